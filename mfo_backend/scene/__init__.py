@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files of a job: scene XML, images. Knows no renderer."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Optimisers and stopping rules. Knows vectors, bounds and losses, no renderer."""

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names, sizes and bounds of the values a fit may change, and their packing into one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import BadInputError
+
+Value = float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One value of a material model.
+
+    `size` is 1 for a scalar and 3 for a linear RGB colour. `lower` and `upper` bound every component during a fit;
+    they lie inside the model's own range where its gradient is defined.
+    """
+
+    name: str
+    size: int
+    lower: float
+    upper: float
+    default: Value
+
+    def __post_init__(self) -> None:
+        if self.size not in (1, 3):
+            raise ValueError(f"parameter {self.name!r} has size {self.size}; allowed are 1 (scalar) and 3 (colour)")
+        if not self.lower < self.upper:
+            raise ValueError(
+                f"parameter {self.name!r} has bounds [{self.lower}, {self.upper}]; lower must be below upper"
+            )
+
+
+class ParameterTable(Sequence[Parameter]):
+    """An ordered set of parameters and its vector layout, colours taking three consecutive entries."""
+
+    def __init__(self, parameters: Iterable[Parameter]) -> None:
+        self._parameters = tuple(parameters)
+        names = [p.name for p in self._parameters]
+        if len(set(names)) != len(names):
+            raise ValueError(f"parameter names repeat in {names}")
+        self._by_name = {p.name: p for p in self._parameters}
+        offsets = np.cumsum([0, *(p.size for p in self._parameters)])
+        self._slices = {p.name: slice(int(a), int(a) + p.size) for p, a in zip(self._parameters, offsets, strict=False)}
+        self.length = int(offsets[-1])
+
+    def __len__(self) -> int:
+        return len(self._parameters)
+
+    def __iter__(self) -> Iterator[Parameter]:
+        return iter(self._parameters)
+
+    def __getitem__(self, key):  # type: ignore[no-untyped-def]  # Sequence's overloads plus lookup by name
+        return self._by_name[key] if isinstance(key, str) else self._parameters[key]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self._parameters)
+
+    @property
+    def lower(self) -> NDArray[np.float64]:
+        """Lower bounds, shape (length,)."""
+        return np.concatenate([np.full(p.size, p.lower) for p in self._parameters])
+
+    @property
+    def upper(self) -> NDArray[np.float64]:
+        """Upper bounds, shape (length,)."""
+        return np.concatenate([np.full(p.size, p.upper) for p in self._parameters])
+
+    def slice_of(self, name: str) -> slice:
+        """Entries of the vector that hold `name`."""
+        return self._slices[name]
+
+    def select(self, names: Iterable[str]) -> ParameterTable:
+        """The named parameters in this table's order.
+
+        Raises
+        ------
+        BadInputError
+            If a name is not in the table, or none is left.
+        """
+        wanted = list(names)
+        unknown = [n for n in wanted if n not in self._by_name]
+        if unknown:
+            raise BadInputError(
+                f"Unknown parameter {', '.join(map(repr, unknown))}: this material has {', '.join(self.names)}."
+            )
+        if not wanted:
+            raise BadInputError(f"No parameter is selected: choose at least one of {', '.join(self.names)}.")
+        return ParameterTable(p for p in self._parameters if p.name in wanted)
+
+    def pack(self, values: Mapping[str, Value]) -> NDArray[np.float64]:
+        """One vector of shape (length,) from a value per name; missing names take their default."""
+        parts = [np.broadcast_to(np.asarray(values.get(p.name, p.default), float), (p.size,)) for p in self._parameters]
+        return np.concatenate(parts)
+
+    def unpack(self, vector: NDArray[np.float64]) -> dict[str, Value]:
+        """The inverse of `pack`: floats for scalars, tuples for colours."""
+        values: dict[str, Value] = {}
+        for p in self._parameters:
+            part = vector[self._slices[p.name]]
+            values[p.name] = float(part[0]) if p.size == 1 else tuple(float(v) for v in part)
+        return values
+
+    def clip(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The nearest vector inside the bounds."""
+        return np.clip(vector, self.lower, self.upper)

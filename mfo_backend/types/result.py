@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a fit reports: the course of every stage and the values it found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .parameter import Value
+from .status import Status
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """One iteration of a stage; `seconds` count from the fit's start, a pass is one primal render at full size."""
+
+    iteration: int
+    loss: float
+    best: float
+    seconds: float
+    passes: float
+
+
+@dataclass(frozen=True)
+class StageReport:
+    """One stage: its loss by name, how it ended, its losses and every iteration."""
+
+    name: str
+    status: Status
+    loss_start: float
+    loss_best: float
+    iterations: int
+    seconds: float
+    values: dict[str, Value]
+    curve: tuple[CurvePoint, ...] = field(repr=False, default=())
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """The recovered values and how they came about.
+
+    `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``.
+    """
+
+    status: Status
+    message: str
+    model: str
+    initial: dict[str, Value]
+    recovered: dict[str, Value]
+    bounds: dict[str, tuple[float, float]]
+    stages: tuple[StageReport, ...]
+    errors: dict[str, tuple[float, float]]
+    seconds: float
+    passes: float
