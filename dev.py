@@ -27,7 +27,7 @@ VENV = ROOT / ".venv"
 LOCK = ROOT / "requirements" / "dev.lock"
 # The bpy module that the demo and the tests use exists for this Python only.
 PYTHON = (3, 11)
-# libLLVM compiles Mitsuba's kernels, the others are what the bpy module links against; a bare Debian or Ubuntu has none.
+# libLLVM compiles Mitsuba's kernels, the others are what the bpy module links against; a bare Debian has none.
 LLVM_PACKAGE = "libllvm19"
 BPY_PACKAGES = [
     "libx11-6",
@@ -194,7 +194,7 @@ def test(arguments: list[str]) -> int:
 
 
 def package() -> int:
-    """Build dist/*.zip with Blender's own builder (the bpy module has no command line, so a Blender program is needed)."""
+    """Build dist/*.zip with Blender's own builder; the bpy module lacks that command, so a program is needed."""
     blender = os.environ.get("MFO_BLENDER", "").split(os.pathsep)[0] or shutil.which("blender")
     if not blender:
         raise DevError("no Blender program: set MFO_BLENDER to one or put `blender` on the PATH")
