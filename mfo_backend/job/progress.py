@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, TextIO
 
-from ..types.event import Event, Preview, Progress, Started
+from ..types.event import Event, Preview, Started
 from ..types.image import Pixels
 from ..types.status import Status
 from .atomic_file import write_atomically
@@ -35,7 +35,7 @@ class EventWriter:
     """
 
     def __init__(self, *, stream: TextIO | None = None, bar: bool = False) -> None:
-        self.has_progress = False
+        self.last_sentence = ""
         self._stream = stream
         self._bar = ProgressBar() if bar else None
         self._folder: JobFolder | None = None
@@ -61,8 +61,6 @@ class EventWriter:
             fields = asdict(event)
         if isinstance(event, Started):
             self._begin()
-        if isinstance(event, Progress):
-            self.has_progress = True
         self._write({"event": event.event, **fields})
         if self._bar is not None:
             self._bar.show(event)
@@ -86,6 +84,7 @@ class EventWriter:
     def _end(self, message: dict[str, Any]) -> None:
         if self._bar is not None:
             self._bar.close()
+        self.last_sentence = message["sentence"]
         self._write(message)
         with self._lock:
             self._ended = True

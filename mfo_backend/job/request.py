@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from ..fit.settings import FitSettings
+from ..metrics.tone_mapping import DisplayView
 from ..types.errors import BadInputError
 from ..types.image import Encoding
 from .checked_object import CheckedObject, is_number, shown
@@ -48,22 +50,8 @@ class Material:
 
 
 @dataclass(frozen=True)
-class FitRequest:
-    """How to fit; `parameters` are names of the model, or "all" or "reduced"."""
-
-    model: str = "mitsuba_principled"
-    preset: str = "paper"
-    parameters: tuple[str, ...] | str = "all"
-    range: str = "hdr"
-    seed: int = 0
-    max_iterations: int = 300
-    spp: int = 16
-    keep_optimizer_state: bool = False
-
-
-@dataclass(frozen=True)
 class Request:
-    """A whole job; paths are relative to its folder, sizes are pixels."""
+    """A whole job; paths are relative to its folder, sizes are pixels. Without a `view` the exposure suits the reference."""
 
     scene: str
     target: Target
@@ -72,10 +60,9 @@ class Request:
     reference: str
     encoding: Encoding
     film_transparent: bool = False
-    exposure_ev: float = 0.0
-    gamma: float = 1.0
+    view: DisplayView | None = None
     materials: Mapping[str, Material] = field(default_factory=dict)
-    fit: FitRequest = field(default_factory=FitRequest)
+    fit: FitSettings = field(default_factory=FitSettings)
     notes: tuple[str, ...] = ()
     generator: Mapping[str, Any] = field(default_factory=dict)
 
@@ -123,7 +110,6 @@ def request_from_json(data: Any) -> Request:
     top = CheckedObject(data, WHERE, keys)
     image = CheckedObject(top.raw("image"), f"{WHERE}: image", ("width", "height", "film_transparent"))
     reference = CheckedObject(top.raw("reference"), f"{WHERE}: reference", ("path", "encoding"))
-    view = CheckedObject(top.raw("view", {}), f"{WHERE}: view", ("exposure_ev", "gamma"))
     return Request(
         scene=top.text("scene"),
         target=_target(top.raw("target")),
@@ -132,8 +118,7 @@ def request_from_json(data: Any) -> Request:
         film_transparent=image.boolean("film_transparent", False),
         reference=reference.text("path"),
         encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
-        exposure_ev=view.number("exposure_ev", -32.0, 32.0, 0.0),  # Blender: -32 to 32
-        gamma=view.number("gamma", 0.01, 5.0, 1.0),  # Blender: 0 to 5, 0 is a black picture
+        view=_view(top.raw("view", None)),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
@@ -160,7 +145,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
             "film_transparent": request.film_transparent,
         },
         "reference": {"path": request.reference, "encoding": request.encoding.value},
-        "view": {"exposure_ev": request.exposure_ev, "gamma": request.gamma},
+        "view": asdict(request.view) if request.view is not None else None,
         "materials": materials,
         "fit": asdict(request.fit),
         "notes": list(request.notes),
@@ -193,21 +178,15 @@ def _material(bsdf_id: str, data: Any) -> Material:
     return Material(material.text("name"), material.text("distribution", "MULTI_GGX"), sockets)
 
 
-def _fit(data: Any) -> FitRequest:
-    default = FitRequest()
-    fit = CheckedObject(data, f"{WHERE}: fit", list(asdict(default)))
-    parameters = fit.raw("parameters", default.parameters)
-    if parameters not in ("all", "reduced"):
-        if isinstance(parameters, str):
-            raise fit.wrong("parameters", "'all', 'reduced' or a list of names")
-        parameters = fit.texts("parameters")
-    return FitRequest(
-        model=fit.text("model", default.model),
-        preset=fit.text("preset", default.preset),
-        parameters=parameters,
-        range=fit.choice("range", ("ldr", "hdr"), default.range),
-        seed=fit.integer("seed", 0, 2**31 - 1, default.seed),
-        max_iterations=fit.integer("max_iterations", 1, 100_000, default.max_iterations),
-        spp=fit.integer("spp", 1, 65536, default.spp),
-        keep_optimizer_state=fit.boolean("keep_optimizer_state", default.keep_optimizer_state),
-    )
+def _fit(data: Any) -> FitSettings:
+    if not isinstance(data, Mapping):
+        raise BadInputError(f"{WHERE}: fit is {shown(data)}: it must be a JSON object.")
+    return FitSettings.from_request(data)
+
+
+def _view(data: Any) -> DisplayView | None:
+    if data is None:
+        return None
+    view = CheckedObject(data, f"{WHERE}: view", ("exposure_ev", "gamma"))
+    # Blender allows -32 to 32 stops and a gamma of 0 to 5, of which 0 is a black picture
+    return DisplayView(view.number("exposure_ev", -32.0, 32.0, 0.0), view.number("gamma", 0.01, 5.0, 1.0))

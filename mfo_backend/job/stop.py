@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import Any, BinaryIO
+from typing import Any
 
 from ..types.status import Status
 from .parent_process import liveness_of
@@ -34,7 +34,7 @@ class StopSignal:
     parent
         Id of a process whose end asks to stop.
     control
-        Binary stream of JSON lines; ``{"cmd": "cancel"}`` and its end ask to stop.
+        File descriptor of a stream of JSON lines; ``{"cmd": "cancel"}`` and its end ask to stop.
     end_process
         Called with the exit code where waiting is no longer right: while a scene is loading, when an orphan does not
         finish, at a second signal.
@@ -45,7 +45,7 @@ class StopSignal:
         *,
         cancel_file: Path | None = None,
         parent: int | None = None,
-        control: BinaryIO | None = None,
+        control: int | None = None,
         end_process: Callable[[int], Any] = os._exit,
         orphan_grace: float = ORPHAN_GRACE,
     ) -> None:
@@ -129,14 +129,21 @@ class StopSignal:
             self._end_process(Status.CANCELLED.exit_code)
 
     def _listen(self) -> None:
+        # os.read, not a buffered file: a thread that dies inside one takes the interpreter's shutdown with it (SIGABRT)
         assert self._control is not None
-        with contextlib.suppress(OSError, ValueError):  # closed under us: the same as its end
-            for line in iter(self._control.readline, b""):
-                with contextlib.suppress(ValueError):  # a line that is not JSON is not for us
-                    command = json.loads(line)
-                    if isinstance(command, dict) and command.get("cmd") == "cancel":
-                        self.request("a cancel command asked to stop")
+        unfinished = b""
+        with contextlib.suppress(OSError):  # closed under us: the same as its end
+            while piece := os.read(self._control, 4096):
+                *lines, unfinished = (unfinished + piece).split(b"\n")
+                for line in lines:
+                    self._obey(line)
         self.request("the program that started this job closed its control stream", orphaned=True)
+
+    def _obey(self, line: bytes) -> None:
+        with contextlib.suppress(ValueError):  # a line that is not JSON is not for us
+            command = json.loads(line)
+            if isinstance(command, dict) and command.get("cmd") == "cancel":
+                self.request("a cancel command asked to stop")
 
     def _install_signals(self) -> Callable[[], None]:
         """Route signals to the watching thread, which sees them even while the main thread is in native code."""

@@ -82,6 +82,11 @@ def configure_llvm() -> Path:
     return found
 
 
+def needs_llvm() -> bool:
+    """Whether the CPU variant is the one to use; an Apple Silicon Mac has Metal."""
+    return not (sys.platform == "darwin" and platform.machine() == "arm64")
+
+
 def require_mitsuba() -> None:
     """Check, without importing them, that Mitsuba and Dr.Jit are installed in this Python.
 

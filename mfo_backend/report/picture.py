@@ -6,32 +6,21 @@ from __future__ import annotations
 import io
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..metrics.tone_mapping import DisplayView
 from ..types.image import Encoding, Image, Pixels
 
 
-def srgb_from_linear(linear: NDArray[np.floating]) -> NDArray[np.floating]:
-    """sRGB display values of linear values in [0, 1] (IEC 61966-2-1)."""
-    root = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, 12.92 * linear, root).astype(linear.dtype, copy=False)
-
-
-def standard_view(pixels: Pixels, *, exposure_ev: float = 0.0, gamma: float = 1.0) -> Pixels:
-    """Display values in [0, 1] of scene-linear pixels under Blender's view transform Standard.
-
-    Blender applies the exposure in stops to the linear values and the power 1/gamma to the display values
-    (Color Management panel, Blender 4.2 to 5.2).
-    """
-    exposed = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1e30) * np.float32(2.0**exposure_ev), 0.0, 1.0)
-    return (srgb_from_linear(exposed) ** np.float32(1.0 / gamma)).astype(np.float32)
-
-
-def displayed(image: Image, *, exposure_ev: float = 0.0, gamma: float = 1.0) -> Pixels:
-    """Display values of an image; one that already holds display values stays as given."""
+def displayed(image: Image, view: DisplayView) -> Pixels:
+    """Display values in [0, 1] of an image; one that already holds display values stays as given."""
     if image.encoding is Encoding.SRGB:
         return np.clip(image.pixels, 0.0, 1.0)
-    return standard_view(image.pixels, exposure_ev=exposure_ev, gamma=gamma)
+    return displayed_linear(image.pixels, view)
+
+
+def displayed_linear(pixels: Pixels, view: DisplayView) -> Pixels:
+    """Display values in [0, 1] of scene-linear pixels; NaN is black."""
+    return view.display(np.nan_to_num(pixels, nan=0.0)).astype(np.float32)
 
 
 def png_bytes(display: Pixels) -> bytes:

@@ -7,9 +7,9 @@ from html import escape
 
 import numpy as np
 
+from ..metrics.colour import srgb_from_linear
 from ..types.parameter import Value
 from ..types.result import FitResult
-from .picture import srgb_from_linear
 
 
 def value_rows(result: FitResult) -> str:
