@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fit that a job runs: the request's scene in Mitsuba against its reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..metrics.tone_mapping import DisplayView
+from ..types.event import Listener
+from ..types.image import Image, Pixels
+from ..types.result import FitResult
+from .job_folder import JobFolder
+from .request import Request, request_to_json
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them."""
+
+    result: FitResult
+    start_image: Pixels
+    result_image: Pixels
+    variant: str = ""
+
+
+class Fitter(Protocol):
+    """Fits what a request asks for; tests give one that needs no renderer."""
+
+    def __call__(
+        self,
+        folder: JobFolder,
+        request: Request,
+        reference: Image,
+        view: DisplayView,
+        *,
+        listener: Listener,
+        should_stop: Callable[[], bool],
+    ) -> JobOutcome:
+        """Run the fit; errors are those of `fit_material`."""
+        ...
+
+
+def fit_scene(
+    folder: JobFolder,
+    request: Request,
+    reference: Image,
+    view: DisplayView,
+    *,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> JobOutcome:
+    """Fit the material of the request's target with Mitsuba.
+
+    Raises
+    ------
+    BadInputError
+        If the scene, the target or a parameter cannot be used.
+    SetupError
+        If Mitsuba or LLVM is missing.
+    """
+    from ..render.llvm import configure_llvm, needs_llvm
+
+    if needs_llvm():
+        configure_llvm()  # before the first import of drjit, so the imports below stay here
+    from ..fit.fit_material import fit_material
+    from ..render.renderer import load_renderer
+    from ..render.variant import load_variant
+
+    variant = load_variant()
+    renderer = load_renderer(
+        folder.root / request.scene,
+        request.target.shape_id,
+        model=request.fit.model,
+        parameters=request.fit.parameters,
+        materials=request_to_json(request)["materials"],
+    )
+    outcome = fit_material(
+        renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
+    )
+    return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
