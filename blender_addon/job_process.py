@@ -176,7 +176,9 @@ class JobProcess:
         if self._cancelled:
             return Outcome("cancelled", "Cancelled; the backend did not answer in time, so nothing of this run was kept.")
         if code < 0:
-            cause = f"The backend was killed by {_signal_name(-code)}; the memory may have run out"
+            name = _signal_name(-code)
+            cause = "The backend was killed; the memory may have run out" if name == "SIGKILL" else "The backend crashed"
+            cause += f" ({name})"
         else:
             cause = _EXIT_SENTENCES.get(code, f"The backend ended with the unknown exit code {code}")
         tail = log_tail(self.folder / LOG)

@@ -10,7 +10,7 @@ import textwrap
 
 import bpy
 
-from . import previews, running_job
+from . import previews
 from .operators.pictures import job_folder_of
 
 
@@ -46,6 +46,11 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
         column.prop(settings, "parameter_set")
         if settings.parameter_set == "chosen":
             column.column(align=True).prop(settings, "parameters", text="Values")
+        header, body = column.panel("mfo_advanced", default_closed=True)
+        header.label(text="Advanced")
+        if body:
+            body.prop(settings, "range")
+            body.prop(settings, "max_iterations")
 
         layout.separator()
         if running:
@@ -56,23 +61,6 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
             row.operator("mfo.fit", icon="PLAY")
             row.operator("mfo.check", text="", icon="VIEWZOOM")
         _draw_outcome(layout, context, runtime)
-
-
-class MFO_PT_settings(_Panel, bpy.types.Panel):
-    """Settings that are rarely changed."""
-
-    bl_idname = "MFO_PT_settings"
-    bl_parent_id = "MFO_PT_fit"
-    bl_label = "Advanced"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw range and iterations."""
-        layout, settings = self.layout, context.scene.mfo
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.enabled = running_job.current is None
-        layout.prop(settings, "range")
-        layout.prop(settings, "max_iterations")
 
 
 class MFO_PT_result(_Panel, bpy.types.Panel):
@@ -91,15 +79,16 @@ class MFO_PT_result(_Panel, bpy.types.Panel):
         layout, runtime = self.layout, context.window_manager.mfo_runtime
         if runtime.has_result:
             _draw_pictures(layout, ("reference", "start", "result"))
-            row = layout.row(align=True)
-            row.operator("mfo.show_pictures", text="Compare", icon="IMAGE_DATA")
-            row.operator("mfo.open_report", text="Report", icon="URL")
-            _draw_table(layout, runtime.errors, "Error")
-            _draw_table(layout, runtime.values, "Value")
         row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator("mfo.apply", text="Apply", icon="CHECKMARK")
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
+        row = layout.row(align=True)
+        row.operator("mfo.show_pictures", text="Compare", icon="IMAGE_DATA")
+        row.operator("mfo.open_report", text="Report", icon="URL")
+        if runtime.has_result:
+            _draw_table(layout, runtime.errors, "Error")
+            _draw_table(layout, runtime.values, "Value")
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -141,17 +130,34 @@ def _draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...]) -> None:
         column = row.column(align=True)
         if previews.icon(name):
             column.template_icon(icon_value=previews.icon(name), scale=5.0)
-        column.label(text=name.title())
+        label = column.row()
+        label.alignment = "CENTER"
+        label.label(text=name.title())
 
 
 def _draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection, title: str) -> None:
     if not rows:
         return
     grid = layout.box().column(align=True)
-    for cells in ((title, "Start", "Result"), *((r.name, r.start, r.result) for r in rows)):
-        row = grid.row()
-        for cell in cells:
-            row.label(text=cell)
+    _draw_cells(grid, title, "Start", "Result")
+    for row in rows:
+        if row.is_color:
+            swatches = _draw_cells(grid, row.name)
+            swatches.enabled = False  # to look at, not to edit
+            swatches.prop(row, "start_color", text="")
+            swatches.prop(row, "result_color", text="")
+        else:
+            _draw_cells(grid, row.name, row.start, row.result)
+
+
+def _draw_cells(layout: bpy.types.UILayout, title: str, *cells: str) -> bpy.types.UILayout:
+    """A line with a wide first column; returns the layout of the others."""
+    split = layout.split(factor=0.46)
+    split.label(text=title)
+    others = split.row()
+    for cell in cells:
+        others.label(text=cell)
+    return others
 
 
 def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
@@ -164,4 +170,4 @@ def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, 
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
-CLASSES = (MFO_PT_fit, MFO_PT_settings, MFO_PT_result)
+CLASSES = (MFO_PT_fit, MFO_PT_result)

@@ -18,6 +18,7 @@ import bpy
 from . import previews
 from .job_process import Event, JobProcess, Outcome
 from .job_result import JobResult, JobResultError, Value, read_job_result
+from .write_back import WriteBackError, result_to_sockets
 
 TICK = 0.15  # seconds between two looks at the process
 _PICTURES = ("reference", "start", "result", "difference")
@@ -41,7 +42,9 @@ result: JobResult | None = None
 material_uid = 0  # of the material `result` belongs to, 0 when it came from another session
 
 
-def start(process: JobProcess, material: bpy.types.Material, notes: Sequence[str], *, timer: bool) -> None:
+def start(
+    process: JobProcess, material: bpy.types.Material, reference: Path, notes: Sequence[str], *, timer: bool
+) -> None:
     """Take over a started process; with `timer` it is looked after while Blender runs."""
     global current, result
     result = None
@@ -52,6 +55,7 @@ def start(process: JobProcess, material: bpy.types.Material, notes: Sequence[str
     previews.clear()
     runtime.state, runtime.material, runtime.job_folder = "RUNNING", material.name, str(process.folder)
     runtime.progress_text = "Starting"
+    previews.show("reference", reference)
     for note in notes:
         add_message(runtime, note, "INFO")
     if timer and not bpy.app.timers.is_registered(_tick):
@@ -89,7 +93,7 @@ def cancel() -> None:
         current.process.cancel()
         runtime = _runtime()
         runtime.state, runtime.progress_text = "CANCELLING", "Cancelling"
-        _redraw()
+        redraw()
 
 
 def close() -> None:
@@ -118,9 +122,9 @@ def show_result(found: JobResult, uid: int, runtime: bpy.types.PropertyGroup | N
     runtime = runtime or _runtime()
     runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
     for name, (before, after) in found.errors.items():
-        _add_row(runtime.errors, _ERROR_LABELS.get(name, name), f"{before:.4g}", f"{after:.4g}")
-    for name, value in found.recovered.items():
-        _add_row(runtime.values, _label(name), _shown(found.initial.get(name)), _shown(value))
+        _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
+    for name, value in result_to_sockets(found).items():
+        _add_row(runtime.values, name, found.sockets_start.get(name), value)
     for note in found.notes:
         if note not in runtime.messages:
             add_message(runtime, note, "INFO")
@@ -136,7 +140,7 @@ def fail(sentences: Sequence[str]) -> None:
     runtime.sentence = sentences[0] if sentences else ""
     for sentence in sentences[1:]:
         add_message(runtime, sentence, "ERROR")
-    _redraw()
+    redraw()
 
 
 def add_message(runtime: bpy.types.PropertyGroup, text: str, icon: str) -> None:
@@ -163,11 +167,11 @@ def _handle(job: RunningJob, event: Event) -> None:
             if path.is_relative_to(job.process.folder.resolve()):
                 previews.show("current", path)
         elif event["event"] == "stage_end":
-            line = "Stage {stage}: {loss_start:.4g} to {loss_best:.4g} in {iterations} iterations. {sentence}"
+            line = "{stage}: {loss_start:.3g} to {loss_best:.3g}, {iterations} iterations ({status})"
             add_message(runtime, line.format_map(event), "CHECKMARK")
     except (KeyError, TypeError, ValueError):
         return  # a newer backend says less or more than we know; its result is what counts
-    _redraw()
+    redraw()
 
 
 def progress_text(event: Event) -> str:
@@ -189,9 +193,9 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
         if outcome.status in _GOOD or (job.process.folder / "result.json").is_file():
             show_result(read_job_result(job.process.folder), job.material_uid, runtime)
             runtime.state = "DONE"
-    except JobResultError as error:
+    except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
-    _redraw()
+    redraw()
 
 
 def _clear(runtime: bpy.types.PropertyGroup) -> None:
@@ -205,26 +209,27 @@ def _runtime() -> bpy.types.PropertyGroup:
     return bpy.context.window_manager.mfo_runtime
 
 
-def _redraw() -> None:
+def redraw() -> None:
+    """Have the sidebar drawn again."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
 
 
-def _add_row(rows: bpy.types.bpy_prop_collection, label: str, before: str, after: str) -> None:
+def _add_row(rows: bpy.types.bpy_prop_collection, label: str, before: Value | None, after: Value) -> None:
     row = rows.add()
-    row.name, row.start, row.result = label, before, after
-
-
-def _label(name: str) -> str:
-    return name.replace("_", " ").title().replace("Ior", "IOR")
+    row.name = label
+    if isinstance(before, tuple) and isinstance(after, tuple):
+        row.is_color, row.start_color, row.result_color = True, before[:3], after[:3]
+    else:
+        row.start, row.result = _shown(before), _shown(after)
 
 
 def _shown(value: Value | None) -> str:
     if value is None:
         return ""
-    return " ".join(f"{v:.3f}" for v in (value if isinstance(value, tuple) else (value,)))
+    return " ".join(f"{v:.4g}" for v in (value if isinstance(value, tuple) else (value,)))
 
 
 def _duration(seconds: float) -> str:

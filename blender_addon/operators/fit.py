@@ -102,7 +102,8 @@ class MFO_OT_fit(bpy.types.Operator):
             if is_new:
                 shutil.rmtree(folder, ignore_errors=True)
             raise FitError(f"The backend could not be started with {python} in {folder} ({error.strerror or error}).") from error
-        running_job.start(process, material, report.notes, timer=not self._blocks() and not bpy.app.background)
+        timer = not self._blocks() and not bpy.app.background
+        running_job.start(process, material, folder / report.request["reference"]["path"], report.notes, timer=timer)
 
     def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, object]:
         parameters: object = self.parameters or settings.parameter_set
@@ -175,6 +176,7 @@ class MFO_OT_check(bpy.types.Operator):
             running_job.add_message(runtime, "Everything can be exported.", "CHECKMARK")
         if runtime.state == "FAILED":
             runtime.state, runtime.sentence = "IDLE", ""
+        running_job.redraw()
         return {"FINISHED"}
 
 

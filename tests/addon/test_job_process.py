@@ -129,6 +129,7 @@ def test_command_line_and_environment(start: Start, monkeypatch: pytest.MonkeyPa
         ("sys.exit(0)", "failed", ["without a result"]),
         ("sys.exit(77)", "failed", ["unknown exit code 77"]),
         ("os.kill(os.getpid(), signal.SIGKILL)", "failed", ["SIGKILL", "memory"]),
+        ("os.abort()", "failed", ["The backend crashed (SIGABRT)"]),
         ("say(event='failed', status='bad_input', sentence='No camera.'); sys.exit(2)", "bad_input", ["No camera."]),
         ("sys.stdout.write('{\"event\": \"finis'); sys.stdout.flush(); os._exit(1)", "failed", ["The backend failed"]),
     ],
