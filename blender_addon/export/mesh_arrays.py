@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From corners of Blender's faces to the shared vertices of Mitsuba's triangles. Knows nothing of bpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ply_file import TriangleMesh
+
+
+@dataclass(frozen=True)
+class CornerMesh:
+    """One triangulated mesh in its own space: three corners a triangle and the material slot of each triangle."""
+
+    positions: NDArray[np.float32]  # (triangles, 3, 3)
+    normals: NDArray[np.float32]  # (triangles, 3, 3)
+    uvs: NDArray[np.float32]  # (triangles, 3, 2)
+    slots: NDArray[np.int32]  # (triangles,)
+    is_closed: bool  # every edge has two faces
+
+
+def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:
+    """Return the triangles selected by `slots` (triangles,) moved by the 4x4 `matrix`, equal corners shared.
+
+    Normals move with the inverse transpose. A mirroring matrix turns the winding around, so that the side a normal
+    points to stays the outside, as in Cycles.
+    """
+    positions = mesh.positions[slots].reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    linear = matrix[:3, :3]
+    mirrored = np.linalg.det(linear) < 0.0
+    # adjugate transpose instead of the inverse: it exists for flat matrices too
+    cofactor = np.stack(
+        [np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])]
+    )
+    if mirrored:
+        cofactor = -cofactor
+    normals = mesh.normals[slots].reshape(-1, 3).astype(np.float64) @ cofactor.T
+    lengths = np.linalg.norm(normals, axis=1)
+    flat = _face_normals(positions.reshape(-1, 3, 3), mirrored)
+    normals = np.where(lengths[:, None] > 1e-20, normals / np.maximum(lengths, 1e-20)[:, None], flat)
+    corners = np.concatenate([positions, normals, mesh.uvs[slots].reshape(-1, 2)], axis=1).astype(np.float32)
+    corners = corners + np.float32(0.0)  # -0.0 and 0.0 are one vertex
+    unique, index = np.unique(corners.view([("", np.float32)] * 8).reshape(-1), return_inverse=True)
+    vertices = unique.view(np.float32).reshape(-1, 8)
+    triangles = index.reshape(-1, 3).astype(np.int32)
+    if mirrored:
+        triangles = triangles[:, ::-1]
+    return TriangleMesh(
+        np.ascontiguousarray(vertices[:, :3]),
+        np.ascontiguousarray(vertices[:, 3:6]),
+        np.ascontiguousarray(vertices[:, 6:]),
+        np.ascontiguousarray(triangles),
+    )
+
+
+def turned(mesh: TriangleMesh, offset: float) -> TriangleMesh:
+    """Return the back of `mesh`: turned around and moved by `offset` metres against its normals."""
+    positions = (mesh.positions - offset * mesh.normals).astype(np.float32)
+    return TriangleMesh(positions, -mesh.normals, mesh.uvs, np.ascontiguousarray(mesh.triangles[:, ::-1]))
+
+
+def _face_normals(triangles: NDArray[np.float64], mirrored: bool) -> NDArray[np.float64]:
+    """Return the geometric normal for each corner, (3 * triangles, 3); +Z for triangles without area."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    if mirrored:
+        normals = -normals
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(lengths > 1e-30, normals / np.maximum(lengths, 1e-30), np.array([0.0, 0.0, 1.0]))
+    return np.repeat(normals, 3, axis=0)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every difference between Blender 4.2 and 5.2 that matters here, found by looking for the feature."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import mathutils
+import numpy as np
+from numpy.typing import NDArray
+
+PRINCIPLED = "ShaderNodeBsdfPrincipled"
+
+
+def working_space_to_rec709() -> NDArray[np.float64] | None:
+    """Return the 3x3 matrix from the scene-linear working space to linear Rec.709, or None where they are the same."""
+    color = mathutils.Color((1.0, 0.0, 0.0))
+    if not hasattr(color, "from_scene_linear_to_rec709_linear"):
+        return None
+    columns = [mathutils.Color(axis).from_scene_linear_to_rec709_linear() for axis in np.eye(3)]
+    matrix = np.array([list(column) for column in columns], dtype=np.float64).T
+    return None if np.allclose(matrix, np.eye(3), atol=1e-5) else matrix
+
+
+def light_strength(light: bpy.types.Light) -> float:
+    """Energy with the exposure of Blender 4.5 and later."""
+    return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+
+
+def light_color(light: bpy.types.Light) -> NDArray[np.float64]:
+    """Colour times the colour temperature of Blender 4.5 and later, in the working space."""
+    color = np.array(light.color, dtype=np.float64)
+    if getattr(light, "use_temperature", False):
+        color = color * np.array(light.temperature_color, dtype=np.float64)
+    return color
+
+
+def light_is_normalized(light: bpy.types.Light) -> bool:
+    """Whether the power is independent of the size (always so before Blender 4.5)."""
+    return getattr(light, "normalize", True)
+
+
+def cycles_settings(owner: Any) -> Any:
+    """Return Cycles' settings of a scene, light, object ..., or None where the Cycles add-on is off."""
+    return getattr(owner, "cycles", None)
+
+
+def active_output(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
+    """Return the output node that Cycles uses."""
+    if tree is None:
+        return None
+    return tree.get_output_node("CYCLES")
+
+
+def node_tree_of(owner: Any) -> bpy.types.NodeTree | None:
+    """Return the shader nodes of a material, world or light; None when it does not use them.
+
+    From Blender 5.0 on `use_nodes` is deprecated and always true for materials and worlds; reading it there is a
+    warning, so it is asked for only where it means something.
+    """
+    tree = getattr(owner, "node_tree", None)
+    if tree is None:
+        return None
+    if isinstance(owner, bpy.types.Light) or bpy.app.version < (5, 0, 0):
+        return tree if owner.use_nodes else None
+    return tree
+
+
+def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """Return the shading normal of every face corner, custom normals included, (corners, 3)."""
+    normals = np.empty(len(mesh.loops) * 3, dtype=np.float32)
+    mesh.corner_normals.foreach_get("vector", normals)
+    return normals.reshape(-1, 3)
