@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar of the 3D view, in the order of the work: reference, what to fit, run, compare, apply.
+
+`draw` only reads properties and icons that exist; it touches no file.
+"""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from . import previews
+from .operators.pictures import job_folder_of
+
+
+class _Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Material Fit"
+
+
+class MFO_PT_fit(_Panel, bpy.types.Panel):
+    """Reference, settings and the run."""
+
+    bl_idname = "MFO_PT_fit"
+    bl_label = "Material Fit"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings and the button or the progress."""
+        layout = self.layout
+        settings, runtime = context.scene.mfo, context.window_manager.mfo_runtime
+        running = runtime.state in {"RUNNING", "CANCELLING"}
+        _draw_target(layout, context)
+
+        column = layout.column()
+        column.enabled = not running
+        column.row().prop(settings, "reference_source", expand=True)
+        if settings.reference_source == "FILE":
+            column.prop(settings, "reference_path", text="")
+        else:
+            column.template_ID(settings, "reference_image", open="image.open")
+        column.separator()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(settings, "preset")
+        column.prop(settings, "parameter_set")
+        if settings.parameter_set == "chosen":
+            column.column(align=True).prop(settings, "parameters", text="Values")
+        header, body = column.panel("mfo_advanced", default_closed=True)
+        header.label(text="Advanced")
+        if body:
+            body.prop(settings, "range")
+            body.prop(settings, "max_iterations")
+
+        layout.separator()
+        if running:
+            _draw_progress(layout, runtime)
+        else:
+            row = layout.row(align=True)
+            row.scale_y = 1.4
+            row.operator("mfo.fit", icon="PLAY")
+            row.operator("mfo.check", text="", icon="VIEWZOOM")
+        _draw_outcome(layout, context, runtime)
+
+
+class MFO_PT_result(_Panel, bpy.types.Panel):
+    """Pictures, numbers, Apply and Revert."""
+
+    bl_idname = "MFO_PT_result"
+    bl_label = "Result"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Hidden until there is something to compare or to revert."""
+        return context.window_manager.mfo_runtime.has_result or bool(job_folder_of(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw pictures, table and buttons."""
+        layout, runtime = self.layout, context.window_manager.mfo_runtime
+        if runtime.has_result:
+            _draw_pictures(layout, ("reference", "start", "result"))
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator("mfo.apply", text="Apply", icon="CHECKMARK")
+        row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
+        row = layout.row(align=True)
+        row.operator("mfo.show_pictures", text="Compare", icon="IMAGE_DATA")
+        row.operator("mfo.open_report", text="Report", icon="URL")
+        if runtime.has_result:
+            _draw_table(layout, runtime.errors, "Error")
+            _draw_table(layout, runtime.values, "Value")
+
+
+def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    obj = context.object
+    if obj is None:
+        layout.label(text="Select an object", icon="ERROR")
+        return
+    material = obj.active_material
+    row = layout.row()
+    row.label(text=obj.name, icon="OBJECT_DATA")
+    row.label(text=material.name if material else "No material", icon="MATERIAL" if material else "ERROR")
+
+
+def _draw_progress(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup) -> None:
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    row.progress(factor=runtime.fraction, type="BAR", text=runtime.progress_text)
+    row.operator("mfo.cancel", text="", icon="X")
+    if runtime.detail:
+        layout.label(text=runtime.detail)
+    if previews.icon("current"):
+        _draw_pictures(layout, ("reference", "current"))
+
+
+def _draw_outcome(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
+    if runtime.state in {"DONE", "FAILED"}:
+        box = layout.box()
+        box.alert = runtime.state == "FAILED"
+        _wrapped(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
+    if runtime.messages:
+        box = layout.box().column(align=True)
+        for message in runtime.messages:
+            _wrapped(box, context, message.name, message.icon or "INFO")
+
+
+def _draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...]) -> None:
+    row = layout.row(align=True)
+    for name in names:
+        column = row.column(align=True)
+        if previews.icon(name):
+            column.template_icon(icon_value=previews.icon(name), scale=5.0)
+        label = column.row()
+        label.alignment = "CENTER"
+        label.label(text=name.title())
+
+
+def _draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection, title: str) -> None:
+    if not rows:
+        return
+    grid = layout.box().column(align=True)
+    _draw_cells(grid, title, "Start", "Result")
+    for row in rows:
+        if row.is_color:
+            swatches = _draw_cells(grid, row.name)
+            swatches.enabled = False  # to look at, not to edit
+            swatches.prop(row, "start_color", text="")
+            swatches.prop(row, "result_color", text="")
+        else:
+            _draw_cells(grid, row.name, row.start, row.result)
+
+
+def _draw_cells(layout: bpy.types.UILayout, title: str, *cells: str) -> bpy.types.UILayout:
+    """A line with a wide first column; returns the layout of the others."""
+    split = layout.split(factor=0.46)
+    split.label(text=title)
+    others = split.row()
+    for cell in cells:
+        others.label(text=cell)
+    return others
+
+
+def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
+    """A sentence over as many lines as the sidebar needs; labels do not wrap."""
+    scale = context.preferences.system.ui_scale
+    width = max(16, int((context.region.width / scale - 70) / 6.2))  # 6.2 px is an average letter at scale 1
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for i, line in enumerate(textwrap.wrap(text, width) or [""]):
+        column.label(text=line, icon=icon if i == 0 else "BLANK1")
+
+
+CLASSES = (MFO_PT_fit, MFO_PT_result)
