@@ -14,10 +14,10 @@ OBJECT = "Suzanne"
 WORLDS = ("city", "courtyard", "forest", "interior", "studio", "sunrise", "sunset")  # night is nearly black
 
 
-def build_demo_scene(folder: Path, seed: int, size: int = 256) -> tuple[Path, Path]:
+def build_demo_scene(folder: Path, seed: int, size: int = 256) -> dict[str, dict[str, object]]:
     """Write `truth.blend` and `start.blend`: one scene, two materials.
 
-    The materials and the light depend on `seed` alone. Returns the two paths.
+    The materials and the light depend on `seed` alone. Returns the socket values by file: `truth` and `start`.
     """
     draw = random.Random(seed)
     folder.mkdir(parents=True, exist_ok=True)
@@ -27,13 +27,12 @@ def build_demo_scene(folder: Path, seed: int, size: int = 256) -> tuple[Path, Pa
     _add_camera()
     _add_table()
     sockets = _add_head().inputs
-    truth, start = _random_material(draw), _random_material(draw)
-    paths = folder / "truth.blend", folder / "start.blend"
-    for path, values in zip(paths, (truth, start), strict=True):
+    materials = {name: _random_material(draw) for name in ("truth", "start")}
+    for file, values in materials.items():
         for name, value in values.items():
             sockets[name].default_value = value
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
-    return paths
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{file}.blend"), compress=True, copy=True)
+    return materials
 
 
 def _random_material(draw: random.Random) -> dict[str, object]:

@@ -53,7 +53,9 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     obj = bpy.context.scene.objects.get(chosen.object)
     if obj is None:
         names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
-        raise HeadlessError(f"{chosen.file} has no object {chosen.object!r} in its scene; its mesh objects are: {names}.")
+        raise HeadlessError(
+            f"{chosen.file} has no object {chosen.object!r} in its scene; its mesh objects are: {names}."
+        )
     try:
         fit = json.loads(chosen.fit)
     except ValueError as error:
@@ -61,7 +63,9 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     if not isinstance(fit, dict):
         raise HeadlessError("--fit is not a JSON object.")
     try:
-        report = export_job(bpy.context, obj, Path(chosen.job).absolute(), reference=chosen.reference.absolute(), fit=fit)
+        report = export_job(
+            bpy.context, obj, Path(chosen.job).absolute(), reference=chosen.reference.absolute(), fit=fit
+        )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
     return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
@@ -109,6 +113,14 @@ def render(chosen: argparse.Namespace) -> dict[str, Any]:
     return {"picture": str(chosen.out)}
 
 
+def demo_scene(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Build the scene of `mfo demo` in a folder; returns the object's name and the socket values of both materials."""
+    from .demo_scene import OBJECT, build_demo_scene
+
+    materials = build_demo_scene(chosen.file.absolute(), chosen.scene_seed, chosen.size)
+    return {"object": OBJECT, **materials}
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="headless", description="Blender's part of `mfo blend`.")
     commands = parser.add_subparsers(dest="command", required=True, parser_class=_Parser)
@@ -132,6 +144,9 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--out", required=True, type=Path)
     command.add_argument("--samples", type=int, default=64)
     command.add_argument("--seed", type=int, default=0)
+    command = add("demo-scene", demo_scene)
+    command.add_argument("--scene-seed", type=int, default=0)
+    command.add_argument("--size", type=int, default=256)
     return parser
 
 

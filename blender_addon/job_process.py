@@ -174,16 +174,22 @@ class JobProcess:
             fallback = _EXIT_SENTENCES.get(code, "The backend ended") + "."
             return Outcome(str(last.get("status", "failed")), str(last.get("sentence") or fallback))
         if self._cancelled:
-            return Outcome("cancelled", "Cancelled; the backend did not answer in time, so nothing of this run was kept.")
+            return Outcome(
+                "cancelled", "Cancelled; the backend did not answer in time, so nothing of this run was kept."
+            )
         if code < 0:
             name = _signal_name(-code)
-            cause = "The backend was killed; the memory may have run out" if name == "SIGKILL" else "The backend crashed"
+            cause = (
+                "The backend was killed; the memory may have run out" if name == "SIGKILL" else "The backend crashed"
+            )
             cause += f" ({name})"
         else:
             cause = _EXIT_SENTENCES.get(code, f"The backend ended with the unknown exit code {code}")
         tail = log_tail(self.folder / LOG)
         reason = next((line.strip() for line in reversed(tail.splitlines()) if line.strip()), "")
-        sentence = f"{cause}; its log {self.folder / LOG} ends with: {reason}" if reason else f"{cause}; its log is empty."
+        sentence = (
+            f"{cause}; its log {self.folder / LOG} ends with: {reason}" if reason else f"{cause}; its log is empty."
+        )
         return Outcome(_EXIT_STATUS.get(code, "failed"), sentence, tail)
 
     def _send(self, line: bytes) -> None:

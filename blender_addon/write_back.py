@@ -51,7 +51,9 @@ def result_to_sockets(result: JobResult) -> dict[str, Value]:
         names = {socket_to_parameter(name): name for name in result.sockets_start}
         unknown = [name for name in result.recovered if name not in names]
         if unknown:
-            raise WriteBackError(f"The result holds {', '.join(unknown)}, which no socket of its material is named after.")
+            raise WriteBackError(
+                f"The result holds {', '.join(unknown)}, which no socket of its material is named after."
+            )
         return {names[name]: value for name, value in result.recovered.items()}
     raise WriteBackError(f"The result is of the model {result.model!r}, which this add-on cannot apply; update it.")
 

@@ -105,14 +105,20 @@ def _pictures(pictures: Mapping[str, bytes]) -> str:
 
 
 def _value_table(result: FitResult) -> str:
-    head = "".join(f"<th>{name}</th>" for name in ("Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"))
+    head = "".join(
+        f"<th>{name}</th>" for name in ("Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered")
+    )
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{value_rows(result)}</tbody></table>"
-    return f'<div class="scroll">{table}</div><p class="soft">Colours are linear Rec.709.</p>' if result.recovered else ""
+    return (
+        f'<div class="scroll">{table}</div><p class="soft">Colours are linear Rec.709.</p>' if result.recovered else ""
+    )
 
 
 def _plot(result: FitResult) -> str:
     plot = loss_plot(result.stages)
-    legend = '<p class="soft">Thick: best so far; thin: every iteration. A dashed line marks the switch of the loss.</p>'
+    legend = (
+        '<p class="soft">Thick: best so far; thin: every iteration. A dashed line marks the switch of the loss.</p>'
+    )
     return f'<div class="plot">{plot}</div>{legend}' if plot else ""
 
 
@@ -123,8 +129,12 @@ def _stage_table(result: FitResult) -> str:
         f'<td class="sentence">{escape(stage.status.sentence)}</td></tr>'
         for stage in result.stages
     )
-    head = "".join(f"<th>{name}</th>" for name in ("Stage", "Loss at start", "Best loss", "Iterations", "Time", "Ended"))
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
+    head = "".join(
+        f"<th>{name}</th>" for name in ("Stage", "Loss at start", "Best loss", "Iterations", "Time", "Ended")
+    )
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
+    )
 
 
 def _error_table(result: FitResult) -> str:
@@ -134,4 +144,6 @@ def _error_table(result: FitResult) -> str:
         for name, (before, after) in result.errors.items()
     )
     head = "".join(f"<th>{name}</th>" for name in ("Measure", "Start", "Result", ""))
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
+    )

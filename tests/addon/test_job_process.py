@@ -131,7 +131,7 @@ def test_command_line_and_environment(start: Start, monkeypatch: pytest.MonkeyPa
         ("os.kill(os.getpid(), signal.SIGKILL)", "failed", ["SIGKILL", "memory"]),
         ("os.abort()", "failed", ["The backend crashed (SIGABRT)"]),
         ("say(event='failed', status='bad_input', sentence='No camera.'); sys.exit(2)", "bad_input", ["No camera."]),
-        ("sys.stdout.write('{\"event\": \"finis'); sys.stdout.flush(); os._exit(1)", "failed", ["The backend failed"]),
+        ('sys.stdout.write(\'{"event": "finis\'); sys.stdout.flush(); os._exit(1)', "failed", ["The backend failed"]),
     ],
 )
 def test_every_end_has_a_sentence(start: Start, body: str, status: str, words: list[str]) -> None:

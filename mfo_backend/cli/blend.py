@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfo blend`: fit a material of a .blend file, with a Blender program or the bpy module doing Blender's part."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..job.fit_scene import fit_scene
+from ..job.progress import EventWriter
+from ..job.run_job import run_job
+from ..job.stop import StopSignal
+from ..types.errors import BadInputError, MfoError, SetupError
+from ..types.status import Status
+from .blender_host import BlenderHost, find_blender_host
+from .fit_options import add_fit_options, fit_from_options
+
+_ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
+
+
+@dataclass(frozen=True)
+class BlendFit:
+    """A finished job of a .blend file: its folder, result.json and the sentences of the export."""
+
+    job: Path
+    result: Mapping[str, Any]
+    notes: tuple[str, ...]
+
+
+def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
+    """Add `mfo blend`."""
+    parser = subparsers.add_parser(
+        "blend",
+        help="fit a material of a .blend file to a reference picture",
+        description="Fit the active material of an object of a .blend file to a reference picture.",
+    )
+    parser.add_argument("file", type=Path, help="the .blend file; it is not changed unless --apply is given alone")
+    parser.add_argument("--object", required=True, metavar="NAME", help="object whose active material is fitted")
+    parser.add_argument("--reference", required=True, type=Path, help="the picture: EXR, HDR, PNG, JPEG or TIFF")
+    add_fit_options(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="job folder (default: a new temporary one)")
+    parser.add_argument("--apply", action="store_true", help="put the recovered values on the material and save")
+    parser.add_argument("--save-as", type=Path, metavar="BLEND", help="with --apply: save here, not over FILE")
+    parser.add_argument("--blender", metavar="PROGRAM", help="a Blender program (default: MFO_BLENDER, bpy, PATH)")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
+    parser.set_defaults(func=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Export, fit and apply; the exit code is that of the fit."""
+    if arguments.save_as and not arguments.apply:
+        raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
+    host = find_blender_host(arguments.blender)
+    job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
+    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, fit_from_options(arguments))
+    saved = None
+    if arguments.apply:
+        saved = arguments.save_as or arguments.file
+        applied = apply_result(host, arguments.file, fit.job, saved)
+        fit = BlendFit(fit.job, fit.result, (*fit.notes, *applied))
+    if arguments.json:
+        answer = {**fit.result, "notes": fit.notes, "job": str(fit.job), "saved": str(saved) if saved else None}
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        for line in (*fit.notes, *summary(fit), *([f"saved {saved}"] if saved else [])):
+            print(line)
+    return Status(fit.result["status"]).exit_code
+
+
+def fit_blend(
+    host: BlenderHost, blend: Path, object_name: str, reference: Path, job: Path, fit: Mapping[str, Any]
+) -> BlendFit:
+    """Export a job from a .blend file and run it with a progress bar on stderr.
+
+    Raises
+    ------
+    BadInputError, SetupError, MfoError
+        With the sentence of the export or of the fit. A cancelled fit is a result, with what was found so far.
+    """
+    exported = host.call(
+        "export", blend, "--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)
+    )
+    events = EventWriter(bar=sys.stderr.isatty())
+    stop = StopSignal(cancel_file=job / "cancel")
+    with stop.watching():
+        status = run_job(job, events, stop, fitter=fit_scene)
+    result = job / "result.json"
+    if not result.is_file():
+        raise _ERRORS.get(status, MfoError)(events.last_sentence)
+    return BlendFit(job, json.loads(result.read_text("utf-8")), tuple(exported.get("notes", ())))
+
+
+def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path) -> tuple[str, ...]:
+    """Save `blend` with the recovered values on its material; returns what was skipped, in sentences."""
+    applied = host.call("apply", blend, "--job", job, "--save-as", save_as)
+    return tuple(applied.get("notes", ()))
+
+
+def summary(fit: BlendFit) -> list[str]:
+    """Lines for the terminal: outcome, errors, values and where the report is."""
+    result = fit.result
+    lines = [result["sentence"]]
+    lines += [f"{name}: {start:.4f} -> {end:.4f}" for name, (start, end) in result["errors"].items()]
+    for name, value in result["recovered"].items():
+        lines.append(f"  {name} = {_shown(value)}  (was {_shown(result['initial'][name])})")
+    lines.append(f"{result['seconds']:.1f} s, report: {fit.job / 'index.html'}")
+    return lines
+
+
+def _shown(value: Any) -> str:
+    """A scalar or colour with three digits."""
+    return ", ".join(f"{v:.3f}" for v in value) if isinstance(value, (list, tuple)) else f"{value:.3f}"
