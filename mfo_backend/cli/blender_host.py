@@ -45,9 +45,8 @@ class BlenderHost:
         if answer is None:
             tail = " | ".join((done.stderr + done.stdout).strip().splitlines()[-4:])
             raise MfoError(f"{self.name} ended with code {done.returncode} and no answer: {tail}")
-        status = Status(answer.get("status", "converged"))
-        if status in (Status.BAD_INPUT, Status.SETUP, Status.FAILED):
-            raise ERRORS.get(status, MfoError)(answer["sentence"])
+        if answer["status"] != "ok":
+            raise ERRORS.get(Status(answer["status"]), MfoError)(answer["sentence"])
         return answer
 
 

@@ -47,6 +47,7 @@ class Material:
     name: str
     distribution: str
     sockets: Mapping[str, Socket]
+    subsurface_method: str = "RANDOM_WALK"
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,7 @@ def _target(data: Any) -> Target:
 
 def _material(bsdf_id: str, data: Any) -> Material:
     where = f"{WHERE}: materials.{bsdf_id}"
-    material = CheckedObject(data, where, ("name", "distribution", "sockets"))
+    material = CheckedObject(data, where, ("name", "distribution", "subsurface_method", "sockets"))
     sockets = {}
     for name, entry in material.mapping("sockets").items():
         socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture"))
@@ -175,7 +176,12 @@ def _material(bsdf_id: str, data: Any) -> Material:
             raise socket.wrong("value", "a number, a list of numbers or null")
         texture = socket.text("texture") if socket.raw("texture", None) is not None else None
         sockets[name] = Socket(value, socket.boolean("linked", False), texture)
-    return Material(material.text("name"), material.text("distribution", "MULTI_GGX"), sockets)
+    return Material(
+        name=material.text("name"),
+        distribution=material.text("distribution", "MULTI_GGX"),
+        sockets=sockets,
+        subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
+    )
 
 
 def _fit(data: Any) -> FitSettings:
