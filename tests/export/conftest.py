@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes built in bpy, rendered by Cycles on one side and, after an export, by Mitsuba on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+OpenEXR = pytest.importorskip("OpenEXR")
+mi = pytest.importorskip("mitsuba")
+
+from blender_addon.export.job import ExportReport, export_job  # noqa: E402
+
+Pixels = np.ndarray
+
+
+@pytest.fixture(scope="session")
+def mitsuba() -> Any:
+    variant = "llvm_ad_rgb" if "llvm_ad_rgb" in mi.variants() else "scalar_rgb"
+    mi.set_variant(variant)
+    return mi
+
+
+@pytest.fixture
+def scene() -> Any:
+    """An empty scene, 32x32, box filter, Cycles on the CPU without anything that biases it."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.samples = 64
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.pixel_filter_type = "BOX"
+    cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
+    cycles.max_bounces = 0
+    return scene
+
+
+@pytest.fixture
+def render_cycles(tmp_path: Path) -> Callable[[], Pixels]:
+    def render() -> Pixels:
+        """Return what Cycles sees, linear (height, width, 3)."""
+        path = tmp_path / "cycles.exr"
+        bpy.context.scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+        return np.array(next(iter(OpenEXR.File(str(path)).channels().values())).pixels[:, :, :3])
+
+    return render
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Callable[..., ExportReport]:
+    def run(target: Any, name: str = "job", **options: Any) -> ExportReport:
+        options = {"reference": None, "fit": {}, **options}
+        return export_job(bpy.context, target, tmp_path / name, **options)
+
+    return run
+
+
+@pytest.fixture
+def render_mitsuba(mitsuba: Any) -> Callable[..., Pixels]:
+    def render(report: ExportReport, spp: int = 64) -> Pixels:
+        """Return what `mi.load_file` and `mi.render` make of the job's scene."""
+        return np.array(mitsuba.render(mitsuba.load_file(str(report.folder / "scene.xml")), spp=spp))[:, :, :3]
+
+    return render
+
+
+def new_material(name: str, **sockets: Any) -> Any:
+    """A Principled material with the given sockets (spaces as underscores)."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    node = material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    for socket, value in sockets.items():
+        target = node.inputs[socket.replace("_", " ")]
+        target.default_value = (*value, 1.0) if target.type == "RGBA" else value
+    return material
+
+
+def diffuse_material(name: str, color: tuple[float, float, float]) -> Any:
+    """A Lambertian material: the same in both renderers."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.inputs["Color"].default_value = (*color, 1.0)
+    node.inputs["Roughness"].default_value = 0.0
+    tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    return material
+
+
+def add_mesh(name: str, vertices: Any, faces: Any, material: Any) -> Any:
+    """Link a new mesh object."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    mesh.materials.append(material)
+    item = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(item)
+    return item
+
+
+def add_quad(name: str, size: float, height: float, material: Any) -> Any:
+    """A horizontal square around the origin."""
+    h = size / 2
+    return add_mesh(name, [(-h, -h, height), (h, -h, height), (h, h, height), (-h, h, height)], [(0, 1, 2, 3)], material)
+
+
+def add_camera(kind: str = "ORTHO", location: Any = (0, 0, 5), rotation: Any = (0, 0, 0), **settings: Any) -> Any:
+    """Add and activate a camera; without rotation it looks down."""
+    data = bpy.data.cameras.new("Camera")
+    data.type = kind
+    for name, value in settings.items():
+        setattr(data, name, value)
+    item = bpy.data.objects.new("Camera", data)
+    item.location, item.rotation_euler = location, rotation
+    bpy.context.collection.objects.link(item)
+    bpy.context.scene.camera = item
+    return item
+
+
+def add_light(kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), scale: Any = (1, 1, 1), **settings: Any) -> Any:
+    """Add a light; without rotation it shines down."""
+    data = bpy.data.lights.new("Light", kind)
+    for name, value in settings.items():
+        setattr(data, name, value)
+    item = bpy.data.objects.new("Light", data)
+    item.location, item.rotation_euler, item.scale = location, rotation, scale
+    bpy.context.collection.objects.link(item)
+    return item
