@@ -76,7 +76,5 @@ def fit_scene(
         parameters=request.fit.parameters,
         materials=request_to_json(request)["materials"],
     )
-    outcome = fit_material(
-        renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
-    )
+    outcome = fit_material(renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop)
     return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)

@@ -76,7 +76,9 @@ class JobFolder:
         absolute = relative.startswith("/") or re.match(r"[A-Za-z]:", relative) is not None
         if absolute or "\\" in relative or "\0" in relative:
             kind = "an absolute path" if absolute else "not a path with forward slashes"
-            raise BadInputError(f"{what} is {relative!r}, {kind}: give it relative to the job folder, like 'scene.xml'.")
+            raise BadInputError(
+                f"{what} is {relative!r}, {kind}: give it relative to the job folder, like 'scene.xml'."
+            )
         if ".." in parts or not parts:
             raise BadInputError(f"{what} is {relative!r}, which leaves the job folder: put the file inside it.")
         path = self.root.joinpath(*parts)

@@ -7,7 +7,7 @@ from ..types.event import Event, Progress, StageEnd
 
 
 class ProgressBar:
-    """A bar on stderr over the whole fit, with stage, loss and remaining time; each ended stage leaves a line."""
+    """A bar where stderr is a terminal, with stage, loss and remaining time; each ended stage leaves a line."""
 
     def __init__(self) -> None:
         self._bar = None
@@ -19,7 +19,7 @@ class ProgressBar:
         if isinstance(event, Progress):
             if self._bar is None:
                 style = "{desc} {percentage:3.0f}%|{bar:24}| {postfix}"
-                self._bar = tqdm(total=1.0, bar_format=style, leave=False, dynamic_ncols=True, mininterval=0.1)
+                self._bar = tqdm(total=1.0, bar_format=style, leave=False, dynamic_ncols=True, disable=None)
             self._bar.set_description_str(f"{event.stage} ({event.stage_index + 1}/{event.stage_count})", refresh=False)
             left = f"{event.remaining_seconds:.0f} s left"
             self._bar.set_postfix_str(f"loss {event.best:.3g}, iteration {event.iteration}, {left}", refresh=False)
