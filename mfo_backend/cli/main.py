@@ -9,6 +9,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TextIO
 
 from .. import __version__
 from ..types.errors import MfoError
@@ -30,22 +31,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     parsed = _parser(words).parse_args(words)
+    stream = sys.stdout if getattr(parsed, "json", False) else None
     try:
         return parsed.func(parsed)
     except MfoError as error:
-        return report_error(error.status, str(error), as_json=getattr(parsed, "json", False))
+        return report_error(error.status, str(error), stream=stream)
     except KeyboardInterrupt:
-        return report_error(Status.CANCELLED, "Interrupted.", as_json=getattr(parsed, "json", False))
+        return report_error(Status.CANCELLED, "Interrupted.", stream=stream)
     except BrokenPipeError:  # the reader of our output has closed it (`mfo doctor | head -1`)
         sys.stderr.close()
         return Status.FAILED.exit_code
 
 
-def report_error(status: Status, sentence: str, *, as_json: bool) -> int:
-    """Write ``mfo: sentence`` to stderr and, for `--json`, one object to stdout; returns the exit code."""
+def report_error(status: Status, sentence: str, *, stream: TextIO | None) -> int:
+    """Write ``mfo: sentence`` to stderr and, for `--json`, one object to `stream`; returns the exit code."""
     print(f"mfo: {sentence}", file=sys.stderr)
-    if as_json:
-        print(json.dumps({"status": status.value, "sentence": sentence}, ensure_ascii=False))
+    if stream is not None:
+        print(json.dumps({"status": status.value, "sentence": sentence}, ensure_ascii=False), file=stream, flush=True)
     return status.exit_code
 
 

@@ -61,7 +61,7 @@ def write_outputs(
 
 
 def bytes_needed(request: Request) -> int:
-    """An upper estimate of what a job writes: four 8-bit pictures, twice with their copies in the report, and one EXR."""
+    """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, and one EXR."""
     pixels = request.width * request.height
     return 2**20 + pixels * (4 * 3 * 3 + 12)
 

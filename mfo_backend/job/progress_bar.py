@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 from ..types.event import Event, Progress, StageEnd
+
+_STYLE = "{desc} {percentage:3.0f}%|{bar:24}| {postfix}"
 
 
 class ProgressBar:
-    """A bar on stderr over the whole fit, with stage, loss and remaining time; each ended stage leaves a line."""
+    """A bar where stderr is a terminal, with stage, loss and remaining time; each ended stage leaves a line."""
 
     def __init__(self) -> None:
         self._bar = None
@@ -18,8 +23,15 @@ class ProgressBar:
 
         if isinstance(event, Progress):
             if self._bar is None:
-                style = "{desc} {percentage:3.0f}%|{bar:24}| {postfix}"
-                self._bar = tqdm(total=1.0, bar_format=style, leave=False, dynamic_ncols=True, mininterval=0.1)
+                self._bar = tqdm(
+                    total=1.0,
+                    bar_format=_STYLE,
+                    leave=False,
+                    disable=None,  # shown on a terminal only
+                    miniters=0,
+                    ncols=_columns(),
+                    nrows=20,  # tqdm would ask the terminal, and draw nothing where it reports no rows
+                )
             self._bar.set_description_str(f"{event.stage} ({event.stage_index + 1}/{event.stage_count})", refresh=False)
             left = f"{event.remaining_seconds:.0f} s left"
             self._bar.set_postfix_str(f"loss {event.best:.3g}, iteration {event.iteration}, {left}", refresh=False)
@@ -28,7 +40,7 @@ class ProgressBar:
             tqdm.write(
                 f"{event.stage}: {event.loss_start:.4g} -> {event.loss_best:.4g} "
                 f"in {event.iterations} iterations. {event.sentence}",
-                file=_stderr(),
+                file=sys.stderr,
             )
 
     def close(self) -> None:
@@ -38,7 +50,9 @@ class ProgressBar:
             self._bar = None
 
 
-def _stderr():  # type: ignore[no-untyped-def]  # looked up at the time of writing, tests replace it
-    import sys
-
-    return sys.stderr
+def _columns() -> int:
+    """Width of the terminal at stderr; some report none, and tqdm would draw nothing there."""
+    try:
+        return os.get_terminal_size(2).columns or 100
+    except OSError:
+        return 100

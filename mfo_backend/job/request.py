@@ -14,10 +14,12 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding
 from .checked_object import CheckedObject, is_number, shown
 from .job_folder import JobFolder
+from .scene_files import check_scene_files
 
 SCHEMA_VERSION = 1
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
+_KEYS = ("schema_version", "generator", "scene", "target", "image", "reference", "view", "materials", "fit", "notes")
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Request:
-    """A whole job; paths are relative to its folder, sizes are pixels. Without a `view` the exposure suits the reference."""
+    """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference."""
 
     scene: str
     target: Target
@@ -86,6 +88,7 @@ def read_request(folder: JobFolder) -> Request:
     request = request_from_json(data)
     folder.file(request.scene, what=f"{WHERE}: scene")
     folder.file(request.reference, what=f"{WHERE}: reference.path")
+    check_scene_files(folder, request.scene)
     for bsdf_id, material in request.materials.items():
         for name, socket in material.sockets.items():
             if socket.texture is not None:
@@ -107,8 +110,7 @@ def request_from_json(data: Any) -> Request:
             f"{WHERE} has schema_version {shown(version)}, this backend reads {SCHEMA_VERSION}: "
             "use add-on and backend of one release."
         )
-    keys = "schema_version generator scene target image reference view materials fit notes".split()
-    top = CheckedObject(data, WHERE, keys)
+    top = CheckedObject(data, WHERE, _KEYS)
     image = CheckedObject(top.raw("image"), f"{WHERE}: image", ("width", "height", "film_transparent"))
     reference = CheckedObject(top.raw("reference"), f"{WHERE}: reference", ("path", "encoding"))
     return Request(

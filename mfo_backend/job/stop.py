@@ -60,8 +60,6 @@ class StopSignal:
         self._control = control
         self._end_process = end_process
         self._orphan_grace = orphan_grace
-        self._wake, self._woken = socket.socketpair()
-        self._wake.setblocking(False)
         self._signals = 0
 
     def requested(self) -> bool:
@@ -79,8 +77,10 @@ class StopSignal:
     @contextlib.contextmanager
     def watching(self) -> Iterator[StopSignal]:
         """Watch all sources while the block runs; only here are SIGTERM and SIGINT requests instead of ends."""
-        restore = self._install_signals()
-        threads = [threading.Thread(target=self._watch, name="mfo-stop", daemon=True)]
+        wake, woken = socket.socketpair()
+        wake.setblocking(False)
+        restore = self._install_signals(wake)
+        threads = [threading.Thread(target=self._watch, args=(woken,), name="mfo-stop", daemon=True)]
         if self._control is not None:
             threads.append(threading.Thread(target=self._listen, name="mfo-control", daemon=True))
         for thread in threads:
@@ -90,11 +90,11 @@ class StopSignal:
         finally:
             self._done.set()
             with contextlib.suppress(OSError):
-                self._wake.send(b"\0")
+                wake.send(b"\0")
             threads[0].join()
             restore()
-            self._wake.close()
-            self._woken.close()
+            wake.close()
+            woken.close()
 
     def loading(self, last_words: Callable[[], None]) -> None:
         """From now on there is nothing to keep: a request runs `last_words` and ends the process soon after it."""
@@ -104,11 +104,11 @@ class StopSignal:
         """From now on the fit itself answers `requested` and keeps its best values."""
         self._while_loading = None
 
-    def _watch(self) -> None:
+    def _watch(self, woken: socket.socket) -> None:
         while not self._done.is_set():
-            ready, _, _ = select.select([self._woken], [], [], POLL_SECONDS)
+            ready, _, _ = select.select([woken], [], [], POLL_SECONDS)
             if ready:
-                self._signals += sum(1 for number in self._woken.recv(64) if number)
+                self._signals += sum(1 for number in woken.recv(64) if number)
                 if self._signals:
                     self.request("a signal asked to stop")
                 if self._signals > 1:  # someone insists
@@ -145,7 +145,7 @@ class StopSignal:
             if isinstance(command, dict) and command.get("cmd") == "cancel":
                 self.request("a cancel command asked to stop")
 
-    def _install_signals(self) -> Callable[[], None]:
+    def _install_signals(self, wake: socket.socket) -> Callable[[], None]:
         """Route signals to the watching thread, which sees them even while the main thread is in native code."""
         if threading.current_thread() is not threading.main_thread():
             return lambda: None
@@ -155,7 +155,7 @@ class StopSignal:
 
         names = [name for name in ("SIGTERM", "SIGINT", "SIGBREAK") if hasattr(signal, name)]
         before = {getattr(signal, name): signal.signal(getattr(signal, name), note) for name in names}
-        wakeup_before = signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
+        wakeup_before = signal.set_wakeup_fd(wake.fileno(), warn_on_full_buffer=False)
 
         def restore() -> None:
             signal.set_wakeup_fd(wakeup_before)

@@ -16,6 +16,7 @@ def render_probe_kernel() -> dict[str, object]:
     """Render and differentiate 8x8 pixels; the LLVM version and vector width that did it."""
     import drjit as dr
     import mitsuba as mi
+    import numpy as np
 
     mi.set_variant("llvm_ad_rgb")
     material = {
@@ -51,9 +52,9 @@ def render_probe_kernel() -> dict[str, object]:
     for key in keys:
         dr.enable_grad(parameters[key])
     parameters.update()
-    image = mi.render(scene, parameters, spp=1, seed=0)
+    image = mi.render(scene, parameters, spp=1, seed=0)  # type: ignore[arg-type]
     dr.backward(dr.mean(dr.square(image), axis=None))
-    slopes = [float(value) for key in keys for value in dr.grad(parameters[key]).numpy().ravel()]
+    slopes = [float(value) for key in keys for value in np.ravel(dr.grad(parameters[key]))]
     if not all(map(math.isfinite, slopes)) or not any(slopes):
         raise RuntimeError(f"the probe kernel gave the gradient {slopes}")
     return {"gradient": slopes}

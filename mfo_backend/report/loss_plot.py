@@ -36,9 +36,8 @@ def loss_plot(stages: Sequence[StageReport]) -> str:
     begin = 0.0
     for number, stage in enumerate(stage for stage in stages if stage.curve):
         if number:
-            parts.append(
-                f'<line class="switch" x1="{x(begin):.1f}" x2="{x(begin):.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
-            )
+            at = f"{x(begin):.1f}"
+            parts.append(f'<line class="switch" x1="{at}" x2="{at}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
         # a narrow last stage would push its label over the edge
         anchor = "end" if x(begin) > WIDTH * 0.8 else "start"
         shift = -6 if anchor == "end" else 6

@@ -67,11 +67,10 @@ def start_worker(job: Path):
             [sys.executable, str(WORKER), str(job), *arguments],
             stdin=options.get("stdin", subprocess.DEVNULL),
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=options.get("stderr", subprocess.PIPE),
             text=True,
             encoding="utf-8",
             env=environment,
-            preexec_fn=options.get("preexec_fn"),
         )
         children.append(child)
         return child
