@@ -53,7 +53,9 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     obj = bpy.context.scene.objects.get(chosen.object)
     if obj is None:
         names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
-        raise HeadlessError(f"{chosen.file} has no object {chosen.object!r} in its scene; its mesh objects are: {names}.")
+        raise HeadlessError(
+            f"{chosen.file} has no object {chosen.object!r} in its scene; its mesh objects are: {names}."
+        )
     try:
         fit = json.loads(chosen.fit)
     except ValueError as error:
@@ -61,7 +63,9 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     if not isinstance(fit, dict):
         raise HeadlessError("--fit is not a JSON object.")
     try:
-        report = export_job(bpy.context, obj, Path(chosen.job).absolute(), reference=chosen.reference.absolute(), fit=fit)
+        report = export_job(
+            bpy.context, obj, Path(chosen.job).absolute(), reference=chosen.reference.absolute(), fit=fit
+        )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
     return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}

@@ -46,7 +46,9 @@ def read_job_result(folder: Path) -> JobResult:
         If a file is missing, unreadable, of another schema version, or holds something else than numbers.
     """
     if not (folder / "result.json").is_file():
-        raise JobResultError(f"There is no result in {folder}: run the fit first, or give the folder of a finished job.")
+        raise JobResultError(
+            f"There is no result in {folder}: run the fit first, or give the folder of a finished job."
+        )
     request, result = _read_json(folder / "request.json"), _read_json(folder / "result.json")
     try:
         target = request["target"]

@@ -101,7 +101,9 @@ class MFO_OT_fit(bpy.types.Operator):
         except OSError as error:
             if is_new:
                 shutil.rmtree(folder, ignore_errors=True)
-            raise FitError(f"The backend could not be started with {python} in {folder} ({error.strerror or error}).") from error
+            raise FitError(
+                f"The backend could not be started with {python} in {folder} ({error.strerror or error})."
+            ) from error
         timer = not self._blocks() and not bpy.app.background
         running_job.start(process, material, folder / report.request["reference"]["path"], report.notes, timer=timer)
 
@@ -113,6 +115,8 @@ class MFO_OT_fit(bpy.types.Operator):
                 raise FitError("No parameter is chosen: choose at least one, or All.")
         if parameters not in ("all", "reduced"):
             parameters = [name.strip() for name in str(parameters).split(",") if name.strip()]
+            if not parameters:
+                raise FitError(f"parameters is {self.parameters!r}: give 'all', 'reduced' or names with commas.")
         fit = {
             "preset": self.preset or settings.preset,
             "parameters": parameters,
@@ -184,7 +188,9 @@ def _target(context: bpy.types.Context, name: str) -> bpy.types.Object:
     if name:
         obj = context.scene.objects.get(name)
         if obj is None:
-            raise FitError(f"The scene {context.scene.name!r} has no object {name!r}: give the name of one of its objects.")
+            raise FitError(
+                f"The scene {context.scene.name!r} has no object {name!r}: give the name of one of its objects."
+            )
         return obj
     obj = context.view_layer.objects.active
     if obj is None:

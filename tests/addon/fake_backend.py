@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stand-in for the backend's Python: takes the same command line, tells the same events, computes nothing.
 
-Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes, `end`
-(finished, failed, crash, deaf). Only the standard library, so that any Python of any machine can run it.
+Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes,
+`end` (finished, failed, crash, deaf). Only the standard library, so that any Python of any machine can run it.
 """
 
 from __future__ import annotations
@@ -72,7 +72,11 @@ def main(arguments: list[str]) -> int:
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
     if control.get("end") == "failed":
-        say(event="failed", status="bad_input", sentence="Reference is 128x128 but the scene renders 256x256: render it anew.")
+        say(
+            event="failed",
+            status="bad_input",
+            sentence="Reference is 128x128 but the scene renders 256x256: render it anew.",
+        )
         return 2
     if control.get("end") == "crash":
         print("Illegal instruction in a far away library", file=sys.stderr, flush=True)
@@ -89,7 +93,9 @@ def main(arguments: list[str]) -> int:
             best=loss, fraction=fraction, seconds=i * pause, remaining_seconds=(steps - i - 1) * pause,
         )  # fmt: skip
         if i % 4 == 0:
-            png(pictures / "current.png", (int(120 + 60 * fraction), int(120 - 60 * fraction), int(120 - 80 * fraction)))
+            png(
+                pictures / "current.png", (int(120 + 60 * fraction), int(120 - 60 * fraction), int(120 - 80 * fraction))
+            )
             say(event="preview", path="pictures/current.png")
         if i % STEPS == STEPS - 1:
             say(
