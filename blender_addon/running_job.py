@@ -120,6 +120,7 @@ def show_result(found: JobResult, uid: int) -> None:
     global result, material_uid
     result, material_uid = found, uid
     runtime = _runtime()
+    runtime.checked = False
     runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
     for name, (before, after) in found.errors.items():
         _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
@@ -199,7 +200,17 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
 
 
 def _clear(runtime: bpy.types.PropertyGroup) -> None:
-    for name in ("state", "material", "job_folder", "sentence", "fraction", "progress_text", "detail", "has_result"):
+    for name in (
+        "state",
+        "material",
+        "job_folder",
+        "sentence",
+        "fraction",
+        "progress_text",
+        "detail",
+        "has_result",
+        "checked",
+    ):
         runtime.property_unset(name)
     for rows in (runtime.messages, runtime.values, runtime.errors):
         rows.clear()
