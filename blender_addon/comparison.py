@@ -31,10 +31,11 @@ def comparison_image(pictures: Path) -> bpy.types.Image:
         strip[: part.shape[0], left : left + part.shape[1]] = part
         left += part.shape[1] + GAP
     image = bpy.data.images.get(COMPARISON)
-    if image is None or image.source != "GENERATED":
+    if image is not None and tuple(image.size) != (width, height):
+        bpy.data.images.remove(image)
+        image = None
+    if image is None:
         image = bpy.data.images.new(COMPARISON, width, height, alpha=True)
-    if tuple(image.size) != (width, height):
-        image.scale(width, height)
     image.pixels.foreach_set(strip.ravel())
     image.update()
     image.pack()  # a generated image loses its pixels when the file is saved

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The backend as a child process: start, read its JSON lines, cancel, and say in one sentence how it ended. No bpy here.
+"""The backend as a child process: start, read its JSON lines, cancel, say in one sentence how it ended. No bpy here.
 
 `poll` never blocks; a timer calls it in windows, a loop in background mode. The only thread here reads a pipe.
 """
@@ -44,7 +44,7 @@ _EXIT_STATUS = {2: "bad_input", 3: "setup", 4: "cancelled"}
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: the status code of `docs/architecture.md`, one sentence, and the end of the log if it crashed."""
+    """How a run ended: status code of `docs/architecture.md`, one sentence, and the end of the log if it crashed."""
 
     status: str
     sentence: str
@@ -104,7 +104,7 @@ class JobProcess:
         return self._cancelled and self.outcome is None
 
     def poll(self) -> list[Event]:
-        """Events since the last call, of progress and preview only the newest; sets `outcome` when the run has ended."""
+        """Events since the last call, of progress and preview only the newest; sets `outcome` at the run's end."""
         if self.outcome is None:
             self._escalate()
             self._check_end()

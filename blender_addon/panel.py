@@ -60,7 +60,12 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
             row.scale_y = 1.4
             row.operator("mfo.fit", icon="PLAY")
             row.operator("mfo.check", text="", icon="VIEWZOOM")
-        _draw_outcome(layout, context, runtime)
+        if runtime.state in {"DONE", "FAILED"}:
+            box = layout.box()
+            box.alert = runtime.state == "FAILED"
+            _wrapped(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
+        if runtime.messages and (runtime.checked or not runtime.has_result):
+            _draw_messages(layout.box(), context, runtime)
 
 
 class MFO_PT_result(_Panel, bpy.types.Panel):
@@ -78,6 +83,8 @@ class MFO_PT_result(_Panel, bpy.types.Panel):
         """Draw pictures, table and buttons."""
         layout, runtime = self.layout, context.window_manager.mfo_runtime
         if runtime.has_result:
+            if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
+                layout.label(text=f"Of material {runtime.material}", icon="MATERIAL")
             _draw_pictures(layout, ("reference", "start", "result"))
         row = layout.row(align=True)
         row.scale_y = 1.4
@@ -89,6 +96,11 @@ class MFO_PT_result(_Panel, bpy.types.Panel):
         if runtime.has_result:
             _draw_table(layout, runtime.errors, "Error")
             _draw_table(layout, runtime.values, "Value")
+            if runtime.messages and not runtime.checked:
+                header, body = layout.panel("mfo_notes", default_closed=True)
+                header.label(text=f"Notes ({len(runtime.messages)})", icon="INFO")
+                if body:
+                    _draw_messages(body, context, runtime)
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -113,15 +125,10 @@ def _draw_progress(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup)
         _draw_pictures(layout, ("reference", "current"))
 
 
-def _draw_outcome(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
-    if runtime.state in {"DONE", "FAILED"}:
-        box = layout.box()
-        box.alert = runtime.state == "FAILED"
-        _wrapped(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
-    if runtime.messages:
-        box = layout.box().column(align=True)
-        for message in runtime.messages:
-            _wrapped(box, context, message.name, message.icon or "INFO")
+def _draw_messages(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
+    column = layout.column(align=True)
+    for message in runtime.messages:
+        _wrapped(column, context, message.name, message.icon or "INFO")
 
 
 def _draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...]) -> None:
@@ -163,7 +170,7 @@ def _draw_cells(layout: bpy.types.UILayout, title: str, *cells: str) -> bpy.type
 def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
     """A sentence over as many lines as the sidebar needs; labels do not wrap."""
     scale = context.preferences.system.ui_scale
-    width = max(16, int((context.region.width / scale - 70) / 6.2))  # 6.2 px is an average letter at scale 1
+    width = max(16, int((context.region.width / scale - 75) / 5.8))  # 5.8 px is an average letter at scale 1
     column = layout.column(align=True)
     column.scale_y = 0.8
     for i, line in enumerate(textwrap.wrap(text, width) or [""]):

@@ -123,6 +123,7 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
     progress_text: StringProperty()
     detail: StringProperty()
     has_result: BoolProperty()
+    checked: BoolProperty()  # the messages come from a check, not from the fit
     messages: CollectionProperty(type=MFO_PG_message)
     values: CollectionProperty(type=MFO_PG_row)
     errors: CollectionProperty(type=MFO_PG_row)

@@ -115,11 +115,12 @@ def reset() -> None:
     _clear(_runtime())
 
 
-def show_result(found: JobResult, uid: int, runtime: bpy.types.PropertyGroup | None = None) -> None:
+def show_result(found: JobResult, uid: int) -> None:
     """Make `found` the result that panel and `mfo.apply` use; `uid` is its material's session_uid or 0."""
     global result, material_uid
     result, material_uid = found, uid
-    runtime = runtime or _runtime()
+    runtime = _runtime()
+    runtime.checked = False
     runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
     for name, (before, after) in found.errors.items():
         _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
@@ -191,7 +192,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     runtime.progress_text, runtime.detail = "", ""
     try:
         if outcome.status in _GOOD or (job.process.folder / "result.json").is_file():
-            show_result(read_job_result(job.process.folder), job.material_uid, runtime)
+            show_result(read_job_result(job.process.folder), job.material_uid)
             runtime.state = "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
@@ -199,7 +200,17 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
 
 
 def _clear(runtime: bpy.types.PropertyGroup) -> None:
-    for name in ("state", "material", "job_folder", "sentence", "fraction", "progress_text", "detail", "has_result"):
+    for name in (
+        "state",
+        "material",
+        "job_folder",
+        "sentence",
+        "fraction",
+        "progress_text",
+        "detail",
+        "has_result",
+        "checked",
+    ):
         runtime.property_unset(name)
     for rows in (runtime.messages, runtime.values, runtime.errors):
         rows.clear()

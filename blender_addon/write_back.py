@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import bpy
-from mathutils import Color
+import numpy as np
 
 from .export.principled_mapping import mitsuba_to_sockets
+from .export.shader_graph import surface_of
 from .job_result import JobResult, Value
+from .versions import PRINCIPLED, node_tree_of, working_space_to_rec709
 
 
 class WriteBackError(Exception):
@@ -25,13 +27,9 @@ def principled_node(material: bpy.types.Material) -> bpy.types.ShaderNode:
     WriteBackError
         If there is none.
     """
-    output = material.node_tree.get_output_node("CYCLES") if material.node_tree else None
-    socket = output.inputs["Surface"] if output else None
-    while socket is not None and socket.links:
-        node = socket.links[0].from_node
-        if node.type == "BSDF_PRINCIPLED":
-            return node
-        socket = node.inputs[0] if node.type == "REROUTE" else None
+    node = surface_of(node_tree_of(material))
+    if node is not None and node.bl_idname == PRINCIPLED:
+        return node
     raise WriteBackError(
         f"Material {material.name!r} has no Principled BSDF on its output: connect one and apply again."
     )
@@ -121,8 +119,8 @@ def _set(socket: bpy.types.NodeSocket, value: Value) -> None:
     if isinstance(value, (int, float)):
         socket.default_value = value
     elif socket.type == "RGBA":
-        # Blender 5.0 has scene working spaces; in Linear Rec.709 this changes nothing
-        color = Color(value[:3]).from_rec709_linear_to_scene_linear()
+        matrix = working_space_to_rec709()
+        color = np.array(value[:3]) if matrix is None else np.linalg.solve(matrix, value[:3])
         socket.default_value = (*color, socket.default_value[3])
     else:
         socket.default_value = value

@@ -13,6 +13,9 @@ from .. import running_job
 from ..job_result import JobResult, JobResultError, read_job_result
 from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values
 
+# what a script gives; buttons start with the defaults every time and the redo panel does not show them
+_SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+
 
 class MFO_OT_apply(bpy.types.Operator):
     """Put the recovered values on the material; sockets with a link stay as they are"""
@@ -22,9 +25,11 @@ class MFO_OT_apply(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     job_folder: StringProperty(
-        name="Job Folder", description="Folder of a finished job; empty: the last fit", subtype="DIR_PATH"
+        name="Job Folder", description="Folder of a finished job; empty: the last fit", options=_SCRIPT
     )
-    material: StringProperty(name="Material", description="Material to change; empty: the one that was fitted")
+    material: StringProperty(
+        name="Material", description="Material to change; empty: the one that was fitted", options=_SCRIPT
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -34,6 +39,10 @@ class MFO_OT_apply(bpy.types.Operator):
             return False
         if not bpy.app.background and not context.window_manager.mfo_runtime.has_result:
             cls.poll_message_set("There is no result yet; run a fit")
+            return False
+        fitted = _fitted_material()
+        if fitted is not None and not fitted.is_editable:
+            cls.poll_message_set("The material comes from a library; make it local first")
             return False
         return True
 
@@ -60,10 +69,8 @@ class MFO_OT_apply(bpy.types.Operator):
 
     def _material(self, result: JobResult) -> bpy.types.Material:
         name = self.material or result.material_name
-        if not self.material and not self.job_folder and running_job.material_uid:
-            found = next((m for m in bpy.data.materials if m.session_uid == running_job.material_uid), None)
-        else:
-            found = bpy.data.materials.get(name)
+        of_this_session = not self.material and not self.job_folder and running_job.material_uid
+        found = _fitted_material() if of_this_session else bpy.data.materials.get(name)
         if found is None:
             raise WriteBackError(f"Material {name!r} is not in this file (any more): name the one to change.")
         return found
@@ -76,7 +83,9 @@ class MFO_OT_revert(bpy.types.Operator):
     bl_label = "Revert Values"
     bl_options = {"REGISTER", "UNDO"}
 
-    material: StringProperty(name="Material", description="Material to revert; empty: the active object's")
+    material: StringProperty(
+        name="Material", description="Material to revert; empty: the active object's", options=_SCRIPT
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -106,6 +115,12 @@ class MFO_OT_revert(bpy.types.Operator):
         for note in notes:
             self.report({"WARNING"}, note)
         return {"FINISHED"}
+
+
+def _fitted_material() -> bpy.types.Material | None:
+    """The material of the last fit under whatever name it has by now."""
+    uid = running_job.material_uid
+    return next((m for m in bpy.data.materials if m.session_uid == uid), None) if uid else None
 
 
 CLASSES = (MFO_OT_apply, MFO_OT_revert)

@@ -17,6 +17,9 @@ from ..job_process import JobProcess
 from ..preferences import new_job_folder, preference
 from ..write_back import WriteBackError, principled_node
 
+# what a script gives; buttons start with the defaults every time and the redo panel does not show them
+_SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+
 
 class FitError(Exception):
     """The fit cannot start; the message is one sentence for the user."""
@@ -29,23 +32,25 @@ class MFO_OT_fit(bpy.types.Operator):
     bl_label = "Fit Material"
     bl_options = {"REGISTER"}
 
-    object: StringProperty(name="Object", description="Name of the object; empty: the active one")
+    object: StringProperty(name="Object", description="Name of the object; empty: the active one", options=_SCRIPT)
     reference: StringProperty(
-        name="Reference", description="Picture to reproduce; empty: the scene's setting", subtype="FILE_PATH"
+        name="Reference", description="Picture to reproduce; empty: the scene's setting", options=_SCRIPT
     )
-    preset: StringProperty(name="Preset", description="How to search; empty: the scene's setting")
+    preset: StringProperty(name="Preset", description="How to search; empty: the scene's setting", options=_SCRIPT)
     parameters: StringProperty(
-        name="Parameters", description='"all", "reduced" or names with commas; empty: the scene\'s setting'
+        name="Parameters",
+        description='"all", "reduced" or names with commas; empty: the scene\'s setting',
+        options=_SCRIPT,
     )
-    job_folder: StringProperty(
-        name="Job Folder", description="Folder for the job; empty: a new one", subtype="DIR_PATH"
+    job_folder: StringProperty(name="Job Folder", description="Folder for the job; empty: a new one", options=_SCRIPT)
+    range: StringProperty(
+        name="Range", description='"hdr", "ldr" or "auto"; empty: the scene\'s setting', options=_SCRIPT
     )
-    range: StringProperty(name="Range", description='"hdr", "ldr" or "auto"; empty: the scene\'s setting')
     max_iterations: IntProperty(
-        name="Iterations", description="Most iterations of a stage; 0: the scene's setting", min=0
+        name="Iterations", description="Most iterations of a stage; 0: the scene's setting", min=0, options=_SCRIPT
     )
     wait: BoolProperty(
-        name="Wait", description="Return when the fit has ended; always so by default in background mode"
+        name="Wait", description="Return when the fit has ended; always so by default in background", options=_SCRIPT
     )
 
     @classmethod
@@ -115,6 +120,8 @@ class MFO_OT_fit(bpy.types.Operator):
                 raise FitError("No parameter is chosen: choose at least one, or All.")
         if parameters not in ("all", "reduced"):
             parameters = [name.strip() for name in str(parameters).split(",") if name.strip()]
+            if not parameters:
+                raise FitError(f"parameters is {self.parameters!r}: give 'all', 'reduced' or names with commas.")
         fit = {
             "preset": self.preset or settings.preset,
             "parameters": parameters,
@@ -170,6 +177,7 @@ class MFO_OT_check(bpy.types.Operator):
             errors, notes = [str(error)], []
         runtime = context.window_manager.mfo_runtime
         runtime.messages.clear()
+        runtime.checked = True
         for sentence in errors:
             running_job.add_message(runtime, sentence, "ERROR")
         for sentence in notes:

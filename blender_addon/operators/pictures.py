@@ -35,7 +35,7 @@ class MFO_OT_show_pictures(_JobOperator, bpy.types.Operator):
     bl_label = "Compare Pictures"
     bl_options = {"REGISTER", "UNDO"}
 
-    job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", subtype="DIR_PATH")
+    job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", options={"HIDDEN", "SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Load the pictures, build the strip, show it."""
@@ -63,7 +63,7 @@ class MFO_OT_open_report(_JobOperator, bpy.types.Operator):
     bl_label = "Open Report"
     bl_options = {"REGISTER"}
 
-    job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", subtype="DIR_PATH")
+    job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", options={"HIDDEN", "SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Hand index.html to the system."""

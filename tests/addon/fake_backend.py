@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stand-in for the backend's Python: takes the same command line, tells the same events, computes nothing.
 
-Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes, `end`
-(finished, failed, crash, deaf). Only the standard library, so that any Python of any machine can run it.
+Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes,
+`end` (finished, failed, crash, deaf). Only the standard library, so that any Python of any machine can run it.
 """
 
 from __future__ import annotations

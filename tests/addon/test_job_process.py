@@ -275,7 +275,7 @@ def test_log_holds_stderr(start: Start) -> None:
 
 def test_no_interpreter_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MFO_BACKEND_PYTHON", raising=False)
-    with pytest.raises(BackendPythonError, match="backend Python is missing.*preferences.*MFO_BACKEND_PYTHON"):
+    with pytest.raises(BackendPythonError, match=r"backend Python is missing.*preferences.*MFO_BACKEND_PYTHON"):
         backend_python("")
 
 
@@ -283,7 +283,7 @@ def test_variable_wins_over_preference(monkeypatch: pytest.MonkeyPatch, tmp_path
     monkeypatch.setenv("MFO_BACKEND_PYTHON", sys.executable)
     assert backend_python(str(tmp_path)) == Path(sys.executable)
     monkeypatch.setenv("MFO_BACKEND_PYTHON", str(tmp_path / "none"))
-    with pytest.raises(BackendPythonError, match="none.*variable MFO_BACKEND_PYTHON"):
+    with pytest.raises(BackendPythonError, match=r"none.*variable MFO_BACKEND_PYTHON"):
         backend_python(sys.executable)
     monkeypatch.delenv("MFO_BACKEND_PYTHON")
     assert backend_python(sys.executable) == Path(sys.executable)

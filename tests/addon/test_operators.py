@@ -33,7 +33,7 @@ def test_fit_apply_undo_redo_revert(scene: SimpleNamespace) -> None:
     bpy = scene.bpy
     assert fit(scene) == {"FINISHED"}
     assert runtime(scene).state == "DONE"
-    assert [(r.name, r.start, r.result) for r in runtime(scene).errors][0] == ("FLIP", "0.21", "0.012")
+    assert next((r.name, r.start, r.result) for r in runtime(scene).errors) == ("FLIP", "0.21", "0.012")
     bpy.ops.ed.undo_push(message="before apply")
     before = {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
 
