@@ -48,13 +48,6 @@ def index_of_refraction(z: Array) -> Array:
     return np.minimum((1 + z**2) / np.maximum(1 - z**2, 1e-12), LARGEST_IOR)
 
 
-def retro_pairs(mu: Array) -> tuple[Array, Array]:
-    """View directions with cosine `mu` and lights at the mirror azimuth 45 degrees above the horizon, (cases, 3) each."""
-    view = np.stack([np.sqrt(1 - mu**2), 0 * mu, mu], axis=1)
-    light = np.tile([-np.sqrt(0.5), 0, np.sqrt(0.5)], (len(mu), 1))
-    return view, light
-
-
 def questions(axes: tuple[Array, ...], sockets: Callable[..., dict[str, Array]]) -> tuple[dict[str, Array], Array, Array]:
     """Sockets, view and light of the grid of `axes`, the second axis being mu."""
     grid = [g.ravel() for g in np.meshgrid(*axes, indexing="ij")]
@@ -67,10 +60,6 @@ def mirror_pairs(mu: Array) -> tuple[Array, Array]:
     angle = np.arccos(mu)
     other = angle - 0.4
     return tuple(np.stack([np.sin(a), 0 * a, np.cos(a)], axis=1) for a in (angle, other))  # type: ignore[return-value]
-
-
-def ratio_tables(batches: list[dict], single: int, multiple: int, results: list[Array]) -> Array:
-    return results[single][:, 0] / results[multiple][:, 0]
 
 
 def main() -> None:
@@ -93,11 +82,12 @@ def main() -> None:
 
         return sockets
 
-    def untinted_diffuse(colour: Array) -> Callable[..., dict[str, Array]]:
-        # A black specular tint leaves F = s(c), so the layer's albedo is the table itself
+    def tinted_diffuse(colour: Array) -> Callable[..., dict[str, Array]]:
+        # The layer's albedo is A = f0 + (1 - f0) S; half the tint keeps f0 away from 0, where Cycles drops the layer at
+        # normal incidence, and from 1, where S would not show
         return lambda r, m, z: {
             "Base Color": np.tile(colour, (len(r), 1)),
-            "Specular Tint": np.zeros((len(r), 3)),
+            "Specular Tint": np.full((len(r), 3), 0.5),
             "Roughness": r,
             "IOR": index_of_refraction(z),
         }
@@ -109,7 +99,7 @@ def main() -> None:
             for inverse in (False, True):
                 jobs.append((f"glass{inverse} {name}", distribution, (r16, m16, z16), glass(colour, inverse)))
     for name, colour in (("white", white), ("black", 0 * white)):
-        jobs.append((f"diffuse {name}", "GGX", (r16, m16, z16), untinted_diffuse(colour)))
+        jobs.append((f"diffuse {name}", "GGX", (r16, m16, z16), tinted_diffuse(colour)))
 
     batches, shapes, lights = [], [], []
     for _, distribution, axes, sockets in jobs:
@@ -131,7 +121,10 @@ def main() -> None:
         name = "ggx_glass_inv" if inverse else "ggx_glass"
         tables[f"{name}_E"], tables[f"{name}_Eavg"] = albedo_and_average(value, f"glass{inverse}", 0.5)
     nl = lights[-1][:, 2].reshape(shapes[-1])
-    tables["schlick_ior_s"] = 1 - (value["diffuse white", "GGX"] - value["diffuse black", "GGX"]) * np.pi / nl
+    albedo = 1 - (value["diffuse white", "GGX"] - value["diffuse black", "GGX"]) * np.pi / nl
+    n = index_of_refraction(z16).astype(np.float32).astype(np.float64)
+    half_f0 = 0.5 * ((n - 1) / (n + 1)) ** 2
+    tables["schlick_ior_s"] = (albedo - half_f0) / (1 - half_f0)
     tables = {name: nodes_of(name, table) for name, table in tables.items()}
     tables["sheen_ltc"] = sheen_table(sheen.mean(axis=1).reshape(-1, len(m32), len(r32)), sheen_view, sheen_light)
     np.savez_compressed(TARGET, **{name: table.astype(np.float32) for name, table in tables.items()})

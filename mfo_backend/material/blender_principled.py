@@ -83,23 +83,26 @@ def evaluate(layers: Layers, wo: Any) -> Any:
 
 
 def refraction_normal(layers: Layers, wo: Any) -> tuple[Any, Any, Any]:
-    """Half vector of refraction on the side of the view, (n / length)^2 |wo.h| (the Jacobian dh/dwo), and validity."""
+    """Half vector of refraction on the side of the view, (n / length)^2 |wo.h| (the Jacobian dh/dwo), and whether a
+    microfacet of that normal really bends `wi` to `wo`."""
     n, wi = layers.glass_ior, layers.wi
     h = -(wi + wo * n)
     squared = dr.maximum(dr.squared_norm(h), 1e-14)
     h = h * dr.rsqrt(squared)
     h = dr.select(h.z < 0, -h, h)
-    incident, transmitted = dr.dot(wi, h), dr.dot(wo, h)
-    valid = (wo.z < 0) & (wi.z > 0) & (incident > 0) & (transmitted < 0)
-    return h, dr.square(n) / squared * dr.abs(transmitted), valid
+    possible = (dr.dot(wi, h) > 0) & (dr.dot(wo, h) < 0)
+    return h, dr.square(n) / squared * dr.abs(dr.dot(wo, h)), possible
 
 
 def refracted(layers: Layers, wo: Any) -> Any:
-    """f_r |cos| of light that comes through the surface from `wo` below it."""
+    """f_r |cos| of light that comes through the surface from `wo` below it.
+
+    Cycles also evaluates pairs that no microfacet can connect, which its own sampling never reaches; so does this.
+    """
     assert layers.glass_fresnel is not None
     wi, alpha = layers.wi, layers.glass_alpha
-    h, jacobian, valid = refraction_normal(layers, wo)
-    c = dr.dot(wi, h)
+    h, jacobian, _ = refraction_normal(layers, wo)
+    c = dr.abs(dr.dot(wi, h))
     g2 = dr.rcp(1 + smith_lambda(wi, alpha, alpha) + smith_lambda(wo, alpha, alpha))
     lobe = density(h, alpha, alpha) * g2 * c * jacobian / dr.maximum(wi.z, 1e-7)
-    return dr.select(valid, layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe, 0)
+    return dr.select((wo.z < 0) & (wi.z > 0), layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe, 0)

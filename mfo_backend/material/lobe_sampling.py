@@ -77,9 +77,9 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any) -> Any:
     density = dr.select(above & (wi.z > 0), density, 0)
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
-        h, jacobian, valid = refraction_normal(layers, wo)
+        h, jacobian, possible = refraction_normal(layers, wo)
         through = visible_pdf(wi, h, alpha, alpha) * jacobian * (1 - reflect_probability(layers, dr.dot(wi, h)))
-        density += dr.select(valid, choice["glass"] * through, 0)
+        density += dr.select(possible & (wo.z < 0) & (wi.z > 0), choice["glass"] * through, 0)
     return dr.detach(density)
 
 
