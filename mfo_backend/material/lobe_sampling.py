@@ -57,8 +57,12 @@ def lobe_choice(layers: Layers, with_transparency: bool) -> LobeChoice:
     return LobeChoice({name: strength[name] * scale for name in NAMES if name in strength})
 
 
-def pdf(layers: Layers, choice: LobeChoice, wo: Any) -> Any:
-    """Density per solid angle of `sample` for the smooth lobes, `wo` in the frame of the layers."""
+def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = False) -> Any:
+    """Density per solid angle of `sample` for the smooth lobes, `wo` in the frame of the layers.
+
+    As in Cycles, glass has a density also for the pairs no microfacet connects, where its value is not zero either but
+    `sample` never arrives; it weighs light sampling there. `reachable_only` leaves these pairs out.
+    """
     wi, above = layers.wi, wo.z > 0
     h = dr.normalize(wi + type(wi)(wo.x, wo.y, dr.abs(wo.z)))
     c = dr.maximum(dr.dot(wi, h), 1e-7)
@@ -78,8 +82,9 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any) -> Any:
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
         h, jacobian, possible = refraction_normal(layers, wo)
-        through = visible_pdf(wi, h, alpha, alpha) * jacobian * (1 - reflect_probability(layers, dr.dot(wi, h)))
-        density += dr.select(possible & (wo.z < 0) & (wi.z > 0), choice["glass"] * through, 0)
+        through = visible_pdf(wi, h, alpha, alpha) * jacobian * (1 - reflect_probability(layers, dr.abs(dr.dot(wi, h))))
+        counted = (wo.z < 0) & (wi.z > 0)
+        density += dr.select(counted & possible if reachable_only else counted, choice["glass"] * through, 0)
     return dr.detach(density)
 
 
