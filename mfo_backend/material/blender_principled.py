@@ -76,6 +76,8 @@ def evaluate(layers: Layers, wo: Any) -> Any:
             value += layers.diffuse * lambert(up)
         else:
             value += layers.diffuse * oren_nayar(wi, up, layers.base, layers.diffuse_roughness)
+    if layers.subsurface is not None:
+        value += layers.subsurface * lambert(up)
     value = dr.select(above & (wi.z > 0), value, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
         value += refracted(layers, wo)

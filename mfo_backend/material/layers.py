@@ -66,6 +66,7 @@ class Layers:
     diffuse: Any = None
     base: Any = None
     diffuse_roughness: Any = None
+    subsurface: Any = None
 
     def to_frame(self, direction: Any) -> Any:
         """`direction` of the surface's frame in the frame of the lobes: the view's side up, tangent along the first axis."""
@@ -226,10 +227,10 @@ def _add_plastic(
     stack |= {"specular": dr.select(present, w * gain.scale, 0), "specular_fresnel": fresnel}
     w = w * saturate(1 - largest(hidden))
     colour = at_least(p["base_color"], 0)
-    diffuse = colour
     if lobes.subsurface:  # random walks are replaced by a Lambert lobe of the same colour
         amount = saturate(p["subsurface_weight"])
-        diffuse = colour + (base - colour) * amount
-    stack |= {"diffuse": w * diffuse, "base": colour}
+        stack["subsurface"] = w * base * amount
+        w = w * (1 - amount)
+    stack |= {"diffuse": w * colour, "base": colour}
     if lobes.diffuse_roughness and model.diffuse_roughness:
         stack["diffuse_roughness"] = saturate(p["diffuse_roughness"])

@@ -48,7 +48,7 @@ def lobe_choice(layers: Layers, with_transparency: bool) -> LobeChoice:
     if layers.glass is not None:
         strength["glass"] = mean(layers.glass)
     if layers.diffuse is not None:
-        strength["diffuse"] = mean(layers.diffuse)
+        strength["diffuse"] = mean(layers.diffuse if layers.subsurface is None else layers.diffuse + layers.subsurface)
     # The floor keeps a direction for every material, black ones included
     strength = {name: dr.maximum(dr.detach(value), 0) for name, value in strength.items()}
     last = "diffuse" if "diffuse" in strength else next(reversed(strength))
