@@ -13,15 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 # the C library itself, not one of the component libraries (libLLVMCore.so) beside it
-<<<<<<< HEAD
-_LIBRARY_NAME = re.compile(
-    r"libLLVM(-[\d.]+)?\.(so|dylib)(\.[\d.]+)?|libLLVM\.[\d.]+\.dylib|LLVM-C\.dll", re.IGNORECASE
-)
-=======
 _LIBRARY_NAME = re.compile(r"libLLVM(-[\d.]+)?\.(so|dylib)(\.[\d.]+)?|LLVM-C\.dll", re.IGNORECASE)
 _VERSION_IN_NAME = re.compile(r"llvm[^/\\\d]*(\d+(?:\.\d+)*)", re.IGNORECASE)  # libLLVM.so.19.1, libLLVM-15.so, llvm-14
 _VERSION_ALONE = re.compile(r"(\d+\.\d+\.\d+)[_\d]*")  # Cellar/llvm/19.1.7_1
->>>>>>> job
 _FOLDERS = {
     "linux": (
         "/usr/lib/*-linux-gnu*",
@@ -57,13 +51,7 @@ def llvm_version(path: Path) -> tuple[int, ...]:
     """The version that the file name or, failing that, a folder above it tells; (0,) if none does."""
     resolved = path.resolve()
     for part in (resolved.name, path.name, *reversed(resolved.parts[:-1])):
-<<<<<<< HEAD
-        number = re.search(r"(?:LLVM|llvm)[^/\\\d]*(\d+(?:\.\d+)*)", part) or re.fullmatch(
-            r"(\d+\.\d+\.\d+)[_\d]*", part
-        )
-=======
         number = _VERSION_IN_NAME.search(part) or _VERSION_ALONE.fullmatch(part)
->>>>>>> job
         if number:
             return tuple(int(piece) for piece in number.group(1).split("."))
     return (0,)

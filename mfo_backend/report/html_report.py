@@ -105,31 +105,14 @@ def _pictures(pictures: Mapping[str, bytes]) -> str:
 
 
 def _value_table(result: FitResult) -> str:
-<<<<<<< HEAD
-    head = "".join(
-        f"<th>{name}</th>" for name in ("Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered")
-    )
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{value_rows(result)}</tbody></table>"
-    return (
-        f'<div class="scroll">{table}</div><p class="soft">Colours are linear Rec.709.</p>' if result.recovered else ""
-    )
-=======
     table = _table(("Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"), value_rows(result))
     return f'{table}<p class="soft">Colours are linear Rec.709.</p>' if table else ""
->>>>>>> job
 
 
 def _plot(result: FitResult) -> str:
     plot = loss_plot(result.stages)
-<<<<<<< HEAD
-    legend = (
-        '<p class="soft">Thick: best so far; thin: every iteration. A dashed line marks the switch of the loss.</p>'
-    )
-    return f'<div class="plot">{plot}</div>{legend}' if plot else ""
-=======
     legend = "Thick: best so far; thin: every iteration. A dashed line marks the switch of the loss."
     return f'<div class="plot">{plot}</div><p class="soft">{legend}</p>' if plot else ""
->>>>>>> job
 
 
 def _stage_table(result: FitResult) -> str:
@@ -139,16 +122,7 @@ def _stage_table(result: FitResult) -> str:
         f'<td class="sentence">{escape(stage.status.sentence)}</td></tr>'
         for stage in result.stages
     )
-<<<<<<< HEAD
-    head = "".join(
-        f"<th>{name}</th>" for name in ("Stage", "Loss at start", "Best loss", "Iterations", "Time", "Ended")
-    )
-    return (
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
-    )
-=======
     return _table(("Stage", "Loss at start", "Best loss", "Iterations", "Time", "Ended"), rows)
->>>>>>> job
 
 
 def _error_table(result: FitResult) -> str:
@@ -157,12 +131,6 @@ def _error_table(result: FitResult) -> str:
         f"<td>{f'{before / after:.1f} times smaller' if 0 < after < before else ''}</td></tr>"
         for name, (before, after) in result.errors.items()
     )
-<<<<<<< HEAD
-    head = "".join(f"<th>{name}</th>" for name in ("Measure", "Start", "Result", ""))
-    return (
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
-    )
-=======
     return _table(("Measure", "Start", "Result", ""), rows)
 
 
@@ -170,4 +138,3 @@ def _table(heads: Sequence[str], rows: str) -> str:
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
     body = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return f'<div class="scroll">{body}</div>' if rows else ""
->>>>>>> job
