@@ -50,7 +50,6 @@ def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> E
     return add(
         plugin("emitter", "envmap", "world"),
         string("filename", save(_rows_on_poles(tinted))),
-        boolean("raw", True),
         scalar("scale", 1.0),
         transform("to_world", matrix),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..metrics.tone_mapping import DisplayView
 from ..types.event import Listener
@@ -74,7 +74,18 @@ def fit_scene(
         request.target.shape_id,
         model=request.fit.model,
         parameters=request.fit.parameters,
-        materials=request_to_json(request)["materials"],
+        materials=_materials(folder, request),
     )
     outcome = fit_material(renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop)
     return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
+
+
+def _materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
+    """The request's materials with textures by absolute path and the Blender version they come from."""
+    materials = request_to_json(request)["materials"]
+    for material in materials.values():
+        material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
+        for name, socket in material["sockets"].items():
+            if socket.get("texture"):
+                socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
+    return materials

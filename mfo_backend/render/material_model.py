@@ -3,33 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable, Sequence
 
 from ..material.mitsuba_parameters import eta_to_specular, select_parameters, specular_to_eta
 from ..scene.scene_xml import Element, Target, read_values, require_principled, unwrap_twosided, write_values
 from ..types.errors import BadInputError
-from ..types.parameter import ParameterTable
-
-Materials = Mapping[str, Mapping[str, Any]]  # `materials` of request.json
-
-
-@dataclass(frozen=True)
-class PreparedMaterial:
-    """A scene whose target material can be differentiated.
-
-    `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the id of `target`'s BSDF.
-    """
-
-    table: ParameterTable
-    start: NDArray[np.float64]
-    target: Target
-    key_ends: Mapping[str, str]
-
+from .blender_material import prepare_blender_principled
+from .prepared_material import Materials, PreparedMaterial
 
 Prepare = Callable[[Element, Target, str | Sequence[str], Materials], PreparedMaterial]
 
@@ -59,7 +39,10 @@ def prepare_mitsuba_principled(
     return PreparedMaterial(table, start, target, ends)
 
 
-MODELS: dict[str, Prepare] = {"mitsuba_principled": prepare_mitsuba_principled}
+MODELS: dict[str, Prepare] = {
+    "blender_principled": prepare_blender_principled,
+    "mitsuba_principled": prepare_mitsuba_principled,
+}
 
 
 def material_model(name: str) -> Prepare:

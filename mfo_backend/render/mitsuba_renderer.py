@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..scene.scene_xml import find_target, prepare_for_fit, read_scene, to_text
 from ..types.errors import BadInputError
 from ..types.image import Pixels
-from .material_model import Materials, PreparedMaterial, material_model
+from .material_model import material_model
+from .prepared_material import Materials, PreparedMaterial
 from .renderer import Pullback, Vector
 from .variant import load_variant
 
@@ -118,6 +119,10 @@ def load_mitsuba_renderer(
     load_variant()
     import mitsuba as mi
 
+    if material.plugin:
+        from ..material.principled_plugin import register
+
+        register()
     with _two_threads():
         try:
             # optimize=False: merging equal objects would take away the ids of shapes and materials
