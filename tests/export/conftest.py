@@ -91,13 +91,21 @@ def new_material(name: str, **sockets: Any) -> Any:
 
 def diffuse_material(name: str, color: tuple[float, float, float]) -> Any:
     """A Lambertian material: the same in both renderers."""
+    return _material_of(name, "ShaderNodeBsdfDiffuse", color)
+
+
+def emission_material(name: str, color: tuple[float, float, float]) -> Any:
+    """A material that glows and reflects nothing."""
+    return _material_of(name, "ShaderNodeEmission", color)
+
+
+def _material_of(name: str, node_type: str, color: tuple[float, float, float]) -> Any:
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
         material.use_nodes = True
     tree = material.node_tree
-    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node = tree.nodes.new(node_type)
     node.inputs["Color"].default_value = (*color, 1.0)
-    node.inputs["Roughness"].default_value = 0.0
     tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
     return material
 
