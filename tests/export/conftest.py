@@ -148,3 +148,15 @@ def add_light(kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), s
     item.location, item.rotation_euler, item.scale = location, rotation, scale
     bpy.context.collection.objects.link(item)
     return item
+
+
+def world_color(scene: Any, strength: float) -> Any:
+    """Give the scene a white world and return its Background node."""
+    world = bpy.data.worlds.new("World")
+    scene.world = world
+    if world.node_tree is None:
+        world.use_nodes = True
+    node = world.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    node.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    node.inputs["Strength"].default_value = strength
+    return node
