@@ -91,13 +91,21 @@ def new_material(name: str, **sockets: Any) -> Any:
 
 def diffuse_material(name: str, color: tuple[float, float, float]) -> Any:
     """A Lambertian material: the same in both renderers."""
+    return _material_of(name, "ShaderNodeBsdfDiffuse", color)
+
+
+def emission_material(name: str, color: tuple[float, float, float]) -> Any:
+    """A material that glows and reflects nothing."""
+    return _material_of(name, "ShaderNodeEmission", color)
+
+
+def _material_of(name: str, node_type: str, color: tuple[float, float, float]) -> Any:
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
         material.use_nodes = True
     tree = material.node_tree
-    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node = tree.nodes.new(node_type)
     node.inputs["Color"].default_value = (*color, 1.0)
-    node.inputs["Roughness"].default_value = 0.0
     tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
     return material
 
@@ -140,3 +148,15 @@ def add_light(kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), s
     item.location, item.rotation_euler, item.scale = location, rotation, scale
     bpy.context.collection.objects.link(item)
     return item
+
+
+def world_color(scene: Any, strength: float) -> Any:
+    """Give the scene a white world and return its Background node."""
+    world = bpy.data.worlds.new("World")
+    scene.world = world
+    if world.node_tree is None:
+        world.use_nodes = True
+    node = world.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    node.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    node.inputs["Strength"].default_value = strength
+    return node
