@@ -76,7 +76,7 @@ def test_no_llvm_is_a_problem_with_a_cure(
     without_llvm: None, monkeypatch: pytest.MonkeyPatch, system: str, cure: str
 ) -> None:
     monkeypatch.setattr(sys, "platform", system)
-    checks = [check for check in machine_checks._renderer()]
+    checks = list(machine_checks._renderer())
     assert [check.state for check in checks] == ["problem"]
     assert checks[0].found == "/usr/lib/libLLVM-15.so: LLVM ERROR: Cannot select"
     assert cure in checks[0].cure

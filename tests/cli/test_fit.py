@@ -145,7 +145,7 @@ def test_a_real_fit_of_a_small_scene(scene: Path) -> None:
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert [stage["name"] for stage in result["stages"]] == ["mse-hdr", "flip-hdr"]
-    red, green, blue = result["recovered"]["base_color"]
+    red, green, _ = result["recovered"]["base_color"]
     assert red > green > 0  # three steps towards the reddish reference
     assert result["versions"]["variant"].endswith("_ad_rgb")
     assert result["errors"]["flip"][1] <= result["errors"]["flip"][0]

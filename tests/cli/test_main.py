@@ -16,6 +16,7 @@ from mfo_backend.cli import main as command
 from mfo_backend.types.errors import BadInputError, MfoError, SetupError
 
 ROOT = Path(__file__).resolve().parents[2]
+HELP = "from mfo_backend.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass"
 SLOW = {"numpy", "mitsuba", "drjit", "scipy", "PIL", "OpenEXR", "tqdm", "matplotlib"}
 
 
@@ -23,10 +24,7 @@ def python(code: str) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60)
 
 
-@pytest.mark.parametrize(
-    "action",
-    ["import mfo_backend", "from mfo_backend.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass"],
-)
+@pytest.mark.parametrize("action", ["import mfo_backend", HELP])
 def test_help_loads_no_heavy_package(action: str) -> None:
     # without them start-up is that of Python itself, about 30 ms; a time limit would fail on a busy machine
     done = python(f"import sys\n{action}\nprint(sorted({SLOW} & set(sys.modules)))")
