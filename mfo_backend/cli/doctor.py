@@ -19,7 +19,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser = subparsers.add_parser(
         "doctor",
         help="say what works here",
-        description="Say what works on this machine and how to mend what does not. Exit code 3: the backend cannot run.",
+        description="Say what works here and how to mend what does not. Exit code 3: the backend cannot run.",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(func=run)

@@ -31,9 +31,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("scene", type=Path, metavar="SCENE.xml", help="Mitsuba 3 scene")
     parser.add_argument("--target", required=True, metavar="SHAPE_ID", help="id of the shape with the material")
-    parser.add_argument(
-        "--reference", required=True, type=Path, metavar="REF", help="EXR, HDR (linear), PNG, JPEG, TIFF"
-    )
+    parser.add_argument("--reference", required=True, type=Path, metavar="REF", help="EXR, HDR, PNG, JPEG or TIFF")
     parser.add_argument("--preset", help="method of the fit (default: paper)")
     parser.add_argument("--model", help="material model (default: mitsuba_principled)")
     parser.add_argument("--parameters", help="'all', 'reduced' or names separated by commas (default: all)")
@@ -44,9 +42,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("--keep-optimizer-state", action="store_const", const=True, help="between the stages")
     parser.add_argument("--exposure", type=float, metavar="EV", help="of the view a display reference was made with")
     parser.add_argument("--gamma", type=float, help="of that view (default: 1)")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="new folder of the job (default: mfo-SCENE-1 and so on)"
-    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="new folder of the job (default: mfo-SCENE-1, ...)")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(func=run)
 

@@ -51,10 +51,8 @@ def make_job(
         fit=settings,
         generator={"name": "mfo fit", "version": __version__},
     )
-    is_new = not folder.exists()
+    is_new = _is_new(folder)
     try:
-        if not is_new and any(folder.iterdir()):
-            raise BadInputError(f"The folder {folder} is not empty: choose another for the job, or remove it.")
         folder.mkdir(parents=True, exist_ok=True)
         pack_scene(scene, folder)
         shutil.copyfile(reference, folder / request.reference)
@@ -63,16 +61,27 @@ def make_job(
         _clear(folder, is_new)
         raise unwritable(folder, error) from error
     except BadInputError:
-        if is_new:
-            _clear(folder, is_new)
+        _clear(folder, is_new)
         raise
     return request
 
 
+def _is_new(folder: Path) -> bool:
+    """Whether the folder is still to be made; refused if something is there that is not an empty folder."""
+    try:
+        if not folder.exists():
+            return True
+        if any(folder.iterdir()):
+            raise BadInputError(f"The folder {folder} is not empty: choose another for the job, or remove it.")
+    except OSError as error:  # a file, or a folder that cannot be read
+        raise unwritable(folder, error) from error
+    return False
+
+
 def _clear(folder: Path, is_new: bool) -> None:
+    """Undo a job in a folder that was new or empty before."""
     if is_new:
         shutil.rmtree(folder, ignore_errors=True)
         return
-    for entry in ("meshes", "textures", "scene.xml", "request.json"):
-        path = folder / entry
-        shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
+    for path in folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()

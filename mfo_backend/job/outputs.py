@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from ..metrics.flip_error import flip_error
 from ..metrics.tone_mapping import DisplayView
-from ..report.difference_map import difference_picture
 from ..report.html_report import ReportContent, report_html
 from ..report.picture import displayed, displayed_linear, png_bytes
 from ..scene.image_file import write_exr
-from ..types.image import Image
+from ..types.image import Encoding, Image
 from .atomic_file import write_atomically
 from .fit_scene import JobOutcome
 from .job_folder import JobFolder
@@ -35,13 +37,12 @@ def write_outputs(
     OSError, BadInputError
         If the folder cannot be written or the disk is full.
     """
-    shown = displayed(reference, view)
-    result = displayed_linear(outcome.result_image, view)
+    difference = flip_error(reference, Image(outcome.result_image, Encoding.LINEAR), display=view)
     pictures = {
-        "reference": png_bytes(shown),
+        "reference": png_bytes(displayed(reference, view)),
         "start": png_bytes(displayed_linear(outcome.start_image, view)),
-        "result": png_bytes(result),
-        "difference": png_bytes(difference_picture(shown, result)),
+        "result": png_bytes(displayed_linear(outcome.result_image, view)),
+        "difference": png_bytes(np.repeat(difference.map[..., None], 3, axis=-1)),
     }
     folder.pictures.mkdir(exist_ok=True)
     for name, data in pictures.items():

@@ -86,7 +86,7 @@ def _named_files(scene: Element, name: str) -> Iterator[tuple[Element, str]]:
     for element in scene.iter():
         if element.tag in ("include", "path"):
             raise BadInputError(
-                f"{name} has <{element.tag}>, which is not followed: put everything into one scene file whose paths are "
+                f"{name} has <{element.tag}>, which is not followed: put everything into one scene file with paths "
                 "relative to it."
             )
         if element.tag == "string" and element.get("name") == "filename":

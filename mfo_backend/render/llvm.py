@@ -98,7 +98,7 @@ def require_mitsuba() -> None:
     missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
     if missing:
         raise SetupError(
-            f"{' and '.join(missing)} is not installed in {sys.executable}: "
+            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed in {sys.executable}: "
             f'run "{sys.executable}" -m pip install mitsuba==3.9.1, or choose another interpreter.'
         )
 

@@ -54,7 +54,7 @@ def render_probe_kernel() -> dict[str, object]:
     parameters.update()
     image = mi.render(scene, parameters, spp=1, seed=0)  # type: ignore[arg-type]
     dr.backward(dr.mean(dr.square(image), axis=None))
-    slopes = [float(value) for key in keys for value in np.ravel(dr.grad(parameters[key]))]
+    slopes = [float(value) for key in keys for value in np.array(dr.grad(parameters[key])).ravel()]
     if not all(map(math.isfinite, slopes)) or not any(slopes):
         raise RuntimeError(f"the probe kernel gave the gradient {slopes}")
     return {"gradient": slopes}

@@ -141,7 +141,7 @@ def test_text_that_is_no_json(job: Path, content: bytes) -> None:
 
 def test_no_request(job: Path) -> None:
     (job / "request.json").unlink()
-    with pytest.raises(BadInputError, match="holds no request.json"):
+    with pytest.raises(BadInputError, match="holds no request"):
         read_request(JobFolder.open(job))
 
 
