@@ -11,7 +11,9 @@ import textwrap
 import bpy
 
 from . import previews
+from .backend_python import is_chosen
 from .operators.pictures import job_folder_of
+from .preferences import ADDON_ID, preference
 
 
 class _Panel:
@@ -55,6 +57,11 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
         layout.separator()
         if running:
             _draw_progress(layout, runtime)
+        elif not is_chosen(preference(context, "backend_python")) and ADDON_ID in context.preferences.addons:
+            _wrapped(layout, context, "Fits run in a Python of their own that has Mitsuba.", "INFO")
+            layout.operator(
+                "preferences.addon_show", text="Choose Backend Python", icon="PREFERENCES"
+            ).module = ADDON_ID
         else:
             row = layout.row(align=True)
             row.scale_y = 1.4
