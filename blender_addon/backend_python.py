@@ -16,6 +16,11 @@ class BackendPythonError(Exception):
     """No usable interpreter; the message is one sentence for the user."""
 
 
+def is_chosen(preference: str) -> bool:
+    """Whether an interpreter is given at all; looks at no file, so that a panel may ask."""
+    return bool(os.environ.get(VARIABLE, "").strip() or preference.strip())
+
+
 def backend_python(preference: str) -> Path:
     """The interpreter of the backend: the variable MFO_BACKEND_PYTHON, else `preference`.
 

@@ -6,8 +6,8 @@ Run by the bpy module or by a Blender program::
     python -m blender_addon.headless export FILE --object NAME --reference REF --job DIR [--fit JSON]
     blender -b --factory-startup --python blender_addon/headless.py -- apply FILE --job DIR --save-as OUT
 
-Library messages may come before it, but the last line on stdout is always one JSON object with `status` and `sentence`;
-the exit code is 0 when the status is "ok", 2 for bad input and 1 for anything else.
+The answer is one JSON object with `status` and `sentence` on a line of its own, the last on stdout that starts with {;
+Blender prints other lines around it. Exit codes: 0 for the status "ok", 2 for bad input, 1 for anything else.
 """
 
 from __future__ import annotations

@@ -11,7 +11,9 @@ import textwrap
 import bpy
 
 from . import previews
+from .backend_python import is_chosen
 from .operators.pictures import job_folder_of
+from .preferences import ADDON_ID, preference
 
 
 class _Panel:
@@ -55,6 +57,11 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
         layout.separator()
         if running:
             _draw_progress(layout, runtime)
+        elif not is_chosen(preference(context, "backend_python")) and ADDON_ID in context.preferences.addons:
+            _wrapped(layout, context, "Fits run in a Python of their own that has Mitsuba.", "INFO")
+            layout.operator(
+                "preferences.addon_show", text="Choose Backend Python", icon="PREFERENCES"
+            ).module = ADDON_ID
         else:
             row = layout.row(align=True)
             row.scale_y = 1.4
@@ -146,25 +153,13 @@ def _draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection,
     if not rows:
         return
     grid = layout.box().column(align=True)
-    _draw_cells(grid, title, "Start", "Result")
-    for row in rows:
-        if row.is_color:
-            swatches = _draw_cells(grid, row.name)
-            swatches.enabled = False  # to look at, not to edit
-            swatches.prop(row, "start_color", text="")
-            swatches.prop(row, "result_color", text="")
-        else:
-            _draw_cells(grid, row.name, row.start, row.result)
-
-
-def _draw_cells(layout: bpy.types.UILayout, title: str, *cells: str) -> bpy.types.UILayout:
-    """A line with a wide first column; returns the layout of the others."""
-    split = layout.split(factor=0.46)
-    split.label(text=title)
-    others = split.row()
-    for cell in cells:
-        others.label(text=cell)
-    return others
+    for name, *cells in ((title, "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
+        split = grid.split(factor=0.46)
+        split.label(text=name)
+        columns = split.row()
+        for cell in cells:
+            swatch = previews.icon(cell)  # colours have one, and no room for their hex code beside it
+            columns.label(text="" if swatch else cell, icon_value=swatch)
 
 
 def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import bpy.utils.previews
 _collection: Any = None
 _shown: dict[str, str] = {}
 _serial = 0
+_SWATCH = 16  # pixels
 
 
 def register() -> None:
@@ -40,6 +42,23 @@ def show(name: str, path: Path) -> None:
     _shown[name] = key
     if old is not None:
         del _collection[old]
+
+
+def swatch(color: Sequence[float]) -> str:
+    """The hex code of a linear Rec.709 colour; an icon of that name shows it."""
+    display = [_linear_to_srgb(min(max(component, 0.0), 1.0)) for component in color[:3]]
+    name = "#" + "".join(f"{round(255 * component):02X}" for component in display)
+    if _collection is not None and not bpy.app.background and name not in _collection:
+        picture = _collection.new(name)
+        picture.icon_size = (_SWATCH, _SWATCH)
+        picture.icon_pixels_float = [*display, 1.0] * _SWATCH**2
+        _shown[name] = name
+    return name
+
+
+def _linear_to_srgb(value: float) -> float:
+    """IEC 61966-2-1."""
+    return 12.92 * value if value <= 0.0031308 else 1.055 * value ** (1.0 / 2.4) - 0.055
 
 
 def clear() -> None:

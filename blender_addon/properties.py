@@ -101,13 +101,10 @@ class MFO_PG_message(bpy.types.PropertyGroup):
 
 
 class MFO_PG_row(bpy.types.PropertyGroup):
-    """One recovered value or error: label in `name`, both numbers as text, or both colours."""
+    """One recovered value or error: label in `name`, both numbers (or hex colours) as text."""
 
     start: StringProperty()
     result: StringProperty()
-    is_color: BoolProperty()
-    start_color: FloatVectorProperty(name="Start", subtype="COLOR", min=0.0, soft_max=1.0)
-    result_color: FloatVectorProperty(name="Result", subtype="COLOR", min=0.0, soft_max=1.0)
 
 
 class MFO_PG_runtime(bpy.types.PropertyGroup):

@@ -231,16 +231,15 @@ def redraw() -> None:
 def _add_row(rows: bpy.types.bpy_prop_collection, label: str, before: Value | None, after: Value) -> None:
     row = rows.add()
     row.name = label
-    if isinstance(before, tuple) and isinstance(after, tuple):
-        row.is_color, row.start_color, row.result_color = True, before[:3], after[:3]
-    else:
-        row.start, row.result = _shown(before), _shown(after)
+    row.start, row.result = _shown(before), _shown(after)
 
 
 def _shown(value: Value | None) -> str:
     if value is None:
         return ""
-    return " ".join(f"{v:.4g}" for v in (value if isinstance(value, tuple) else (value,)))
+    if isinstance(value, tuple):
+        return previews.swatch(value)
+    return f"{value:.3g}"
 
 
 def _duration(seconds: float) -> str:

@@ -34,6 +34,9 @@ def test_fit_apply_undo_redo_revert(scene: SimpleNamespace) -> None:
     assert fit(scene) == {"FINISHED"}
     assert runtime(scene).state == "DONE"
     assert next((r.name, r.start, r.result) for r in runtime(scene).errors) == ("FLIP", "0.21", "0.012")
+    shown = {r.name: (r.start, r.result) for r in runtime(scene).values}
+    assert shown["Roughness"] == ("0.5", "0.312")
+    assert shown["Base Color"][0] == "#E7E7E7"  # 0.8 linear, IEC 61966-2-1
     bpy.ops.ed.undo_push(message="before apply")
     before = {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
 

@@ -41,6 +41,8 @@ def test_fit_apply_undo_revert(blender: RealBlender, tmp_path: Path, variables: 
     assert "ALL GOOD" in out
     asked = json.loads((tmp_path / "job" / "request.json").read_text("utf-8"))
     assert asked["fit"]["preset"] == "paper"
+    request = pytest.importorskip("mfo_backend.job.request")
+    assert request.request_from_json(asked).target.object == "Cube"  # every socket of this version is understood
 
 
 def test_a_script_that_fails_ends_blender_with_an_exit_code(blender: RealBlender, variables: dict[str, str]) -> None:
