@@ -107,7 +107,9 @@ def main() -> None:
         batches.append({"sockets": asked, "view": view, "light": light, "distribution": distribution})
         shapes.append(tuple(len(a) for a in axes))
         lights.append(light)
-    sheen_view, sheen_light, sheen_sockets = sheen_questions(m32, r32)
+    m_sheen = m32.copy()
+    m_sheen[-1] = 1 - FIRST / 31  # a view along the normal has no azimuth for the lobe to turn with
+    sheen_view, sheen_light, sheen_sockets = sheen_questions(m_sheen, r32)
     batches.append({"sockets": sheen_sockets, "view": sheen_view, "light": sheen_light})
     *answers, sheen = ask_cycles(batches)
     value = {
@@ -183,7 +185,11 @@ def sheen_table(value: Array, view: Array, light: Array) -> Array:
     k = 1 / (s - q**2 / p)  # = A sqrt(R)
     a, b = np.sqrt(p * k), q * k / np.sqrt(p * k)
     table = np.where(lit, np.stack([a, b, (k / a) ** 2]), 0.0).reshape(3, *shape)
-    return to_first_node(to_first_node(table, 1), 2)
+    table = to_first_node(to_first_node(table, 1), 2)
+    table = to_first_node(table[:, ::-1], 1)[:, ::-1]
+    # Nearly all entries come out within 1e-6 of a number with five decimals, which they must be in Cycles
+    table[2] = np.maximum(table[2], 0)
+    return np.round(table, 5)
 
 
 if __name__ == "__main__":
