@@ -62,9 +62,7 @@ class MitsubaRenderer:
 
             theta = self._update(vector, differentiable=True)
             gradient = mi.TensorXf(np.ascontiguousarray(pixel_gradient, dtype=np.float32))
-            self._integrator.render_backward(
-                self._scene, self._params, gradient, self._sensor, _opaque(seed), spp
-            )
+            self._integrator.render_backward(self._scene, self._params, gradient, self._sensor, _opaque(seed), spp)
             self.passes += 2.0
             return np.array(dr.grad(theta), dtype=np.float64)
 
@@ -78,7 +76,8 @@ class MitsubaRenderer:
         width, height = (int(n) for n in self._sensor.film().crop_size())
         columns, rows = width * _MASK_RAYS, height * _MASK_RAYS
         index = dr.arange(mi.UInt32, columns * rows)
-        position = mi.Point2f((index % columns + 0.5) / columns, (index // columns + 0.5) / rows)
+        column, row = mi.Float(index % columns), mi.Float(index // columns)
+        position = mi.Point2f((column + 0.5) / columns, (row + 0.5) / rows)
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
         surface = self._scene.ray_intersect_preliminary(ray)
         shape = next(s for s in self._scene.shapes() if s.id() == self._shape_id)
@@ -119,14 +118,13 @@ def load_mitsuba_renderer(
     load_variant()
     import mitsuba as mi
 
-    if material.plugin:
-        from ..material.principled_plugin import register
+    from ..material.principled_plugin import register
 
-        register()
+    register()
     with _two_threads():
         try:
-            # optimize=False: merging equal objects would take away the ids of shapes and materials
-            scene = mi.load_string(to_text(document), optimize=False)
+            # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
+            scene = mi.load_string(to_text(document), optimize=False, parallel=False)
         except RuntimeError as error:
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a material model hands to the renderer: the scene's target, its parameters and where Mitsuba keeps them."""
+"""What a material model hands to the renderer."""
 
 from __future__ import annotations
 
@@ -20,12 +20,10 @@ Materials = Mapping[str, Mapping[str, Any]]  # `materials` of request.json
 class PreparedMaterial:
     """A scene whose target material can be differentiated.
 
-    `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the id of `target`'s
-    BSDF. `plugin` is the plugin of ours that must be registered before the scene is loaded, if any.
+    `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the target's BSDF id.
     """
 
     table: ParameterTable
     start: NDArray[np.float64]
     target: Target
     key_ends: Mapping[str, str]
-    plugin: str = ""
