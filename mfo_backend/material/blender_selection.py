@@ -10,8 +10,8 @@ from ..types.parameter import ParameterTable
 from .principled_parameters import BLENDER_PRINCIPLED
 
 REDUCED = ("base_color", "metallic", "roughness", "specular_ior_level")  # the paper's scenario "Parameters"
-# Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR and tint from its weight; the
-# remaining ones (alpha, transmission, film, emission, subsurface, anisotropy) join when the material has them already.
+# Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR and tint from its weight;
+# transmission, film, anisotropy and diffuse roughness join when the material has them already.
 OPAQUE = (*REDUCED, "specular_tint", "coat_weight", "coat_roughness", "sheen_weight", "sheen_roughness", "sheen_tint")
 _WITH = {
     "transmission_weight": ("transmission_weight", "ior"),
@@ -62,7 +62,7 @@ def select_blender_parameters(
     table = BLENDER_PRINCIPLED.select(selection)
     for name in table.names:
         if name in _FIXED:
-            raise BadInputError(f"Parameter {name!r} cannot be fitted: choose among {names}.")
+            raise BadInputError(f"Parameter {name!r} cannot be fitted: emission is a light; choose among {names}.")
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")
         if name in _NEEDS and _NEEDS[name] not in {*present, *linked, *table.names}:
