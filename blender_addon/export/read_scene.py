@@ -30,7 +30,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
     """Return the scene as the render would see it, or None with errors in `findings`."""
     scene, view_layer = context.scene, context.view_layer
     if target is None or target.type not in MESH_TYPES:
-        what = "nothing" if target is None else f"'{target.name}', a {target.type.title()}"
+        what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
         findings.error(f"The object to fit is {what}: select an object with faces.")
         return None
     with render_state(view_layer, scene):

@@ -4,31 +4,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-bpy = pytest.importorskip("bpy")
-OpenEXR = pytest.importorskip("OpenEXR")
-mi = pytest.importorskip("mitsuba")
-
-from blender_addon.export.job import ExportReport, export_job  # noqa: E402
-
 Pixels = np.ndarray
+
+# the pure part is tested without Blender too
+collect_ignore = (
+    []
+    if find_spec("bpy")
+    else [
+        "test_bad_input.py",
+        "test_camera.py",
+        "test_geometry.py",
+        "test_light_levels.py",
+        "test_materials.py",
+        "test_reference.py",
+        "test_untouched.py",
+        "test_world.py",
+    ]
+)
 
 
 @pytest.fixture(scope="session")
 def mitsuba() -> Any:
-    variant = "llvm_ad_rgb" if "llvm_ad_rgb" in mi.variants() else "scalar_rgb"
-    mi.set_variant(variant)
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("llvm_ad_rgb")
     return mi
 
 
 @pytest.fixture
 def scene() -> Any:
     """An empty scene, 32x32, box filter, Cycles on the CPU without anything that biases it."""
+    import bpy
+
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -51,6 +64,9 @@ def scene() -> Any:
 def render_cycles(tmp_path: Path) -> Callable[[], Pixels]:
     def render() -> Pixels:
         """Return what Cycles sees, linear (height, width, 3)."""
+        import bpy
+        import OpenEXR
+
         path = tmp_path / "cycles.exr"
         bpy.context.scene.render.filepath = str(path)
         bpy.ops.render.render(write_still=True)
@@ -60,8 +76,11 @@ def render_cycles(tmp_path: Path) -> Callable[[], Pixels]:
 
 
 @pytest.fixture
-def export(tmp_path: Path) -> Callable[..., ExportReport]:
-    def run(target: Any, name: str = "job", **options: Any) -> ExportReport:
+def export(tmp_path: Path) -> Callable[..., Any]:
+    def run(target: Any, name: str = "job", **options: Any) -> Any:
+        import bpy
+        from blender_addon.export.job import export_job
+
         options = {"reference": None, "fit": {}, **options}
         return export_job(bpy.context, target, tmp_path / name, **options)
 
@@ -70,93 +89,8 @@ def export(tmp_path: Path) -> Callable[..., ExportReport]:
 
 @pytest.fixture
 def render_mitsuba(mitsuba: Any) -> Callable[..., Pixels]:
-    def render(report: ExportReport, spp: int = 64) -> Pixels:
+    def render(report: Any, spp: int = 64) -> Pixels:
         """Return what `mi.load_file` and `mi.render` make of the job's scene."""
         return np.array(mitsuba.render(mitsuba.load_file(str(report.folder / "scene.xml")), spp=spp))[:, :, :3]
 
     return render
-
-
-def new_material(name: str, **sockets: Any) -> Any:
-    """A Principled material with the given sockets (spaces as underscores)."""
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
-    node = material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
-    for socket, value in sockets.items():
-        target = node.inputs[socket.replace("_", " ")]
-        target.default_value = (*value, 1.0) if target.type == "RGBA" else value
-    return material
-
-
-def diffuse_material(name: str, color: tuple[float, float, float]) -> Any:
-    """A Lambertian material: the same in both renderers."""
-    return _material_of(name, "ShaderNodeBsdfDiffuse", color)
-
-
-def emission_material(name: str, color: tuple[float, float, float]) -> Any:
-    """A material that glows and reflects nothing."""
-    return _material_of(name, "ShaderNodeEmission", color)
-
-
-def _material_of(name: str, node_type: str, color: tuple[float, float, float]) -> Any:
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    node = tree.nodes.new(node_type)
-    node.inputs["Color"].default_value = (*color, 1.0)
-    tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
-    return material
-
-
-def add_mesh(name: str, vertices: Any, faces: Any, material: Any) -> Any:
-    """Link a new mesh object."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(vertices, [], faces)
-    mesh.materials.append(material)
-    item = bpy.data.objects.new(name, mesh)
-    bpy.context.collection.objects.link(item)
-    return item
-
-
-def add_quad(name: str, size: float, height: float, material: Any) -> Any:
-    """A horizontal square around the origin."""
-    h = size / 2
-    return add_mesh(name, [(-h, -h, height), (h, -h, height), (h, h, height), (-h, h, height)], [(0, 1, 2, 3)], material)
-
-
-def add_camera(kind: str = "ORTHO", location: Any = (0, 0, 5), rotation: Any = (0, 0, 0), **settings: Any) -> Any:
-    """Add and activate a camera; without rotation it looks down."""
-    data = bpy.data.cameras.new("Camera")
-    data.type = kind
-    for name, value in settings.items():
-        setattr(data, name, value)
-    item = bpy.data.objects.new("Camera", data)
-    item.location, item.rotation_euler = location, rotation
-    bpy.context.collection.objects.link(item)
-    bpy.context.scene.camera = item
-    return item
-
-
-def add_light(kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), scale: Any = (1, 1, 1), **settings: Any) -> Any:
-    """Add a light; without rotation it shines down."""
-    data = bpy.data.lights.new("Light", kind)
-    for name, value in settings.items():
-        setattr(data, name, value)
-    item = bpy.data.objects.new("Light", data)
-    item.location, item.rotation_euler, item.scale = location, rotation, scale
-    bpy.context.collection.objects.link(item)
-    return item
-
-
-def world_color(scene: Any, strength: float) -> Any:
-    """Give the scene a white world and return its Background node."""
-    world = bpy.data.worlds.new("World")
-    scene.world = world
-    if world.node_tree is None:
-        world.use_nodes = True
-    node = world.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
-    node.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    node.inputs["Strength"].default_value = strength
-    return node

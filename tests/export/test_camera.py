@@ -15,7 +15,7 @@ from blender_addon.export.xml_scene import scene_text
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
-from .conftest import add_camera, add_mesh, add_quad, emission_material, new_material
+from .scenes import add_camera, add_mesh, add_quad, emission_material, new_material
 
 POINTS = [(0, 0, 0), (0.4, 0.2, -0.3), (-0.5, 0.3, 0.2), (0.2, -0.4, 0.5), (-0.3, -0.2, -0.6)]
 SIZES = {"wide": (64, 32), "tall": (24, 48)}

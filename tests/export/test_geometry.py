@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
-from .conftest import (
+from .scenes import (
     add_camera,
     add_light,
     add_mesh,

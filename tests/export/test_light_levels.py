@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from .conftest import add_camera, add_light, add_quad, diffuse_material, new_material
+from .scenes import add_camera, add_light, add_quad, diffuse_material, new_material
 
 TILTED = {"location": (0.7, -0.4, 2.5), "rotation": (0.3, 0.2, 0.5)}
 SHARP = {"use_soft_falloff": False}

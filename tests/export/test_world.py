@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from .conftest import add_camera, add_quad, new_material
+from .scenes import add_camera, add_quad, new_material
 
 DIRECTIONS = [
     (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0.1, 0.05, 1), (0.05, -0.1, -1), (3, 2, 1), (-1, 2, -2), (-2, -3, 1), (1, -1, 3)
