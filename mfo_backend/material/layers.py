@@ -222,8 +222,10 @@ def _add_plastic(
     if film is not None:
         albedo = dr.select(film.present, fresnel(mu), albedo)
     present = (n != 1) | (film.present if film is not None else False)
-    # A channel that the coat's tint has made black takes no part in the achromatic attenuation
-    hidden = dr.select(w > 0, dr.select(present, gain.weight * albedo, 0), 0)
+    # A channel that the coat's tint has made black takes no part in the achromatic attenuation; when all are black, as
+    # under a fully metallic surface, the derivative still has to see the attenuation
+    counts = (w > 0) | (largest(w) <= 0)
+    hidden = dr.select(counts & present, gain.weight * albedo, 0)
     stack |= {"specular": dr.select(present, w * gain.scale, 0), "specular_fresnel": fresnel}
     w = w * saturate(1 - largest(hidden))
     colour = at_least(p["base_color"], 0)
