@@ -39,7 +39,7 @@ class BlenderPrincipled(mi.BSDF):
         self.model = cycles_model(version, props.get("distribution", "MULTI_GGX"))
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
-        self.given = [item.name for item in BLENDER_PRINCIPLED if props.has_property(item.name)]
+        self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
         fixed: dict[str, Value | None] = {}
         for item in BLENDER_PRINCIPLED:
             value = props.get(item.name, item.default)

@@ -38,7 +38,8 @@ class SphereRenderer:
         self._inside = x**2 + y**2 < 1.0
         normal = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=-1)
         light = np.array([0.3, -0.4, 0.8660254])
-        half = (light + [0.0, 0.0, 1.0]) / np.linalg.norm(light + [0.0, 0.0, 1.0])
+        half = light + np.array([0.0, 0.0, 1.0])
+        half /= np.linalg.norm(half)
         self._cos_light = np.maximum(normal @ light, 0.0) * self._inside
         self._cos_half_sq = (normal @ half) ** 2
 
