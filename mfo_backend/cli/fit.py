@@ -18,6 +18,7 @@ from ..job.stop import StopSignal
 from ..metrics.tone_mapping import DisplayView
 from .main import report_error
 from .result_text import result_text
+from .run import leave
 
 _SETTINGS = ("model", "preset", "parameters", "range", "seed", "max_iterations", "spp", "keep_optimizer_state")
 
@@ -67,14 +68,15 @@ def work(arguments: argparse.Namespace, fitter: Fitter) -> int:
     with stop.watching():
         status = run_job(folder, events, stop, fitter=fitter)
     if not (folder / "result.json").exists():
-        return report_error(status, events.last_sentence, stream=stream)
+        report_error(status, events.last_sentence, stream=stream)
+        return leave(status)
     result = json.loads((folder / "result.json").read_text("utf-8"))
     if stream is not None:
         print(json.dumps(result | {"folder": str(folder)}, ensure_ascii=False), file=stream)
         stream.close()
     else:
         print(f"{result['sentence']}\n\n{result_text(result)}\n\nReport: {folder / 'index.html'}")
-    return status.exit_code
+    return leave(status)
 
 
 def _parameters(text: str | None) -> dict[str, Any]:

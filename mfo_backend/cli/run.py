@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import sys
 from pathlib import Path
 
@@ -33,7 +34,16 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the job; the exit code is its status'."""
-    return work(arguments, fit_scene).exit_code
+    return leave(work(arguments, fit_scene))
+
+
+def leave(status: Status) -> int:
+    """The exit code of a job; after a cancel the process ends here, because native code may still be at work."""
+    if status is Status.CANCELLED:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status.exit_code)
+    return status.exit_code
 
 
 def work(arguments: argparse.Namespace, fitter: Fitter, *, orphan_grace: float = ORPHAN_GRACE) -> Status:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..metrics.loss import Loss, make_loss
 from ..metrics.tone_mapping import DisplayView
-from ..render.renderer import Renderer
+from ..render.renderer import Interrupted, Renderer
 from ..types.errors import BadInputError
 from ..types.event import Listener, Started
 from ..types.image import Encoding, Image, Pixels
@@ -131,9 +131,11 @@ def _verify(
     for candidate in candidates:
         if should_stop():
             return None
-        verified.append(
-            Candidate(candidate.vector, renderer.image(candidate.vector, seed=seed, spp=settings.verify_spp))
-        )
+        try:
+            image = renderer.image(candidate.vector, seed=seed, spp=settings.verify_spp)
+        except Interrupted:
+            return None
+        verified.append(Candidate(candidate.vector, image))
     return tuple(verified)
 
 

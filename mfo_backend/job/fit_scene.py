@@ -59,23 +59,30 @@ def fit_scene(
         If the scene, the target or a parameter cannot be used.
     SetupError
         If Mitsuba or LLVM is missing.
+    Interrupted
+        If it was asked to stop before there was anything to keep.
     """
     from ..render.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit, so the imports below stay here
     from ..fit.fit_material import fit_material
+    from ..render.interruptible import InterruptibleRenderer, NativeThread
     from ..render.renderer import load_renderer
     from ..render.variant import load_variant
 
-    variant = load_variant()
-    renderer = load_renderer(
-        folder.root / request.scene,
-        request.target.shape_id,
-        model=request.fit.model,
-        parameters=request.fit.parameters,
-        materials=_materials(folder, request),
+    thread = NativeThread(should_stop)
+    variant = thread.call(load_variant)
+    renderer = thread.call(
+        lambda: load_renderer(
+            folder.root / request.scene,
+            request.target.shape_id,
+            model=request.fit.model,
+            parameters=request.fit.parameters,
+            materials=_materials(folder, request),
+        )
     )
+    renderer = InterruptibleRenderer(renderer, thread)
     outcome = fit_material(renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop)
     return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
 

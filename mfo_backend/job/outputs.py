@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ..metrics.flip_error import flip_error
 from ..metrics.tone_mapping import DisplayView
+from ..report.difference_map import magma
 from ..report.html_report import ReportContent, report_html
 from ..report.picture import displayed, displayed_linear, png_bytes
 from ..scene.image_file import write_exr
@@ -42,7 +41,7 @@ def write_outputs(
         "reference": png_bytes(displayed(reference, view)),
         "start": png_bytes(displayed_linear(outcome.start_image, view)),
         "result": png_bytes(displayed_linear(outcome.result_image, view)),
-        "difference": png_bytes(np.repeat(difference.map[..., None], 3, axis=-1)),
+        "difference": png_bytes(magma(difference.map)),
     }
     folder.pictures.mkdir(exist_ok=True)
     for name, data in pictures.items():

@@ -8,6 +8,7 @@ import traceback
 from pathlib import Path
 
 from ..metrics.tone_mapping import DisplayView
+from ..render.renderer import Interrupted
 from ..report.picture import displayed_linear, png_bytes
 from ..scene.image_file import check_reference, read_image
 from ..types.errors import MfoError
@@ -33,6 +34,8 @@ def run_job(path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter
         status, sentence = _run(path, events, stop, fitter)
     except MfoError as error:
         return _fail(events, error.status, str(error))
+    except Interrupted:
+        return _fail(events, Status.CANCELLED, _CANCELLED_EARLY)
     except OSError as error:
         traceback.print_exc(file=sys.stderr)
         refused = unwritable(path, error)

@@ -18,7 +18,7 @@ _CAPTIONS = {
     "reference": ("Reference", "the picture to match"),
     "start": ("Start", "before the fit"),
     "result": ("Result", "with the recovered values"),
-    "difference": ("Difference", "FLIP of result and reference; black is equal"),
+    "difference": ("Difference", "FLIP of reference and result"),
 }
 _ERROR_NAMES = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
 _TONES = {Status.FAILED: "bad", Status.CANCELLED: "warn", Status.MAX_ITERATIONS: "warn"}
@@ -97,9 +97,10 @@ def _pictures(pictures: Mapping[str, bytes]) -> str:
     for name, (title, words) in _CAPTIONS.items():
         if name in pictures:
             data = base64.b64encode(pictures[name]).decode("ascii")
+            scale = '<span class="scale">0 <i></i> 1</span>' if name == "difference" else ""
             shown.append(
                 f'<figure><img src="data:image/png;base64,{data}" alt="{title}: {words}">'
-                f"<figcaption><b>{title}</b>, {words}</figcaption></figure>"
+                f"<figcaption><b>{title}</b>, {words}{scale}</figcaption></figure>"
             )
     return "".join(shown)
 
