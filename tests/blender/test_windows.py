@@ -20,4 +20,4 @@ def test_in_windows(windowed: RealBlender, tmp_path: Path) -> None:
     out = windowed.script(SCRIPT, ADDON_ID, str(tmp_path), windows=True, MFO_BACKEND_PYTHON=python)
     assert "ALL GOOD" in out, out[-4000:]
     assert "script error" not in out, out[-4000:]
-    print(out.splitlines()[-3:])
+    print(next(line for line in out.splitlines() if "ALL GOOD" in line))

@@ -23,6 +23,7 @@ running_job = importlib.import_module(f"{addon_id}.blender_addon.running_job")
 panel = importlib.import_module(f"{addon_id}.blender_addon.panel")
 LONGEST_STALL = 0.05  # seconds
 spent: list[float] = []
+bpy.context.preferences.view.show_splash = False
 
 
 def timed(function, *arguments):
@@ -99,7 +100,6 @@ def alive(process):
 
 
 def story():
-    bpy.context.preferences.view.show_splash = False
     yield from show_tab()
     settings()
     shot("1_idle")
