@@ -102,8 +102,9 @@ def texture_element(name: str, texture: Texture, path: str) -> Element:
     """Return the `<texture>`; the meshes carry 1 - v because Mitsuba counts rows from the top."""
     element = bitmap(name, path, extension=texture.wrap, filter_type=texture.filter_type)
     if not np.allclose(texture.uv_matrix, np.eye(3)):
-        # Mitsuba keeps the upper left 3x3 of a 4x4 matrix: the translation goes into the third column
+        # Mitsuba 3.9 takes rotation and scale from the upper left 2x2, the translation from the fourth column
+        flat = FLIP_V @ texture.uv_matrix @ FLIP_V
         matrix = np.eye(4)
-        matrix[:3, :3] = FLIP_V @ texture.uv_matrix @ FLIP_V
+        matrix[:2, :2], matrix[:2, 3] = flat[:2, :2], flat[:2, 2]
         add(element, transform("to_uv", matrix))
     return element

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,9 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     lengths = np.linalg.norm(normals, axis=1)
     flat = _face_normals(positions.reshape(-1, 3, 3), mirrored)
     normals = np.where(lengths[:, None] > 1e-20, normals / np.maximum(lengths, 1e-20)[:, None], flat)
-    corners = np.concatenate([positions, normals, mesh.uvs[slots].reshape(-1, 2)], axis=1).astype(np.float32)
+    # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
+    uvs = mesh.uvs[slots].reshape(-1, 2) * (1.0, -1.0) + (0.0, 1.0)
+    corners = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
     corners = corners + np.float32(0.0)  # -0.0 and 0.0 are one vertex
     unique, index = np.unique(corners.view([("", np.float32)] * 8).reshape(-1), return_inverse=True)
     vertices = unique.view(np.float32).reshape(-1, 8)
@@ -53,6 +56,19 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
         np.ascontiguousarray(vertices[:, 3:6]),
         np.ascontiguousarray(vertices[:, 6:]),
         np.ascontiguousarray(triangles),
+    )
+
+
+def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+    """Return all triangles of `meshes` as one mesh."""
+    if len(meshes) == 1:
+        return meshes[0]
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
+    return TriangleMesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.uvs for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]).astype(np.int32),
     )
 
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ..versions import cycles_settings
 from .findings import Findings
-from .mesh_arrays import CornerMesh, world_mesh
+from .mesh_arrays import CornerMesh, joined, world_mesh
 from .material_model import Material
+from .ply_file import TriangleMesh
 from .read_camera import read_camera, read_pixel_filter
 from .read_light import read_light
 from .read_material import read_context, read_target
@@ -29,7 +30,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
     """Return the scene as the render would see it, or None with errors in `findings`."""
     scene, view_layer = context.scene, context.view_layer
     if target is None or target.type not in MESH_TYPES:
-        what = "nothing" if target is None else f"'{target.name}', a {target.type.title()}"
+        what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
         findings.error(f"The object to fit is {what}: select an object with faces.")
         return None
     with render_state(view_layer, scene):
@@ -86,6 +87,7 @@ class _Walk:
         self.data, self.target, self.slot = data, target, slot
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
+        self.target_pieces: list[tuple[TriangleMesh, bool]] = []
         data.materials[TARGET_BSDF] = material
         self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
 
@@ -99,10 +101,15 @@ class _Walk:
                 light = read_light(item, matrix, self.data.settings.exposure, self.findings)
                 if light is not None:
                     self.data.lights.append(light)
-            elif item.type in MESH_TYPES:
-                self._add_mesh(item, matrix, item.original == self.target and not instance.is_instance)
-            elif item.type not in SILENT_TYPES:
+            elif item.type == "MESH":
+                # the faces of curves, texts and geometry nodes come as instances whose parent is the object itself
+                own = not instance.is_instance or instance.parent == item.original.evaluated_get(self.depsgraph)
+                self._add_mesh(item, matrix, own and item.original == self.target)
+            elif item.type not in (*MESH_TYPES, *SILENT_TYPES):
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
+        if self.target_pieces:
+            meshes, closed = zip(*self.target_pieces, strict=True)
+            self.data.shapes.insert(0, Shape(TARGET_SHAPE, joined(meshes), TARGET_BSDF, all(closed)))
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
@@ -123,16 +130,12 @@ class _Walk:
         last = max(len(item.material_slots) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         for slot in np.unique(slots):
-            chosen = is_target and slot == self.slot
-            count = len(self.data.shapes) + 1
-            self.data.shapes.append(
-                Shape(
-                    TARGET_SHAPE if chosen else f"shape_{count:04d}",
-                    world_mesh(mesh, slots == slot, matrix),
-                    TARGET_BSDF if chosen else self._bsdf(item, int(slot)),
-                    mesh.is_closed,
-                )
-            )
+            piece = world_mesh(mesh, slots == slot, matrix)
+            if is_target and slot == self.slot:
+                self.target_pieces.append((piece, mesh.is_closed))
+                continue
+            name = f"shape_{len(self.data.shapes) + 1:04d}"
+            self.data.shapes.append(Shape(name, piece, self._bsdf(item, int(slot)), mesh.is_closed))
 
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
         slots = item.material_slots

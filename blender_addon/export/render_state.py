@@ -23,6 +23,7 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
     hidden: list[bpy.types.Object] = []
     selected = [item for item in view_layer.objects if item.select_get(view_layer=view_layer)]
     active = view_layer.objects.active
+    flushed = False
 
     def put(owner: Any, name: str, value: Any) -> None:
         before = getattr(owner, name)
@@ -47,7 +48,8 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
                 hidden.append(item)
                 item.hide_set(False, view_layer=view_layer)
             _use_render_settings(item, put)
-        if changed or hidden:
+            flushed |= item.mode == "EDIT" and item.update_from_editmode()
+        if changed or hidden or flushed:
             view_layer.update()
         yield
     finally:

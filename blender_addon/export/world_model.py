@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .xml_scene import Element, add, boolean, plugin, rgb, scalar, string, transform
+from .xml_scene import Element, add, plugin, rgb, scalar, string, transform
 
 # Mitsuba's envmap looks up local (x, y, z), Y up; Blender's equirectangular image has +X in its middle and Z up
 AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -42,15 +42,12 @@ def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> E
     if world.pixels is None:
         return add(plugin("emitter", "constant", "world"), rgb("radiance", world.color))
     tinted = world.pixels * world.color.astype(np.float32)
-    width = world.pixels.shape[1]
     rotation = np.eye(3) if world.lookup is None else world.lookup
     matrix = np.eye(4)
-    # Mitsuba puts the middle of the first column at u = 0, Blender half a column to the right of it
-    matrix[:3, :3] = rotation.T @ AXES @ _about_y(-math.pi / width)
+    matrix[:3, :3] = rotation.T @ AXES
     return add(
         plugin("emitter", "envmap", "world"),
         string("filename", save(_rows_on_poles(tinted))),
-        boolean("raw", True),
         scalar("scale", 1.0),
         transform("to_world", matrix),
     )
@@ -94,8 +91,3 @@ def _rows_on_poles(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
     rows[2:-1:2] = 0.5 * (pixels[:-1] + pixels[1:])
     rows[0], rows[-1] = pixels[0], pixels[-1]
     return rows
-
-
-def _about_y(angle: float) -> NDArray[np.float64]:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
