@@ -156,7 +156,7 @@ def _draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection,
     for name, *cells in ((title, "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
         split = grid.split(factor=0.46)
         split.label(text=name)
-        columns = split.row()
+        columns = split.split(factor=0.5)  # a row would pack swatches to the left
         for cell in cells:
             swatch = previews.icon(cell)  # colours have one, and no room for their hex code beside it
             columns.label(text="" if swatch else cell, icon_value=swatch)

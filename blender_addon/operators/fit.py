@@ -62,6 +62,9 @@ class MFO_OT_fit(bpy.types.Operator):
         if not bpy.app.background and context.object is None:
             cls.poll_message_set("Select the object whose material is to be fitted")
             return False
+        if not bpy.app.background and context.object.active_material is None:
+            cls.poll_message_set("The object has no material in its active slot; give it one with a Principled BSDF")
+            return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -308,6 +308,26 @@ def test_nothing_heavy_is_in_blenders_process(scene: SimpleNamespace) -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_colours_follow_the_working_space(scene: SimpleNamespace) -> None:
+    bpy = scene.bpy
+    if not hasattr(bpy.data, "colorspace"):
+        pytest.skip("this Blender has one working space")
+    fit(scene)
+    path = Path(scene.job, "result.json")
+    found = json.loads(path.read_text())
+    path.write_text(
+        json.dumps(found | {"model": "blender_principled", "recovered": {"base_color": [0.25, 0.5, 0.0625]}})
+    )
+    bpy.ops.wm.set_working_color_space(working_space="Linear Rec.2020", convert_colors=False)
+    bpy.ops.mfo.apply(job_folder=scene.job)
+    # ITU-R BT.2087-0, table 1: linear BT.709 to BT.2020
+    matrix = ((0.6274, 0.3293, 0.0433), (0.0691, 0.9195, 0.0114), (0.0164, 0.0880, 0.8956))
+    wanted = [sum(m * c for m, c in zip(row, (0.25, 0.5, 0.0625), strict=True)) for row in matrix]
+    assert _plain(sockets(bpy)["Base Color"])[:3] == pytest.approx(wanted, abs=1e-4)  # the table has four digits
+    bpy.ops.mfo.revert()
+    assert _plain(sockets(bpy)["Base Color"]) == pytest.approx((0.8, 0.8, 0.8, 1.0), abs=FLOAT32)
+
+
 def _plain(socket) -> object:
     value = socket.default_value
     return value if isinstance(value, (int, float, str)) else tuple(value)

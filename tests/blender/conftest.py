@@ -13,6 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 ADDON_ID = "bl_ext.user_default.material_fit_mfo"
 PROGRAMS = [p for p in os.environ.get("MFO_BLENDER", "").split(os.pathsep) if p]
+WINDOWED = [p for p in os.environ.get("MFO_BLENDER_WINDOWS", "").split(os.pathsep) if p]
 
 
 @dataclass(frozen=True)
@@ -23,21 +24,23 @@ class RealBlender:
     profile: Path
     package: Path
 
-    def run(self, *arguments: str, check: bool = True, **variables: str) -> subprocess.CompletedProcess[str]:
-        """Start it in background with factory settings and wait."""
+    def run(
+        self, *arguments: str, check: bool = True, windows: bool = False, **variables: str
+    ) -> subprocess.CompletedProcess[str]:
+        """Start it with factory settings, in background unless with `windows`, and wait."""
         environment = os.environ | {"BLENDER_USER_RESOURCES": str(self.profile)} | variables
         done = subprocess.run(
-            [self.program, "--background", "--factory-startup", "--offline-mode", *arguments],
+            [self.program, *([] if windows else ["--background"]), "--factory-startup", "--offline-mode", *arguments],
             capture_output=True, text=True, env=environment, timeout=250, check=False,
         )  # fmt: skip
         if check:
             assert done.returncode == 0, f"{done.stdout[-4000:]}\n{done.stderr[-4000:]}"
         return done
 
-    def script(self, path: Path, *arguments: str, **variables: str) -> str:
+    def script(self, path: Path, *arguments: str, windows: bool = False, **variables: str) -> str:
         """Run a Python file with the extension enabled; an exception in it is a failed test."""
         options = ["--addons", ADDON_ID, "--python-exit-code", "3", "--python", str(path), "--", *arguments]
-        return self.run(*options, **variables).stdout
+        return self.run(*options, windows=windows, **variables).stdout
 
 
 @pytest.fixture(scope="session", params=PROGRAMS or [None], ids=lambda p: Path(p).name if p else "none")
@@ -45,8 +48,20 @@ def blender(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     """A Blender with the extension built, validated and installed."""
     if request.param is None:
         pytest.skip("MFO_BLENDER names no Blender program")
-    folder = tmp_path_factory.mktemp("blender")
-    found = RealBlender(request.param, folder / "profile", folder / "material_fit.zip")
+    return installed(request.param, tmp_path_factory.mktemp("blender"))
+
+
+@pytest.fixture(scope="session", params=WINDOWED or [None], ids=lambda p: Path(p).name if p else "none")
+def windowed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> RealBlender:
+    """The same for a program that can open windows, on a real or a virtual screen."""
+    if request.param is None:
+        pytest.skip("MFO_BLENDER_WINDOWS names no Blender program")
+    return installed(request.param, tmp_path_factory.mktemp("windowed"))
+
+
+def installed(program: str, folder: Path) -> RealBlender:
+    """Build, validate and install the extension into a new profile."""
+    found = RealBlender(program, folder / "profile", folder / "material_fit.zip")
     found.profile.mkdir()
     built = ["--source-dir", str(ROOT), "--output-filepath", str(found.package)]
     found.run("--command", "extension", "build", *built)

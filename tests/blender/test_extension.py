@@ -45,6 +45,15 @@ def test_fit_apply_undo_revert(blender: RealBlender, tmp_path: Path, variables: 
     assert request.request_from_json(asked).target.object == "Cube"  # every socket of this version is understood
 
 
+def test_interpreter_and_job_root_from_the_preferences(
+    blender: RealBlender, tmp_path: Path, variables: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("MFO_BACKEND_PYTHON", raising=False)
+    arguments = [ADDON_ID, str(tmp_path), variables["MFO_BACKEND_PYTHON"]]
+    assert "ALL GOOD" in blender.script(SCRIPTS / "preferences.py", *arguments)
+    assert len(list((tmp_path / "jobs").iterdir())) == 1
+
+
 def test_a_script_that_fails_ends_blender_with_an_exit_code(blender: RealBlender, variables: dict[str, str]) -> None:
     done = blender.run(
         "--addons", ADDON_ID, "--python-exit-code", "7",
