@@ -96,6 +96,15 @@ def test_llvm_19_is_found_behind_a_bad_choice(monkeypatch: pytest.MonkeyPatch, n
     assert llvm.configure_llvm() == INSTALLED[19]
 
 
+@pytest.mark.skipif(19 not in INSTALLED, reason="LLVM 19 is not installed")
+def test_a_probe_compiles_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # kernels that another LLVM left in the user's cache would let a broken one pass
+    (tmp_path / "kernels").mkdir()
+    monkeypatch.setenv("DRJIT_CACHE_DIR", str(tmp_path / "kernels"))
+    assert llvm.probe_llvm(INSTALLED[19]).works
+    assert list((tmp_path / "kernels").iterdir()) == []
+
+
 def test_a_file_that_is_no_library(tmp_path: Path) -> None:
     fake = tmp_path / "libLLVM-99.so"
     fake.write_bytes(b"not a library")
