@@ -37,7 +37,7 @@ class Scripted:
 
 def test_recovers_the_truth(sphere, truth, mse) -> None:
     outcome = run(sphere, [mse], max_iterations=1000)
-    np.testing.assert_allclose(outcome.candidates[-1].vector, truth, atol=5e-3)  # the last rate is 7e-4 of the range
+    np.testing.assert_allclose(outcome.candidates[-1].vector, truth, atol=5e-3)  # the last rate is 2e-3 of the range
     assert outcome.reports[0].loss_best < 1e-4 * outcome.reports[0].loss_start
 
 
@@ -66,9 +66,9 @@ def test_a_new_stage_starts_from_the_best_with_fresh_or_kept_moments(sphere, mse
     _, gradient = mse.value_and_gradient(images[0])
     slope = sphere.image_and_pullback(fresh, seed=0, spp=1)[1](gradient)
     span = sphere.table.upper - sphere.table.lower
-    first_step = fresh - 0.02 * span * np.sign(slope)
+    first_step = fresh - 0.05 * span * np.sign(slope)
     slope = sphere.image_and_pullback(first_step, seed=0, spp=1)[1](mse.value_and_gradient(best)[1])
-    second_step = first_step - 0.02 * span * np.sign(slope)
+    second_step = first_step - 0.05 * span * np.sign(slope)
     expected = sphere.shade(second_step).astype(np.float32)
     assert np.allclose(stepped, expected, atol=1e-5) is not keep
 
@@ -80,6 +80,20 @@ def test_constant_rate_ends_at_the_first_stall_and_decay_takes_three_more(sphere
     assert (constant.status, constant.reports[0].iterations) == (Status.STALE, 11)
     assert (decay.status, decay.reports[0].iterations) == (Status.STALE, 41)
     np.testing.assert_array_equal(decay.candidates[-1].vector, sphere.start)
+
+
+def test_a_stall_goes_on_from_the_best_with_a_third_of_the_rate(sphere, mse) -> None:
+    images = []
+
+    class Recorded(Scripted):
+        def value_and_gradient(self, image):
+            images.append(image)
+            return super().value_and_gradient(image)
+
+    run(sphere, [Recorded(mse, [1.0, *[2.0, 2.1] * 40])], schedule="decay", learning_rate=0.03, max_iterations=13)
+    np.testing.assert_array_equal(images[11], images[0])
+    first, again = (np.abs(images[i] - images[0]).max() for i in (1, 12))
+    assert 0.2 < again / first < 0.5  # a third, up to the curvature of the picture
 
 
 def test_the_maximum_holds_through_stalls(sphere, mse) -> None:
@@ -140,7 +154,8 @@ def test_events_tell_the_whole_course(sphere, mse) -> None:
     assert [end.sentence for end in ends] == [Status(end.status).sentence for end in ends]
     curve = outcome.reports[1].curve
     assert [point.iteration for point in curve] == list(range(1, len(curve) + 1))
-    assert all(np.diff([point.passes for point in curve]) == 3.0)
+    # an iterate at which a stall ends has no need of its slope
+    assert set(np.diff([point.passes for point in curve])) == {1.0, 3.0}
 
 
 def test_equal_seeds_give_equal_fits(noisy_sphere, sphere, truth) -> None:
