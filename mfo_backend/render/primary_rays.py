@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Camera rays on a fixed, stratified set of positions in every pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+TILE = 4  # pixels; a tile is the smallest residual when the recording itself is noisy
+
+
+@dataclass(frozen=True)
+class PrimaryRays:
+    """`per_pixel` rays for each pixel, pixels in tile order.
+
+    Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every ray
+    counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
+    `filter_weight` adds up to 1 within a pixel.
+    """
+
+    ray: mi.RayDifferential3f
+    pixel_position: mi.UInt32
+    filter_weight: mi.Float
+    pixel: NDArray[np.int64]
+    tile: NDArray[np.int64]
+    per_pixel: int
+
+
+def tile_order(width: int, height: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Flat pixel indices ordered by tile, and the tile number of each; both of shape (height * width,)."""
+    row, column = np.divmod(np.arange(width * height), width)
+    tile = (row // TILE) * -(-width // TILE) + column // TILE
+    order = np.argsort(tile, kind="stable")
+    return order, tile[order]
+
+
+def fresh_sampler(seed: int, width: int) -> mi.Sampler:
+    """Independent random numbers; the seed is data, so that another seed needs no other kernel."""
+    sampler = mi.load_dict({"type": "independent", "sample_count": 1})
+    sampler.seed(dr.opaque(mi.UInt32, seed), width)
+    return sampler
+
+
+def primary_rays(sensor: mi.Sensor, grid: int, seed: int) -> PrimaryRays:
+    """`grid` x `grid` jittered camera rays for each pixel of the sensor's film."""
+    film = sensor.film()
+    width, height = (int(v) for v in film.crop_size())
+    order, tile = tile_order(width, height)
+    per_pixel = grid * grid
+    lane = dr.arange(mi.UInt32, width * height * per_pixel)
+    position = lane // per_pixel
+    cell = lane - position * per_pixel
+    sampler = fresh_sampler(seed, width * height * per_pixel)
+    flat = dr.gather(mi.UInt32, mi.UInt32(order.astype(np.uint32)), position)
+    y = flat // width
+    x = flat - y * width
+    jitter = sampler.next_2d()
+    cell_y = cell // grid
+    inside = mi.Point2f(mi.Float(cell - cell_y * grid) + jitter.x, mi.Float(cell_y) + jitter.y) / grid
+    offset, sign = _through_filter(film.rfilter(), inside)
+    if sign is None:
+        weight = dr.full(mi.Float, 1.0 / per_pixel, width * height * per_pixel)
+    else:
+        weight = sign / dr.gather(mi.Float, dr.block_sum(sign, per_pixel), position)
+    crop = film.crop_offset()
+    size = mi.ScalarVector2f(film.size())
+    film_position = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]) / mi.Point2f(size)
+    ray, _ = sensor.sample_ray_differential(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
+    return PrimaryRays(ray, position, weight, order, tile, per_pixel)
+
+
+def _through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:
+    """Offsets from the pixel centre with density |filter|, and the filter's sign where it has one."""
+    if rfilter.is_box_filter():
+        return u - 0.5, None
+    edges = np.linspace(-rfilter.radius(), rfilter.radius(), 1025, dtype=np.float32)
+    value = np.array(rfilter.eval(mi.Float(0.5 * (edges[1:] + edges[:-1]))))
+    cumulative = np.concatenate([[0.0], np.cumsum(np.abs(value))])
+    quantiles = mi.Float(np.interp(np.linspace(0, 1, 4097), cumulative / cumulative[-1], edges).astype(np.float32))
+
+    def inverse(t: mi.Float) -> mi.Float:
+        cell = dr.minimum(mi.UInt32(t * 4096.0), 4095)
+        low, high = dr.gather(mi.Float, quantiles, cell), dr.gather(mi.Float, quantiles, cell + 1)
+        return dr.lerp(low, high, t * 4096.0 - mi.Float(cell))
+
+    offset = mi.Point2f(inverse(u.x), inverse(u.y))
+    if (value >= 0.0).all():
+        return offset, None
+    return offset, dr.sign(rfilter.eval(offset.x) * rfilter.eval(offset.y))

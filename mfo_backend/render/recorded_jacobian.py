@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pixels and their derivatives by all free values, from recorded paths, in one kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.parameter import ParameterTable, Value
+from .recorded_paths import LaneGroups, RecordedPaths
+
+
+class MaterialModel(Protocol):
+    """A reflecting material as a plain Dr.Jit function of its values and two directions."""
+
+    name: str
+    table: ParameterTable
+
+    def evaluate(self, parameters: Mapping[str, Any], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
+        """BSDF times cosine."""
+        ...
+
+
+class RecordedJacobian:
+    """The image of recorded paths as a function of a material's free values.
+
+    Parameters
+    ----------
+    model
+        The material.
+    free
+        Names of the values that vary.
+    fixed
+        The other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
+        value needs no new kernel.
+
+    Notes
+    -----
+    A lane of the kernel is a pixel or tile. It walks over its recorded lanes, evaluates the material and pushes one unit
+    tangent after the other through the same tape (forward mode), so 3 (1 + K) sums are all that leaves the kernel. Sums
+    run in a fixed order: the result is deterministic. The launch is recorded once (`dr.freeze`) and replayed; the output
+    is an argument because a frozen function would keep the size it had at the recording.
+    """
+
+    def __init__(self, model: MaterialModel, free: Sequence[str], fixed: Mapping[str, Value]) -> None:
+        self.model = model
+        self.table = model.table.select(free)
+        values = {p.name: fixed.get(p.name, p.default) for p in model.table if p.name not in self.table.names}
+        self._absent = {name for name, value in values.items() if value == 0.0}
+        self._fixed_table = [p for p in model.table if p.name in values and p.name not in self._absent]
+        constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
+        self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
+        dr.eval(self._constants)
+        self.evaluations = 0
+        self._launch = dr.freeze(self._kernel)
+
+    def __call__(
+        self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Mean radiance (g, 3) of the groups, without the constant part, and its Jacobian (g, 3, K)."""
+        width = self.table.length + 1
+        theta = mi.Float(np.asarray(vector, np.float32))
+        out = dr.zeros(mi.Float, len(groups) * 3 * width)
+        dr.eval(theta, out)
+        self._launch(
+            theta, self._constants, paths.wi, paths.wo, paths.weight, groups.start, groups.stop, groups.scale, out
+        )
+        self.evaluations += 1
+        rows = out.numpy().reshape(len(groups), 3, width)
+        return rows[:, :, 0], rows[:, :, 1:]
+
+    def _kernel(self, theta, constants, wi, wo, weight, start, stop, scale, out):  # noqa: ANN001, ANN202
+        width = self.table.length + 1
+
+        def body(lane, stop, sums):  # noqa: ANN001, ANN202
+            columns = self._columns(
+                theta, constants, *(dr.gather(type(a), a, lane) for a in (wi, wo)), dr.gather(mi.Color3f, weight, lane)
+            )
+            return lane + 1, stop, [s + c[k] for k in range(3) for s, c in zip(sums[k * width :], columns, strict=False)]
+
+        sums = [mi.Float(0.0) for _ in range(3 * width)]
+        _, _, sums = dr.while_loop(
+            (mi.UInt32(start), mi.UInt32(stop), sums), lambda lane, stop, sums: lane < stop, body, label="recorded paths"
+        )
+        row = dr.arange(mi.UInt32, dr.width(start)) * (3 * width)
+        for column, total in enumerate(sums):
+            dr.scatter(out, total * scale, row + column, mode=dr.ReduceMode.Permute)
+
+    def _columns(self, theta, constants, wi, wo, weight) -> list[mi.Color3f]:  # noqa: ANN001
+        """The weighted BSDF value and its derivative by each free value."""
+        values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
+        dr.enable_grad(*values)
+        result = self.model.evaluate(self._parameters(values, constants), wi, wo) * weight
+        columns = [dr.detach(result)]
+        for value in values:
+            dr.set_grad(value, 1.0)
+            dr.enqueue(dr.ADMode.Forward, value)
+            dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
+            columns.append(mi.Color3f(dr.grad(result)))
+            dr.clear_grad(result)
+        return columns
+
+    def _parameters(self, values: list[mi.Float], constants: mi.Float) -> dict[str, Any]:
+        parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)
+        rest = [dr.gather(mi.Float, constants, mi.UInt32(k)) for k in range(sum(p.size for p in self._fixed_table))]
+        for table, entries in ((self.table, iter(values)), (self._fixed_table, iter(rest))):
+            for p in table:
+                parameters[p.name] = next(entries) if p.size == 1 else mi.Color3f(*(next(entries) for _ in range(3)))
+        return parameters
