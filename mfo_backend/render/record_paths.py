@@ -197,11 +197,17 @@ def _merge(
     position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
     if len(position) == 0:
         raise BadInputError("No light reaches the target: add a light or a world background.")
-    order = mi.UInt32(np.argsort(position, kind="stable").astype(np.uint32))
-    wi, wo, weight = (
-        kind(*(dr.gather(mi.Float, dr.concat([getattr(part, name)[k] for part in lanes]), order) for k in range(3)))
-        for kind, name in ((mi.Vector3f, "wi"), (mi.Vector3f, "wo"), (mi.Color3f, "weight"))
-    )
+    rank = np.empty(len(position), np.uint32)
+    rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
+    wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
+    begin = 0
+    for part in lanes:
+        end = begin + dr.width(part.position)
+        if end > begin:
+            target = mi.UInt32(rank[begin:end])
+            for merged, value in ((wi, part.wi), (wo, part.wo), (weight, part.weight)):
+                dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
+        begin = end
     dr.eval(wi, wo, weight)
     count = np.bincount(position, minlength=len(rays.pixel))[covered]
     first = np.concatenate([[0], np.cumsum(count)])

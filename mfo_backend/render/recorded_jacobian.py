@@ -61,18 +61,17 @@ class RecordedJacobian:
 
     def __call__(
         self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Mean radiance (g, 3) of the groups, without the constant part, and its Jacobian (g, 3, K)."""
+    ) -> NDArray[np.float32]:
+        """Mean radiance of the groups, without the constant part, then its derivative by each free value: (g, 3, 1 + K)."""
         width = self.table.length + 1
         theta = mi.Float(np.asarray(vector, np.float32))
-        out = dr.zeros(mi.Float, len(groups) * 3 * width)
+        out = dr.zeros(mi.Float, dr.width(groups.start) * 3 * width)
         dr.eval(theta, out)
         self._launch(
             theta, self._constants, paths.wi, paths.wo, paths.weight, groups.start, groups.stop, groups.scale, out
         )
         self.evaluations += 1
-        rows = out.numpy().reshape(len(groups), 3, width)
-        return rows[:, :, 0], rows[:, :, 1:]
+        return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
     def _kernel(self, theta, constants, wi, wo, weight, start, stop, scale, out):  # noqa: ANN001, ANN202
         width = self.table.length + 1

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..types.image import Pixels
 
+ENOUGH_GROUPS = 4096  # kernel lanes that keep the vector units of a few cores busy
 BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
 
 
@@ -24,8 +25,9 @@ BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
 class LaneGroups:
     """Runs of lanes that are summed into one residual each: single pixels or tiles of pixels.
 
-    `start` and `stop` bound the lanes of a group, `scale` is one over its number of pixels. `pixels` lists the flat pixel
-    indices of all groups one after the other, `first` (g + 1) where each group's begin.
+    `start` and `stop` bound the lanes of each part, `scale` is one over the number of pixels of its group. A part is a
+    group, or a pixel of it where there are too few groups to keep all cores busy. `pixels` lists the flat pixel indices of
+    all groups one after the other, `first` (g + 1) where each group's begin.
     """
 
     start: mi.UInt32
@@ -39,12 +41,16 @@ class LaneGroups:
 
     def average(self, image: Pixels) -> NDArray[np.float32]:
         """Mean of `image` (height, width, 3) over the pixels of each group, shape (g, 3)."""
-        flat = np.ascontiguousarray(image.reshape(-1, image.shape[-1]))[self.pixels]
+        flat = image.reshape(-1, image.shape[-1])[self.pixels]
         count = np.diff(self.first)
         if count.max(initial=1) == 1:
             return flat
         sums = np.add.reduceat(flat.astype(np.float64), self.first[:-1], axis=0)
         return (sums / count[:, None]).astype(np.float32)
+
+    def add_parts(self, parts: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Sums over the parts of each group, along the first axis."""
+        return parts if len(parts) == len(self) else np.add.reduceat(parts, self.first[:-1], axis=0)
 
 
 @dataclass(frozen=True)
@@ -97,7 +103,7 @@ class RecordedPaths:
     def pixel_groups(self, chosen: NDArray[np.int64] | None = None) -> LaneGroups:
         """One group for each covered pixel, or for the `chosen` ones (positions in `pixel`)."""
         index = np.arange(len(self.pixel)) if chosen is None else np.asarray(chosen)
-        return _groups(self.first[index], self.first[index + 1], self.pixel[index], np.arange(len(index) + 1))
+        return _groups(self.first, self.pixel, index, np.arange(len(index) + 1))
 
     def tile_groups(self, minimum_pixels: int = 1, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
         """One group for each tile with at least `minimum_pixels` covered pixels, all of them inside `keep` if given."""
@@ -110,17 +116,21 @@ class RecordedPaths:
         parts = [np.arange(b, e) for b, e in zip(begin, end, strict=True)]
         index = np.concatenate(parts) if parts else np.zeros(0, int)
         first = np.concatenate([[0], np.cumsum(end - begin)])
-        return _groups(self.first[begin], self.first[end], self.pixel[index], first)
+        return _groups(self.first, self.pixel, index, first)
 
 
-def _groups(start: NDArray, stop: NDArray, pixels: NDArray, first: NDArray) -> LaneGroups:
+def _groups(first_lane: NDArray, pixel: NDArray, index: NDArray, first: NDArray) -> LaneGroups:
+    """Groups of the covered pixels `index`, whose groups begin at `first`."""
     count = np.diff(first)
+    scale = 1.0 / count
+    start, stop = first_lane[index], first_lane[index + 1]
+    if len(count) >= ENOUGH_GROUPS:
+        start, stop = start[first[:-1]], stop[first[1:] - 1]
+    else:
+        scale = np.repeat(scale, count)
     groups = LaneGroups(
-        mi.UInt32(start.astype(np.uint32)),
-        mi.UInt32(stop.astype(np.uint32)),
-        mi.Float((1.0 / count).astype(np.float32)),
-        pixels,
-        first,
+        mi.UInt32(start.astype(np.uint32)), mi.UInt32(stop.astype(np.uint32)), mi.Float(scale.astype(np.float32)),
+        pixel[index], first,
     )
     dr.eval(groups.start, groups.stop, groups.scale)
     return groups
