@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Image differences and their gradients. Knows images only."""
+"""Differences between images, as numbers, maps and gradients. Knows arrays and colour, no renderer and no file."""

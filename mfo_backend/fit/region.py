@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Losses that look at the target alone, whatever lies behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metrics.loss import Loss
+from ..types.image import Encoding, Image, Pixels
+
+
+def fill_outside(
+    reference: Image, background: Pixels, mask: NDArray[np.bool_], display: Callable[[Pixels], Pixels]
+) -> Image:
+    """The reference with `background` (scene-linear) wherever `mask` is False, in the reference's own encoding.
+
+    A background that differs between reference and render, or its noise, would add a constant to every loss and hide
+    small gains. `display` turns linear values into display values.
+    """
+    shown = display(background) if reference.encoding is Encoding.SRGB else background
+    return replace(reference, pixels=np.where(mask[..., None], reference.pixels, shown).astype(np.float32))
+
+
+class MaskedLoss:
+    """A loss of pictures whose pixels outside `mask` are held at `background`."""
+
+    def __init__(self, loss: Loss, background: Pixels, mask: NDArray[np.bool_]) -> None:
+        self.name: str = loss.name
+        self._loss = loss
+        self._background = background
+        self._mask = mask[..., None]
+
+    def value(self, image: Pixels) -> float:
+        """The loss of a scene-linear image."""
+        return self._loss.value(np.where(self._mask, image, self._background))
+
+    def value_and_gradient(self, image: Pixels) -> tuple[float, Pixels]:
+        """The loss and its gradient, which is 0 outside the mask."""
+        value, gradient = self._loss.value_and_gradient(np.where(self._mask, image, self._background))
+        return value, np.where(self._mask, gradient, np.float32(0.0))

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a user may choose about a fit; the `fit` object of request.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ..solve.stopping import StoppingRules
+from ..types.errors import BadInputError
+from ..types.image import Encoding
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "preset": ("paper",),
+    "range": ("auto", "hdr", "ldr"),
+    "schedule": ("decay", "constant"),
+    "region": ("target", "image"),
+}
+_POSITIVE = ("max_iterations", "spp", "verify_spp", "patience")
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Settings of a fit, checked.
+
+    Attributes
+    ----------
+    model, parameters
+        Material model, and the names to fit, ``"all"`` or ``"reduced"``.
+    losses
+        Stages in order, ``"mse"`` or ``"flip"``. The paper's method is the pair; one alone is its comparison.
+    range
+        ``"hdr"`` or ``"ldr"`` losses; ``"auto"`` takes HDR for a linear reference.
+    seed, spp
+        Random numbers and samples per pixel of an iteration; every iteration of a fit uses the same seed, so that
+        its losses can be compared.
+    verify_spp
+        Samples per pixel of the final pictures, which have a seed of their own.
+    max_iterations, patience
+        Of each stage; `patience` is the ten of the paper's rules.
+    learning_rate, schedule
+        Adam's rate, in units of parameters that mostly span [0, 1], and whether it stays (``"constant"``, the paper's rules to the
+        letter) or falls to a third at each stall (``"decay"``, see `fit.schedule`).
+    keep_optimizer_state
+        Carry Adam's moments and rate into the next stage instead of a new optimisation.
+    region
+        Pixels the losses look at: those that see the target, or all.
+    """
+
+    model: str = "mitsuba_principled"
+    preset: str = "paper"
+    parameters: str | tuple[str, ...] = "all"
+    losses: tuple[str, ...] = ("mse", "flip")
+    range: str = "auto"
+    seed: int = 0
+    max_iterations: int = 300
+    patience: int = 10
+    spp: int = 16
+    verify_spp: int = 64
+    learning_rate: float = 0.02
+    schedule: str = "decay"
+    keep_optimizer_state: bool = False
+    region: str = "target"
+
+    def __post_init__(self) -> None:
+        for name, allowed in _CHOICES.items():
+            if getattr(self, name) not in allowed:
+                raise BadInputError(
+                    f"Fit setting {name!r} is {getattr(self, name)!r}: choose {' or '.join(map(repr, allowed))}."
+                )
+        for name in (*_POSITIVE, "seed"):
+            value, least = getattr(self, name), 0 if name == "seed" else 1
+            if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**32:
+                raise BadInputError(f"Fit setting {name!r} is {value!r}: give a whole number from {least} on.")
+        rate = self.learning_rate
+        if not isinstance(rate, (int, float)) or isinstance(rate, bool) or not 0.0 < rate <= 1.0:
+            raise BadInputError(f"Fit setting 'learning_rate' is {rate!r}: give a number above 0 and at most 1.")
+        if not isinstance(self.keep_optimizer_state, bool):
+            raise BadInputError(
+                f"Fit setting 'keep_optimizer_state' is {self.keep_optimizer_state!r}: give true or false."
+            )
+        if not isinstance(self.model, str):
+            raise BadInputError(f"Fit setting 'model' is {self.model!r}: give the name of a material model.")
+        if not self.losses or any(loss not in ("mse", "flip") for loss in self.losses):
+            raise BadInputError(f"Fit setting 'losses' is {list(self.losses)!r}: give 'mse', 'flip' or both in order.")
+
+    @classmethod
+    def from_request(cls, request: Mapping[str, Any]) -> FitSettings:
+        """Settings from JSON values; what is missing takes its default.
+
+        Raises
+        ------
+        BadInputError
+            For unknown keys and values that are not allowed.
+        """
+        known = [f.name for f in fields(cls)]
+        unknown = [key for key in request if key not in known]
+        if unknown:
+            raise BadInputError(f"Unknown fit setting {', '.join(map(repr, unknown))}: known are {', '.join(known)}.")
+        values = dict(request)
+        for name in ("parameters", "losses"):
+            if name in values and not isinstance(values[name], str):
+                values[name] = _names(name, values[name])
+        if isinstance(values.get("losses"), str):
+            values["losses"] = (values["losses"],)
+        return cls(**values)
+
+    @property
+    def rules(self) -> StoppingRules:
+        """The stopping rules of every stage."""
+        return StoppingRules(patience=self.patience, max_iterations=self.max_iterations)
+
+    def stage_names(self, encoding: Encoding) -> tuple[str, ...]:
+        """Names of the stages' losses, such as ``mse-hdr``, for a reference of this encoding.
+
+        Raises
+        ------
+        BadInputError
+            If HDR losses are asked for a display-encoded reference, whose radiance above white is lost.
+        """
+        if self.range == "hdr" and encoding is Encoding.SRGB:
+            raise BadInputError(
+                "Fit setting 'range' is 'hdr' but the reference is a display picture: "
+                "use 'ldr' or give a linear reference such as OpenEXR."
+            )
+        chosen = self.range
+        if chosen == "auto":
+            chosen = "hdr" if encoding is Encoding.LINEAR else "ldr"
+        return tuple(f"{loss}-{chosen}" for loss in self.losses)
+
+
+def _names(key: str, value: Any) -> tuple[str, ...]:
+    if not isinstance(value, Sequence) or not all(isinstance(name, str) for name in value):
+        raise BadInputError(f"Fit setting {key!r} is {value!r}: give a list of names.")
+    return tuple(value)

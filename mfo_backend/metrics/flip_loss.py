@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mean LDR-FLIP and mean HDR-FLIP as losses of a scene-linear image."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .exposure_range import ExposureRange
+from .flip import FlipDifference, flip_features, pixels_of, planes_of
+from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
+from .hdr_flip import HdrFlip
+from .tone_mapping import DisplayView
+
+Array = NDArray[np.floating]
+
+
+class FlipLoss:
+    """Mean LDR-FLIP of a scene-linear image seen through `view` against the light `target` of a display, in [0, 1]."""
+
+    def __init__(
+        self, name: str, target: Array, view: DisplayView, pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE
+    ) -> None:
+        self.name = name
+        self._view = view
+        self._pixels_per_degree = pixels_per_degree
+        self._dtype = target.dtype
+        self._reference = flip_features(planes_of(target), pixels_per_degree).perceived
+
+    def value(self, image: Array) -> float:
+        """The mean error."""
+        return float(self._difference(image).error.mean(dtype=np.float64))
+
+    def value_and_gradient(self, image: Array) -> tuple[float, Array]:
+        """The mean error and its gradient with respect to the scene-linear image."""
+        difference = self._difference(image)
+        weight = np.full_like(difference.error, 1 / difference.error.size)
+        gradient = self._view.light_pullback(image, pixels_of(difference.pullback(weight)))
+        return float(difference.error.mean(dtype=np.float64)), gradient.astype(image.dtype, copy=False)
+
+    def _difference(self, image: Array) -> FlipDifference:
+        light = planes_of(self._view.light(image).astype(self._dtype, copy=False))
+        return FlipDifference(self._reference, flip_features(light, self._pixels_per_degree))
+
+
+class HdrFlipLoss:
+    """Mean HDR-FLIP of a scene-linear image against a scene-linear `target`."""
+
+    def __init__(
+        self,
+        name: str,
+        target: Array,
+        exposures: ExposureRange,
+        pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE,
+    ) -> None:
+        self.name = name
+        self._flip = HdrFlip(target, exposures=exposures, pixels_per_degree=pixels_per_degree)
+
+    def value(self, image: Array) -> float:
+        """The mean error."""
+        return float(self._flip.map(image).mean(dtype=np.float64))
+
+    def value_and_gradient(self, image: Array) -> tuple[float, Array]:
+        """The mean error and its gradient with respect to the image."""
+        error, gradient = self._flip.map_and_pullback(image, 1 / (image.shape[0] * image.shape[1]))
+        return float(error.mean(dtype=np.float64)), gradient.astype(image.dtype, copy=False)

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""HDR-FLIP and its gradient: the largest LDR-FLIP error of every pixel over a range of exposures.
+
+References
+----------
+Andersson et al., "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .exposure_range import ExposureRange, official_exposures
+from .flip import FlipDifference, flip_features, pixels_of, planes_of
+from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
+from .pixel_check import check_finite, check_pair
+from .tone_curve import ToneCurve
+
+Array = NDArray[np.floating]
+
+
+class HdrFlip:
+    """HDR-FLIP against one reference whose features are computed once.
+
+    Parameters
+    ----------
+    reference
+        Linear Rec.709 pixels (height, width, 3); float64 is computed in float64, everything else in float32.
+        Negative values count as 0.
+    exposures
+        The range; by default `official_exposures`.
+    curve
+        The tone curve.
+    pixels_per_degree
+        How large the picture is seen.
+
+    Raises
+    ------
+    BadInputError
+        If a pixel is NaN or infinite.
+    """
+
+    def __init__(
+        self,
+        reference: Array,
+        *,
+        exposures: ExposureRange | None = None,
+        curve: ToneCurve = ToneCurve(),  # noqa: B008  # frozen
+        pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE,
+    ) -> None:
+        check_finite(reference, "The reference")
+        self.dtype = np.dtype(np.float64 if reference.dtype == np.float64 else np.float32)
+        self.exposures = exposures or official_exposures(reference, curve)
+        self._curve = curve
+        self._pixels_per_degree = pixels_per_degree
+        planes = planes_of(reference.astype(self.dtype, copy=False))
+        self._perceived = [
+            flip_features(curve.apply(planes, ev), pixels_per_degree).perceived for ev in self.exposures.values
+        ]
+
+    def map(self, test: Array) -> Array:
+        """The error map (height, width) in [0, 1] of linear pixels (height, width, 3); negative values count as 0."""
+        return self._evaluate(planes_of(test.astype(self.dtype, copy=False)))[0]
+
+    def map_and_pullback(self, test: Array, weight: Array | float) -> tuple[Array, Array]:
+        """The map, and the gradient (height, width, 3) of sum(weight * map) with respect to the test pixels.
+
+        Where exposures tie, the lowest one carries the gradient.
+        """
+        planes = planes_of(test.astype(self.dtype, copy=False))
+        error, winner, differences = self._evaluate(planes)
+        gradient = np.zeros_like(planes)
+        for index, difference in differences.items():
+            won = winner == index
+            if won.any():
+                ev = self.exposures.values[index]
+                shown = difference.pullback((won * weight).astype(self.dtype, copy=False))
+                gradient += self._curve.pullback(planes, ev, shown)
+        return error, pixels_of(gradient)
+
+    def _evaluate(self, planes: Array) -> tuple[Array, NDArray[np.int16], dict[int, FlipDifference]]:
+        error = np.full(planes.shape[1:], -1, self.dtype)
+        winner = np.zeros(error.shape, np.int16)
+        differences = {}
+        for index, ev in enumerate(self.exposures.values):
+            features = flip_features(self._curve.apply(planes, ev), self._pixels_per_degree)
+            difference = FlipDifference(self._perceived[index], features)
+            larger = difference.error > error
+            if larger.any():
+                np.copyto(error, difference.error, where=larger)
+                winner[larger] = index
+                differences[index] = difference
+        return error, winner, differences
+
+
+def hdr_flip_map(
+    reference: Array,
+    test: Array,
+    *,
+    exposures: ExposureRange | None = None,
+    curve: ToneCurve = ToneCurve(),  # noqa: B008  # frozen
+    pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE,
+) -> Array:
+    """HDR-FLIP map (height, width) in [0, 1] of two linear Rec.709 pictures (height, width, 3), in the official range.
+
+    The pooled value is the mean of the map. The range comes from the reference, so the order of the two matters.
+    """
+    check_pair(reference, test)
+    return HdrFlip(reference, exposures=exposures, curve=curve, pixels_per_degree=pixels_per_degree).map(test)

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures and their pull-backs by Mitsuba's `prb` integrator (detached sampling, about three passes a step)."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.scene_xml import find_target, prepare_for_fit, read_scene, to_text
+from ..types.errors import BadInputError
+from ..types.image import Pixels
+from .material_model import Materials, PreparedMaterial, material_model
+from .renderer import Pullback, Vector
+from .variant import load_variant
+
+_MASK_RAYS = 4  # rays per pixel and axis that look for the target
+
+
+def gradient_seed(seed: int) -> int:
+    """The seed of a pull-back: not the image's own, or the noise of both would correlate and bias the gradient."""
+    return (seed * 0x9E3779B1 + 0x7F4A7C15) % 2**32
+
+
+class MitsubaRenderer:
+    """The `Renderer` protocol on a loaded Mitsuba scene."""
+
+    def __init__(self, model: str, material: PreparedMaterial, scene: Any) -> None:
+        import mitsuba as mi
+
+        self.model = model
+        self.table = material.table
+        self.start = material.start
+        self.passes = 0.0
+        self._shape_id = material.target.shape_id
+        self._scene = scene
+        self._integrator = scene.integrator()
+        self._sensor = scene.sensors()[0]
+        self._params = mi.traverse(scene)
+        self._keys = _keys_of(list(self._params.keys()), material)
+        self._params.keep(list(self._keys.values()))
+
+    def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
+        """See `Renderer.image`. A pixel that Mitsuba leaves non-finite is black."""
+        self._update(vector, differentiable=False)
+        self.passes += 1.0
+        return self._render(seed, spp)
+
+    def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Pullback]:
+        """See `Renderer.image_and_pullback`; the pull-back may be called any number of times, 2 passes each."""
+        vector = np.array(vector)
+        image = self.image(vector, seed=seed, spp=spp)
+
+        def pullback(pixel_gradient: Pixels) -> Vector:
+            import drjit as dr
+            import mitsuba as mi
+
+            theta = self._update(vector, differentiable=True)
+            gradient = mi.TensorXf(np.ascontiguousarray(pixel_gradient, dtype=np.float32))
+            self._integrator.render_backward(
+                self._scene, self._params, gradient, self._sensor, _opaque(gradient_seed(seed)), spp
+            )
+            self.passes += 2.0
+            return np.array(dr.grad(theta), dtype=np.float64)
+
+        return image, pullback
+
+    def target_mask(self) -> NDArray[np.bool_]:
+        """See `Renderer.target_mask`: a regular grid of rays in every pixel, without the pixel filter's tails."""
+        import drjit as dr
+        import mitsuba as mi
+
+        width, height = (int(n) for n in self._sensor.film().crop_size())
+        columns, rows = width * _MASK_RAYS, height * _MASK_RAYS
+        index = dr.arange(mi.UInt32, columns * rows)
+        position = mi.Point2f((index % columns + 0.5) / columns, (index // columns + 0.5) / rows)
+        ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
+        surface = self._scene.ray_intersect_preliminary(ray)
+        shape = next(s for s in self._scene.shapes() if s.id() == self._shape_id)
+        hit = surface.is_valid() & (surface.shape == mi.ShapePtr(shape))
+        return np.array(hit).reshape(height, _MASK_RAYS, width, _MASK_RAYS).any(axis=(1, 3))
+
+    def _update(self, vector: Vector, *, differentiable: bool) -> Any:
+        """Put `vector` into the scene anew: the plugin derives values (IOR from specular) in the update's own graph."""
+        import drjit as dr
+        import mitsuba as mi
+
+        theta = mi.Float(np.asarray(vector, dtype=np.float32))
+        if differentiable:
+            dr.enable_grad(theta)
+        for name, key in self._keys.items():
+            entries = range(*self.table.slice_of(name).indices(self.table.length))
+            values = [dr.gather(mi.Float, theta, mi.UInt32(i)) for i in entries]
+            self._params[key] = mi.Color3f(*values) if len(values) == 3 else values[0]
+        self._params.update()
+        return theta
+
+    def _render(self, seed: int, spp: int) -> Pixels:
+        image = self._integrator.render(self._scene, self._sensor, seed=_opaque(seed), spp=spp)
+        pixels = np.array(image, dtype=np.float32)
+        pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
+        return pixels
+
+
+def load_mitsuba_renderer(
+    scene_xml: Path, shape_id: str, *, model: str, parameters: str | Sequence[str], materials: Materials
+) -> MitsubaRenderer:
+    """See `renderer.load_renderer`."""
+    prepare = material_model(model)
+    document = read_scene(scene_xml)
+    target = find_target(document, shape_id)
+    prepare_for_fit(document)
+    material = prepare(document, target, parameters, materials)
+    load_variant()
+    import mitsuba as mi
+
+    with _two_threads():
+        try:
+            # optimize=False: merging equal objects would take away the ids of shapes and materials
+            scene = mi.load_string(to_text(document), optimize=False)
+        except RuntimeError as error:
+            raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
+    if not scene.emitters():
+        raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
+    return MitsubaRenderer(model, material, scene)
+
+
+def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[str, str]:
+    """The `mi.traverse` key of every parameter; wrappers such as `twosided` add a part in the middle."""
+    keys = {}
+    for name, end in material.key_ends.items():
+        found = [key for key in available if key.startswith(f"{material.target.bsdf_id}.") and key.endswith(f".{end}")]
+        if len(found) != 1:
+            raise BadInputError(f"Material {material.target.bsdf_id!r} has {len(found)} parameters {end!r}, not one.")
+        keys[name] = found[0]
+    return keys
+
+
+def _opaque(seed: int) -> Any:
+    """A seed whose value is not baked into the kernel, so that the next seed needs no compilation."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return dr.opaque(mi.UInt32, seed)
+
+
+@contextlib.contextmanager
+def _two_threads() -> Iterator[None]:
+    """Mitsuba 3.9.1 waits for ever for an EXR file when its thread pool holds the calling thread alone."""
+    import drjit as dr
+
+    before = dr.thread_count()
+    if before < 2:
+        dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        if before < 2:
+            dr.set_thread_count(before)

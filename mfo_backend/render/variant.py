@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Choosing the Mitsuba variant: it needs arrays, automatic differentiation and linear RGB."""
+
+from __future__ import annotations
+
+import sys
+
+from ..types.errors import SetupError
+
+CANDIDATES = ("llvm_ad_rgb", "metal_ad_rgb") if sys.platform != "darwin" else ("metal_ad_rgb", "llvm_ad_rgb")
+
+
+def load_variant(name: str | None = None) -> str:
+    """Import Mitsuba and set a variant; returns its name. A variant that is set already is kept unless named otherwise.
+
+    Without a name the CPU comes first (on a Mac: Metal, which needs no LLVM): at the sizes of a fit the start-up of a
+    GPU costs more than it saves.
+
+    Raises
+    ------
+    SetupError
+        If Mitsuba is missing or no variant works.
+    """
+    try:
+        import mitsuba as mi
+    except ImportError as error:
+        raise SetupError(
+            f"Mitsuba cannot be imported ({error}): install mitsuba 3.9.1, then run `mfo doctor`."
+        ) from None
+    current = mi.variant()
+    if current is not None and "_ad_rgb" in current and name in (None, current):
+        return current
+    reasons = []
+    for candidate in [name] if name else CANDIDATES:
+        if candidate not in mi.variants():
+            reasons.append(f"{candidate} is not built into this Mitsuba")
+            continue
+        try:
+            mi.set_variant(candidate)
+        except (ImportError, AttributeError, RuntimeError) as error:
+            reasons.append(f"{candidate}: {str(error).splitlines()[0]}")
+        else:
+            return candidate
+    raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")

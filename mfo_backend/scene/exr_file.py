@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""OpenEXR files through the OpenEXR package. Mitsuba's own reader is not used: it deadlocks on a single thread."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.errors import BadInputError
+from ..types.image import Encoding, Image, Pixels
+
+MAX_PIXELS = 2**28  # a header may declare any size; this one (16384 x 16384) takes 3 GiB of float32
+_COLOUR = ("R", "G", "B")
+
+
+def read_exr(path: Path) -> Image:
+    """The scene-linear picture in an EXR file.
+
+    Of several layers or parts the plain channels R, G, B win, then those of a layer named Combined (Blender's main
+    pass), then the first layer with colour, then a grey channel Y. Pixels outside the data window are black.
+
+    Raises
+    ------
+    BadInputError
+        If the file cannot be read, declares too large a size or holds no colour.
+    """
+    import OpenEXR
+
+    try:
+        header = OpenEXR.File(str(path), separate_channels=True, header_only=True)
+        headers = [part.header for part in header.parts]
+    except Exception as error:  # the package raises RuntimeError, ValueError and its own type
+        raise _damaged(path) from error
+    if not headers:
+        raise _damaged(path)
+    for part in headers:
+        _check_size(path, part)
+    names = [[channel.name for channel in part["channels"]] for part in headers]
+    index, colour, alpha = _choose(path, names)
+    _check_channels(path, headers[index], [*colour, *([alpha] if alpha else [])])
+    try:
+        # the package prints what is wrong with a damaged file on stdout, which belongs to our caller
+        with contextlib.redirect_stdout(io.StringIO()):
+            channels = OpenEXR.File(str(path), separate_channels=True).channels(index)
+        planes = [_in_display_window(channels[name].pixels, headers[index]) for name in colour]
+        coverage = _in_display_window(channels[alpha].pixels, headers[index]) if alpha else None
+    except Exception as error:  # also when only some scan lines are there: the part is then missing
+        raise _damaged(path) from error
+    pixels = np.stack(planes * 3 if len(planes) == 1 else planes, axis=-1)
+    return Image(np.ascontiguousarray(pixels, np.float32), Encoding.LINEAR, coverage)
+
+
+def write_exr(path: Path | str, pixels: NDArray[np.floating]) -> None:
+    """Write linear pixels (height, width, 3) or (height, width) as float32, ZIP compressed."""
+    import OpenEXR
+
+    name = "RGB" if pixels.ndim == 3 else "Y"
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    try:
+        OpenEXR.File(header, {name: np.ascontiguousarray(pixels, np.float32)}).write(str(path))
+    except Exception as error:
+        raise BadInputError(f"Image {str(path)!r} cannot be written: check the folder and the free space.") from error
+
+
+def _damaged(path: Path) -> BadInputError:
+    return BadInputError(f"Image {path.name!r} cannot be read: the file is damaged or not an OpenEXR image.")
+
+
+def _window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
+    (left, top), (right, bottom) = header[name]
+    return int(left), int(top), int(right) + 1, int(bottom) + 1
+
+
+def _check_size(path: Path, header: dict[str, Any]) -> None:
+    for name in ("dataWindow", "displayWindow"):
+        left, top, right, bottom = _window(header, name)
+        width, height = right - left, bottom - top
+        if width < 1 or height < 1 or width * height > MAX_PIXELS:
+            raise BadInputError(
+                f"Image {path.name!r} declares a size of {width}x{height}: between 1 and {MAX_PIXELS} pixels are read."
+            )
+
+
+def _choose(path: Path, parts: list[list[str]]) -> tuple[int, list[str], str | None]:
+    """Part index, colour channel names and alpha's name."""
+    candidates = []
+    for index, names in enumerate(parts):
+        lookup = set(names)
+        for name in sorted(names):
+            prefix, _, last = name.rpartition(".")
+            layer = f"{prefix}." if prefix else ""
+            alpha = f"{layer}A" if f"{layer}A" in lookup else None
+            if last == "R" and {f"{layer}G", f"{layer}B"} <= lookup:
+                rank = 0 if not layer else 1 if prefix.split(".")[-1] == "Combined" else 2
+                candidates.append((rank, index, [layer + c for c in _COLOUR], alpha))
+            elif last == "Y" and not {f"{layer}RY", f"{layer}BY"} & lookup:
+                candidates.append((3, index, [name], alpha))
+    if not candidates:
+        found = ", ".join(dict.fromkeys(n for names in parts for n in names)) or "none"
+        raise BadInputError(
+            f"Image {path.name!r} has no colour: needed are channels R, G, B or Y, found {found}; export it as RGB."
+        )
+    _, index, colour, alpha = min(candidates, key=lambda c: (c[0], c[1]))
+    return index, colour, alpha
+
+
+def _check_channels(path: Path, header: dict[str, Any], names: list[str]) -> None:
+    import OpenEXR
+
+    if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
+        raise BadInputError(f"Image {path.name!r} is a deep image: export it as a flat one.")
+    for channel in header["channels"]:
+        if channel.name in names and (channel.xSampling, channel.ySampling) != (1, 1):
+            raise BadInputError(f"Image {path.name!r} has subsampled channels: export it with full resolution RGB.")
+
+
+def _in_display_window(plane: NDArray, header: dict[str, Any]) -> Pixels:
+    """The plane of the data window cut or padded with black to the display window."""
+    left, top, right, bottom = _window(header, "displayWindow")
+    data_left, data_top, data_right, data_bottom = _window(header, "dataWindow")
+    if plane.dtype.kind != "f":
+        raise ValueError(f"channel holds {plane.dtype}")
+    plane = plane.astype(np.float32)
+    if (left, top, right, bottom) == (data_left, data_top, data_right, data_bottom):
+        return plane
+    out = np.zeros((bottom - top, right - left), np.float32)
+    x0, x1 = max(left, data_left), min(right, data_right)
+    y0, y1 = max(top, data_top), min(bottom, data_bottom)
+    if x0 < x1 and y0 < y1:
+        out[y0 - top : y1 - top, x0 - left : x1 - left] = plane[
+            y0 - data_top : y1 - data_top, x0 - data_left : x1 - data_left
+        ]
+    return out

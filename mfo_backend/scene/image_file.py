@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading and writing picture files: EXR and HDR are scene-linear, PNG, JPEG and TIFF hold sRGB display values."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.errors import BadInputError
+from ..types.image import Encoding, Image, Pixels
+from .exr_file import MAX_PIXELS, read_exr, write_exr
+from .hdr_file import read_hdr
+
+__all__ = ["check_reference", "read_image", "write_exr", "write_png"]
+
+_DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+_SUFFIXES = (".exr", ".hdr", *_DISPLAY_SUFFIXES)
+
+
+def read_image(path: Path | str) -> Image:
+    """The picture in a file.
+
+    EXR (any compression, half or float; channels RGB, RGBA or Y, also layered as Blender writes them) and Radiance HDR
+    are scene-linear. PNG, JPEG and TIFF are taken as sRGB display values in [0, 1]; a grey picture becomes three equal
+    channels. Pillow reads 16-bit colour PNG and TIFF with 8 bits a channel; 16-bit grey keeps its depth.
+
+    Raises
+    ------
+    BadInputError
+        If the file is missing, of another kind, damaged, too large or without colour channels.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise BadInputError(f"Image {path.name!r} is of an unknown kind: use {', '.join(s[1:] for s in _SUFFIXES)}.")
+    if not path.is_file():
+        raise BadInputError(f"Image {str(path)!r} does not exist: check the path.")
+    if suffix == ".exr":
+        return read_exr(path)
+    return read_hdr(path) if suffix == ".hdr" else _read_display(path)
+
+
+def write_png(path: Path | str, srgb: NDArray[np.floating]) -> None:
+    """Write sRGB display values (height, width, 3) or (height, width), clipped to [0, 1], as an 8-bit PNG."""
+    from PIL import Image as PillowImage
+
+    levels = np.rint(np.clip(np.nan_to_num(srgb), 0, 1) * 255).astype(np.uint8)
+    try:
+        PillowImage.fromarray(levels).save(path, format="PNG")
+    except OSError as error:
+        raise BadInputError(f"Image {str(path)!r} cannot be written: {error.strerror or error}.") from error
+
+
+def check_reference(image: Image, width: int, height: int) -> tuple[Image, tuple[str, ...]]:
+    """The reference ready for a fit, and notes on what was changed: negative values become 0.
+
+    Raises
+    ------
+    BadInputError
+        If the size is not `width` x `height`, a pixel is NaN or infinite, or all are black.
+    """
+    if (image.width, image.height) != (width, height):
+        raise BadInputError(
+            f"Reference is {image.width}x{image.height} but the scene renders {width}x{height}: "
+            "render the reference at that size or change the resolution of the scene."
+        )
+    nan = int(np.isnan(image.pixels).any(axis=-1).sum())
+    infinite = int(np.isinf(image.pixels).any(axis=-1).sum())
+    if nan or infinite:
+        raise BadInputError(
+            f"Reference has {nan} pixels with NaN and {infinite} with infinite values: "
+            "render or export it without them."
+        )
+    if image.pixels.max() <= 0:
+        raise BadInputError("Reference is all black: it must show the lit object, so check the lights and the file.")
+    negative = int((image.pixels < 0).any(axis=-1).sum())
+    if not negative:
+        return image, ()
+    note = f"Reference has {negative} pixels with negative values; they were set to 0."
+    return Image(np.maximum(image.pixels, np.float32(0)), image.encoding, image.alpha), (note,)
+
+
+def _read_display(path: Path) -> Image:
+    from PIL import Image as PillowImage
+
+    try:
+        # Pillow warns about large images; ours is an error, and Pillow's hard limit is one like any other
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with PillowImage.open(path) as picture:
+                if picture.width * picture.height > MAX_PIXELS:
+                    size = f"{picture.width}x{picture.height}"
+                    raise BadInputError(f"Image {path.name!r} is {size}: at most {MAX_PIXELS} pixels are read.")
+                picture.load()
+    except BadInputError:
+        raise
+    except Exception as error:  # Pillow raises OSError, SyntaxError, ValueError and others on damaged files
+        raise BadInputError(f"Image {path.name!r} cannot be read: the file is damaged or not an image.") from error
+    if picture.mode.startswith("I") or picture.mode == "F":
+        return _read_grey(path, np.asarray(picture))
+    rgba = np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
+    has_alpha = "A" in picture.getbands() or "transparency" in picture.info
+    return Image(_contiguous(rgba[..., :3]), Encoding.SRGB, _contiguous(rgba[..., 3]) if has_alpha else None)
+
+
+def _read_grey(path: Path, grey: NDArray) -> Image:
+    if grey.dtype.kind not in "iu" or grey.max(initial=0) > 65535 or grey.min(initial=0) < 0:
+        raise BadInputError(
+            f"Image {path.name!r} holds {grey.dtype} values: PNG, JPEG and TIFF must hold 8 or 16 bits a channel."
+        )
+    values = grey.astype(np.float32) / np.float32(65535)
+    return Image(np.repeat(values[..., None], 3, axis=-1), Encoding.SRGB)
+
+
+def _contiguous(pixels: NDArray) -> Pixels:
+    return np.ascontiguousarray(pixels, np.float32)
