@@ -14,25 +14,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..types.parameter import Parameter, ParameterTable
-
-# Bounds inside the model's range where its derivatives exist: alpha = max(0.001, roughness**2) is flat below 0.0316 and
-# the index of refraction has an infinite slope at specular 0.
-TABLE = ParameterTable(
-    [
-        Parameter("base_color", 3, 0.001, 0.999, (0.5, 0.5, 0.5)),
-        Parameter("roughness", 1, 0.04, 1.0, 0.5),
-        Parameter("metallic", 1, 0.0, 1.0, 0.0),
-        Parameter("specular", 1, 0.02, 1.0, 0.5),
-        Parameter("anisotropic", 1, 0.0, 0.95, 0.0),
-        Parameter("spec_tint", 1, 0.0, 1.0, 0.0),
-        Parameter("clearcoat", 1, 0.0, 1.0, 0.0),
-        Parameter("clearcoat_gloss", 1, 0.0, 1.0, 0.0),
-        Parameter("sheen", 1, 0.0, 1.0, 0.0),
-        Parameter("sheen_tint", 1, 0.0, 1.0, 0.0),
-        Parameter("flatness", 1, 0.0, 1.0, 0.0),
-    ]
-)
+from ..types.errors import BadInputError
+from ..types.parameter import Value
+from .mitsuba_parameters import MITSUBA_PRINCIPLED
 
 Scalar = Any  # mi.Float or a Python float; a float of exactly 0 leaves its lobe out of the kernel
 
@@ -64,9 +48,22 @@ class MitsubaPrincipled:
     """The model `mitsuba_principled`: its parameter table and its evaluation."""
 
     name = "mitsuba_principled"
-    table = TABLE
+    table = MITSUBA_PRINCIPLED
     # what a global start scans instead of solving for: the first is the lobe width, the others are optional
     scanned = ("roughness", "clearcoat_gloss")
+
+    def values(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """All values `evaluate` needs besides the free ones, from those of a material; missing ones are the plugin's defaults.
+
+        Raises
+        ------
+        BadInputError
+            If the material transmits light.
+        """
+        if given.get("spec_trans", 0.0) != 0.0:
+            raise BadInputError("Material with 'spec_trans': recorded paths hold reflected light only, use the preset 'paper'.")
+        unused = {"spec_trans", "specular" if "eta" in given else "eta"}
+        return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
 
     def evaluate(self, parameters: Mapping[str, Scalar], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
         """Value of the BSDF times the cosine of `wo`, linear Rec.709; zero unless both directions are in front.
@@ -74,7 +71,8 @@ class MitsubaPrincipled:
         Parameters
         ----------
         parameters
-            A value for every name of `table`: `mi.Float` or `mi.Color3f` of width 1 or n, or Python floats.
+            A value for every name of `table` but `spec_trans`, with one of `specular` and `eta`: `mi.Float` or `mi.Color3f` of
+            width 1 or n, or Python floats.
         wi, wo
             Unit directions in the shading frame, towards camera and light.
         """
@@ -107,13 +105,12 @@ class MitsubaPrincipled:
     @staticmethod
     def _specular(p: Mapping, base: Any, tint: Any, dielectric: Any, wi: Any, wo: Any, half: Any, cos_d: Any, w: Any):
         # eta(specular) has normal reflectance 0.08 * specular (`principled.cpp`)
-        root = dr.sqrt(0.08 * mi.Float(p["specular"]))
-        eta = 2.0 / (1.0 - root) - 1.0
+        eta = p["eta"] if "eta" in p else 2.0 / (1.0 - dr.sqrt(0.08 * mi.Float(p["specular"]))) - 1.0
         fresnel = mi.Color3f(dielectric * (1.0 - p["spec_tint"]) * _fresnel_dielectric(cos_d, eta))
         if not _is_zero(p["metallic"]):
             fresnel += p["metallic"] * dr.lerp(base, mi.Color3f(1.0), w)
         if not _is_zero(p["spec_tint"]):
-            f0 = tint * dr.square((eta - 1.0) / (eta + 1.0))
+            f0 = tint * ((eta - 1.0) / (eta + 1.0)) ** 2
             fresnel += dielectric * p["spec_tint"] * dr.lerp(f0, mi.Color3f(1.0), w)
         alpha = dr.square(mi.Float(p["roughness"]))
         if _is_zero(p["anisotropic"]):

@@ -15,7 +15,7 @@ TILE = 4  # pixels; a tile is the smallest residual when the recording itself is
 
 @dataclass(frozen=True)
 class PrimaryRays:
-    """`per_pixel` rays for each pixel, pixels in tile order.
+    """Rays for each pixel, pixels in tile order; `pixel_position` counts in that order.
 
     Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every ray
     counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
@@ -27,14 +27,15 @@ class PrimaryRays:
     filter_weight: mi.Float
     pixel: NDArray[np.int64]
     tile: NDArray[np.int64]
-    per_pixel: int
 
 
-def tile_order(width: int, height: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Flat pixel indices ordered by tile, and the tile number of each; both of shape (height * width,)."""
+def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Flat pixel indices ordered by tile, and the tile number of each; of every `stride`-th tile along both axes."""
     row, column = np.divmod(np.arange(width * height), width)
-    tile = (row // TILE) * -(-width // TILE) + column // TILE
-    order = np.argsort(tile, kind="stable")
+    tile_row, tile_column = row // TILE, column // TILE
+    tile = tile_row * -(-width // TILE) + tile_column
+    kept = np.flatnonzero((tile_row % stride == stride // 2) & (tile_column % stride == stride // 2))
+    order = kept[np.argsort(tile[kept], kind="stable")]
     return order, tile[order]
 
 
@@ -45,32 +46,35 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
     return sampler
 
 
-def primary_rays(sensor: mi.Sensor, grid: int, seed: int) -> PrimaryRays:
-    """`grid` x `grid` jittered camera rays for each pixel of the sensor's film."""
+def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: int = 1) -> PrimaryRays:
+    """Jittered camera rays, `grid` (height, width) squared for each pixel, in every `stride`-th tile along both axes."""
     film = sensor.film()
     width, height = (int(v) for v in film.crop_size())
-    order, tile = tile_order(width, height)
-    per_pixel = grid * grid
-    lane = dr.arange(mi.UInt32, width * height * per_pixel)
-    position = lane // per_pixel
-    cell = lane - position * per_pixel
-    sampler = fresh_sampler(seed, width * height * per_pixel)
+    order, tile = tile_order(width, height, stride)
+    per_axis = grid.reshape(-1)[order]
+    position = mi.UInt32(np.repeat(np.arange(len(order), dtype=np.uint32), per_axis**2))
+    first = mi.UInt32(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]).astype(np.uint32))
+    count = dr.width(position)
+    cells = dr.gather(mi.UInt32, mi.UInt32(per_axis.astype(np.uint32)), position)
+    cell = dr.arange(mi.UInt32, count) - dr.gather(mi.UInt32, first, position)
+    sampler = fresh_sampler(seed, count)
     flat = dr.gather(mi.UInt32, mi.UInt32(order.astype(np.uint32)), position)
     y = flat // width
     x = flat - y * width
     jitter = sampler.next_2d()
-    cell_y = cell // grid
-    inside = mi.Point2f(mi.Float(cell - cell_y * grid) + jitter.x, mi.Float(cell_y) + jitter.y) / grid
+    cell_y = cell // cells
+    inside = mi.Point2f(mi.Float(cell - cell_y * cells) + jitter.x, mi.Float(cell_y) + jitter.y) / mi.Float(cells)
     offset, sign = _through_filter(film.rfilter(), inside)
-    if sign is None:
-        weight = dr.full(mi.Float, 1.0 / per_pixel, width * height * per_pixel)
-    else:
-        weight = sign / dr.gather(mi.Float, dr.block_sum(sign, per_pixel), position)
+    weight = 1.0 / mi.Float(cells * cells)
+    if sign is not None:
+        total = dr.zeros(mi.Float, len(order))
+        dr.scatter_reduce(dr.ReduceOp.Add, total, sign, position)
+        weight = sign / dr.gather(mi.Float, total, position)
     crop = film.crop_offset()
     size = mi.ScalarVector2f(film.size())
     film_position = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]) / mi.Point2f(size)
     ray, _ = sensor.sample_ray_differential(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
-    return PrimaryRays(ray, position, weight, order, tile, per_pixel)
+    return PrimaryRays(ray, position, weight, order, tile)
 
 
 def _through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:

@@ -22,15 +22,19 @@ DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 class RecordSettings:
     """How many rays a recording takes.
 
-    `grid` squared camera rays start in each pixel. Point, spot and directional lights take one sample for each of them;
+    `grid` squared camera rays start in each pixel, `fine_grid` squared in the chosen ones. Point, spot and directional lights take one sample for each of them;
     the other lights one light sample and one sample of the proposal. `depth` is the path length of light that arrives over
-    other surfaces: 2 leaves it out.
+    other surfaces: 2 leaves it out. `hide_emitters` leaves lights out of the background, as the integrator's option does.
+    Only every `stride`-th tile of pixels along both axes is recorded, which bounds the memory of large pictures.
     """
 
     grid: int = 2
     seed: int = 0
     depth: int = 2
     proposal: DefensiveProposal = DefensiveProposal()
+    hide_emitters: bool = False
+    stride: int = 1
+    fine_grid: int = 6
 
 
 @dataclass
@@ -43,16 +47,28 @@ class _Lanes:
     position: mi.UInt32
 
 
-def record_paths(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings) -> RecordedPaths:
-    """Record the light that reaches the first hit on `shape` from the scene's sensor.
+def record_paths(
+    scene: mi.Scene,
+    shape: mi.Shape,
+    settings: RecordSettings,
+    *,
+    fine: NDArray[np.bool_] | None = None,
+    allow_dark: bool = False,
+) -> RecordedPaths:
+    """Record the light that reaches the first hit on `shape` from the scene's sensor; pixels in `fine` (height, width) take more rays.
 
     Raises
     ------
     BadInputError
-        If no pixel sees the shape.
+        If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
-        rays = primary_rays(scene.sensors()[0], settings.grid, settings.seed)
+        sensor = scene.sensors()[0]
+        width, height = (int(v) for v in sensor.film().crop_size())
+        grid = np.full((height, width), settings.grid)
+        if fine is not None:
+            grid[fine] = settings.fine_grid
+        rays = primary_rays(sensor, grid, settings.seed, settings.stride)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
         dr.eval(rays, hit, on_target)
@@ -72,7 +88,19 @@ def record_paths(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings) -> 
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
-        return _merge(lanes, rays, covered, coverage, constant)
+        merged = _merge(lanes, rays, covered, coverage, constant)
+        if merged.lanes == 0 and not allow_dark:
+            raise BadInputError("No light reaches the target: add a light or a world background.")
+        return merged
+
+
+def indirect_share(scene: mi.Scene, shape: mi.Shape, depth: int) -> float:
+    """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
+    with dr.suspend_grad():
+        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2), allow_dark=True)
+        everything = record_paths(scene, shape, RecordSettings(grid=1, depth=depth), allow_dark=True)
+        sums = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) for p in (direct, everything)]
+    return (sums[1] - sums[0]) / max(sums[0], 1e-30)
 
 
 def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
@@ -175,7 +203,9 @@ def _background(
     index = dr.compress(wanted)
     if dr.width(index) > 0:
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
-        integrator = mi.load_dict({"type": "path", "max_depth": max(settings.depth, 2)})
+        integrator = mi.load_dict(
+            {"type": "path", "max_depth": max(settings.depth, 2), "hide_emitters": settings.hide_emitters}
+        )
         ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
         radiance, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray))
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
@@ -195,8 +225,6 @@ def _merge(
 ) -> RecordedPaths:
     """One lane array, ordered by tile and pixel."""
     position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
-    if len(position) == 0:
-        raise BadInputError("No light reaches the target: add a light or a world background.")
     rank = np.empty(len(position), np.uint32)
     rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
     wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
@@ -212,5 +240,5 @@ def _merge(
     count = np.bincount(position, minlength=len(rays.pixel))[covered]
     first = np.concatenate([[0], np.cumsum(count)])
     return RecordedPaths(
-        wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant, rays.per_pixel
+        wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant
     )

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import drjit as dr
@@ -20,6 +20,11 @@ class MaterialModel(Protocol):
 
     name: str
     table: ParameterTable
+    scanned: tuple[str, ...]  # values a global start scans: the main lobe's width first
+
+    def values(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """All values `evaluate` needs besides the free ones, from those of a material."""
+        ...
 
     def evaluate(self, parameters: Mapping[str, Any], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
         """BSDF times cosine."""
@@ -34,9 +39,9 @@ class RecordedJacobian:
     model
         The material.
     free
-        Names of the values that vary.
+        The values that vary.
     fixed
-        The other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
+        All other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
         value needs no new kernel.
 
     Notes
@@ -47,17 +52,18 @@ class RecordedJacobian:
     is an argument because a frozen function would keep the size it had at the recording.
     """
 
-    def __init__(self, model: MaterialModel, free: Sequence[str], fixed: Mapping[str, Value]) -> None:
+    def __init__(self, model: MaterialModel, free: ParameterTable, fixed: Mapping[str, Value]) -> None:
         self.model = model
-        self.table = model.table.select(free)
-        values = {p.name: fixed.get(p.name, p.default) for p in model.table if p.name not in self.table.names}
-        self._absent = {name for name, value in values.items() if value == 0.0}
-        self._fixed_table = [p for p in model.table if p.name in values and p.name not in self._absent]
+        self.table = free
+        values = {name: value for name, value in fixed.items() if name not in free.names}
+        self._absent = [name for name, value in values.items() if value == 0.0]
+        self._fixed_table = [model.table[name] for name in values if name not in self._absent]
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
         self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
         dr.eval(self._constants)
         self.evaluations = 0
-        self._launch = dr.freeze(self._kernel)
+        # a recording is made anew when the relation of the array sizes changes; that is rare and no cause for a warning
+        self._launch = dr.freeze(self._kernel, auto_opaque=False, warn_after=1000)
 
     def __call__(
         self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
@@ -65,11 +71,10 @@ class RecordedJacobian:
         """Mean radiance of the groups, without the constant part, then its derivative by each free value: (g, 3, 1 + K)."""
         width = self.table.length + 1
         theta = mi.Float(np.asarray(vector, np.float32))
-        out = dr.zeros(mi.Float, dr.width(groups.start) * 3 * width)
+        start, stop, scale = groups.parts
+        out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
         dr.eval(theta, out)
-        self._launch(
-            theta, self._constants, paths.wi, paths.wo, paths.weight, groups.start, groups.stop, groups.scale, out
-        )
+        self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, start, stop, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 

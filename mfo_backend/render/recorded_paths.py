@@ -9,6 +9,7 @@ random numbers, so the objective is deterministic.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -21,36 +22,66 @@ ENOUGH_GROUPS = 4096  # kernel lanes that keep the vector units of a few cores b
 BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LaneGroups:
-    """Runs of lanes that are summed into one residual each: single pixels or tiles of pixels.
+    """Covered pixels that are averaged into one residual each: single pixels or tiles of pixels.
 
-    `start` and `stop` bound the lanes of each part, `scale` is one over the number of pixels of its group. A part is a
-    group, or a pixel of it where there are too few groups to keep all cores busy. `pixels` lists the flat pixel indices of
-    all groups one after the other, `first` (g + 1) where each group's begin.
+    `member` lists the positions of all groups' pixels in the recording, `first` (g + 1) where each group's begin; `pixels`
+    are their flat indices in the image, `first_lane` the recording's.
     """
 
-    start: mi.UInt32
-    stop: mi.UInt32
-    scale: mi.Float
-    pixels: NDArray[np.int64]
+    member: NDArray[np.int64]
     first: NDArray[np.int64]
+    pixels: NDArray[np.int64]
+    first_lane: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.first) - 1
+
+    @property
+    def lanes(self) -> int:
+        """Recorded lanes in all groups."""
+        return int((self.first_lane[self.member + 1] - self.first_lane[self.member]).sum())
+
+    def take(self, chosen: NDArray[np.int64]) -> LaneGroups:
+        """Only the groups of these numbers."""
+        count = np.diff(self.first)[chosen]
+        first = np.concatenate([[0], np.cumsum(count)])
+        where = np.repeat(self.first[chosen] - first[:-1], count) + np.arange(first[-1])
+        return LaneGroups(self.member[where], first, self.pixels[where], self.first_lane)
+
+    @cached_property
+    def parts(self) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
+        """First lane, last lane + 1 and one over the number of pixels, for each lane of the kernel.
+
+        A kernel lane is a group, or one pixel of a group where there are too few groups to keep all cores busy.
+        """
+        count = np.diff(self.first)
+        start, stop, scale = self.first_lane[self.member], self.first_lane[self.member + 1], 1.0 / count
+        if len(count) >= ENOUGH_GROUPS:
+            start, stop = start[self.first[:-1]], stop[self.first[1:] - 1]
+        else:
+            scale = np.repeat(scale, count)
+        parts = (
+            mi.UInt32(start.astype(np.uint32)),
+            mi.UInt32(stop.astype(np.uint32)),
+            mi.Float(scale.astype(np.float32)),
+        )
+        dr.eval(parts)
+        return parts
+
+    def add_parts(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Sums over the kernel lanes of each group, along the first axis."""
+        return values if len(values) == len(self) else np.add.reduceat(values, self.first[:-1], axis=0)
 
     def average(self, image: Pixels) -> NDArray[np.float32]:
         """Mean of `image` (height, width, 3) over the pixels of each group, shape (g, 3)."""
         flat = image.reshape(-1, image.shape[-1])[self.pixels]
         count = np.diff(self.first)
-        if count.max(initial=1) == 1:
+        if len(flat) == len(self):
             return flat
         sums = np.add.reduceat(flat.astype(np.float64), self.first[:-1], axis=0)
         return (sums / count[:, None]).astype(np.float32)
-
-    def add_parts(self, parts: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Sums over the parts of each group, along the first axis."""
-        return parts if len(parts) == len(self) else np.add.reduceat(parts, self.first[:-1], axis=0)
 
 
 @dataclass(frozen=True)
@@ -72,8 +103,6 @@ class RecordedPaths:
     constant
         What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects seen
         in covered pixels; 0 elsewhere.
-    primary_rays
-        Camera rays per pixel.
     """
 
     wi: mi.Vector3f
@@ -84,7 +113,6 @@ class RecordedPaths:
     first: NDArray[np.int64]
     coverage: NDArray[np.float32]
     constant: Pixels
-    primary_rays: int
 
     @property
     def lanes(self) -> int:
@@ -100,37 +128,14 @@ class RecordedPaths:
         """Covered pixels without background in them."""
         return self.coverage > 0.999
 
-    def pixel_groups(self, chosen: NDArray[np.int64] | None = None) -> LaneGroups:
-        """One group for each covered pixel, or for the `chosen` ones (positions in `pixel`)."""
-        index = np.arange(len(self.pixel)) if chosen is None else np.asarray(chosen)
-        return _groups(self.first, self.pixel, index, np.arange(len(index) + 1))
+    def pixel_groups(self, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
+        """One group for each covered pixel, or for those in `keep`."""
+        member = np.arange(len(self.pixel)) if keep is None else np.flatnonzero(keep)
+        return LaneGroups(member, np.arange(len(member) + 1), self.pixel[member], self.first)
 
-    def tile_groups(self, minimum_pixels: int = 1, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
-        """One group for each tile with at least `minimum_pixels` covered pixels, all of them inside `keep` if given."""
+    def tile_groups(self, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
+        """One group for each tile with a covered pixel, or for those whose covered pixels are all in `keep`."""
         begin = np.flatnonzero(np.diff(self.tile, prepend=-1))
-        end = np.append(begin[1:], len(self.tile))
-        good = end - begin >= minimum_pixels
-        if keep is not None:
-            good &= np.logical_and.reduceat(keep, begin)
-        begin, end = begin[good], end[good]
-        parts = [np.arange(b, e) for b, e in zip(begin, end, strict=True)]
-        index = np.concatenate(parts) if parts else np.zeros(0, int)
-        first = np.concatenate([[0], np.cumsum(end - begin)])
-        return _groups(self.first, self.pixel, index, first)
-
-
-def _groups(first_lane: NDArray, pixel: NDArray, index: NDArray, first: NDArray) -> LaneGroups:
-    """Groups of the covered pixels `index`, whose groups begin at `first`."""
-    count = np.diff(first)
-    scale = 1.0 / count
-    start, stop = first_lane[index], first_lane[index + 1]
-    if len(count) >= ENOUGH_GROUPS:
-        start, stop = start[first[:-1]], stop[first[1:] - 1]
-    else:
-        scale = np.repeat(scale, count)
-    groups = LaneGroups(
-        mi.UInt32(start.astype(np.uint32)), mi.UInt32(stop.astype(np.uint32)), mi.Float(scale.astype(np.float32)),
-        pixel[index], first,
-    )
-    dr.eval(groups.start, groups.stop, groups.scale)
-    return groups
+        first = np.append(begin, len(self.tile))
+        groups = LaneGroups(np.arange(len(self.pixel)), first, self.pixel, self.first)
+        return groups if keep is None else groups.take(np.flatnonzero(np.logical_and.reduceat(keep, begin)))

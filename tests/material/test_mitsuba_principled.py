@@ -12,12 +12,13 @@ mi.set_variant("llvm_ad_rgb")
 
 from mfo_backend.material.mitsuba_principled import MitsubaPrincipled  # noqa: E402  after the variant is set
 
-NAMES = [p.name for p in MitsubaPrincipled.table]
+TABLE = [p for p in MitsubaPrincipled.table if p.name not in ("eta", "spec_trans")]
+NAMES = [p.name for p in TABLE]
 
 
 def random_values(seed: int) -> dict[str, object]:
     rng = np.random.default_rng(seed)
-    values = {p.name: rng.uniform(p.lower, p.upper, p.size) for p in MitsubaPrincipled.table}
+    values = {p.name: rng.uniform(p.lower, p.upper, p.size) for p in TABLE}
     return {n: v.tolist() if len(v) == 3 else float(v[0]) for n, v in values.items()}
 
 
@@ -50,6 +51,15 @@ def test_equals_the_plugin_of_mitsuba(seed):
     assert expected.max() > 0.1
     # 1e-5 of the value plus 1e-6: float32 with another order of operations
     np.testing.assert_allclose(got, expected, rtol=1e-5, atol=1e-6)
+
+
+def test_an_index_of_refraction_replaces_the_specular_level():
+    values = {k: mi.Color3f(v) if isinstance(v, list) else mi.Float(v) for k, v in random_values(4).items()}
+    wi, wo = directions(6)
+    by_level = MitsubaPrincipled().evaluate({**values, "specular": mi.Float(0.5)}, wi, wo)
+    del values["specular"]
+    by_eta = MitsubaPrincipled().evaluate({**values, "eta": mi.Float(1.5)}, wi, wo)
+    np.testing.assert_allclose(np.array(by_eta), np.array(by_level), rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("absent", ["metallic", "anisotropic", "spec_tint", "clearcoat", "sheen", "sheen_tint", "flatness"])
