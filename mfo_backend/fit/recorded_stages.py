@@ -13,7 +13,7 @@ from ..render.recorded_paths import LaneGroups
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, SolveLimits, Solution, solve_bounded
 from ..types.image import Pixels
-from .choose_groups import all_groups, detailed_pixels, fewer_groups
+from .choose_groups import all_groups, detail_grid, fewer_groups
 from .course import Course
 from .global_start import different_nodes, scan
 from .residuals import ImageAndJacobian, Residual, normal_equations
@@ -29,10 +29,7 @@ class RecordedPlan:
     Attributes
     ----------
     grid_first, grid_last
-        Squared: camera rays a pixel of the first recording and of the one at the solution. Lights without extent are exact
-        with one sample and need rays for the pixel's footprint only.
-    grid_exact
-        The same where every light is without extent.
+        Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
     scan_lanes, start_lanes
         Recorded lanes the scan and the fits from its nodes look at.
     starts
@@ -43,7 +40,6 @@ class RecordedPlan:
 
     grid_first: int = 4
     grid_last: int = 8
-    grid_exact: int = 2
     scan_lanes: int = 20_000
     start_lanes: int = 80_000
     starts: int = 3
@@ -67,10 +63,19 @@ class Problem:
 
 
 class RecordedFit:
-    """The stages of one fit; `reference` is scene-linear."""
+    """The stages of one fit; `reference` is scene-linear, `mask` holds the pixels that see the target."""
 
-    def __init__(self, scene: RecordedScene, reference: Pixels, plan: RecordedPlan, seed: int, course: Course) -> None:
-        self.scene, self.reference, self.plan, self.seed, self.course = scene, reference, plan, seed, course
+    def __init__(
+        self,
+        scene: RecordedScene,
+        reference: Pixels,
+        mask: NDArray[np.bool_],
+        plan: RecordedPlan,
+        seed: int,
+        course: Course,
+    ) -> None:
+        self.scene, self.reference, self.mask = scene, reference, mask
+        self.plan, self.seed, self.course = plan, seed, course
         self.table = scene.renderer.table
 
     def problem(self, paths, groups: LaneGroups, make: MakeResidual) -> Problem:  # noqa: ANN001
@@ -81,10 +86,9 @@ class RecordedFit:
         """Stages `scan` and `start`: the best local solution from the scan's nodes, the scene's material and a random one."""
         plan, renderer = self.plan, self.scene.renderer
         sampled = self.scene.needs.sampled
-        grid = plan.grid_first if sampled else plan.grid_exact
-        # where every light is exact, only the pixel's footprint is sampled: finely where the picture changes within it
-        fine = None if sampled else detailed_pixels(self.reference)
-        paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False, fine=fine)
+        # where every light is exact, only the pixel's footprint is sampled
+        grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
+        paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
         self.paths = paths
         groups = all_groups(paths, tiles=sampled)
         with self.course.stage("scan") as stage:

@@ -47,7 +47,7 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
 
 
 def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: int = 1) -> PrimaryRays:
-    """Jittered camera rays, `grid` (height, width) squared for each pixel, in every `stride`-th tile along both axes."""
+    """Camera rays, `grid` (height, width) squared for each pixel, in every `stride`-th tile along both axes."""
     film = sensor.film()
     width, height = (int(v) for v in film.crop_size())
     order, tile = tile_order(width, height, stride)
@@ -55,15 +55,16 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
     position = mi.UInt32(np.repeat(np.arange(len(order), dtype=np.uint32), per_axis**2))
     first = mi.UInt32(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]).astype(np.uint32))
     count = dr.width(position)
-    cells = dr.gather(mi.UInt32, mi.UInt32(per_axis.astype(np.uint32)), position)
+    # lanes past the end read 0, and an integer division by 0 kills the process
+    cells = dr.maximum(dr.gather(mi.UInt32, mi.UInt32(per_axis.astype(np.uint32)), position), 1)
     cell = dr.arange(mi.UInt32, count) - dr.gather(mi.UInt32, first, position)
     sampler = fresh_sampler(seed, count)
     flat = dr.gather(mi.UInt32, mi.UInt32(order.astype(np.uint32)), position)
     y = flat // width
     x = flat - y * width
-    jitter = sampler.next_2d()
     cell_y = cell // cells
-    inside = mi.Point2f(mi.Float(cell - cell_y * cells) + jitter.x, mi.Float(cell_y) + jitter.y) / mi.Float(cells)
+    # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per cent
+    inside = (mi.Point2f(mi.Float(cell - cell_y * cells), mi.Float(cell_y)) + 0.5) / mi.Float(cells)
     offset, sign = _through_filter(film.rfilter(), inside)
     weight = 1.0 / mi.Float(cells * cells)
     if sign is not None:

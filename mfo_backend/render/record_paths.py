@@ -22,19 +22,18 @@ DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 class RecordSettings:
     """How many rays a recording takes.
 
-    `grid` squared camera rays start in each pixel, `fine_grid` squared in the chosen ones. Point, spot and directional lights take one sample for each of them;
+    `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and directional lights take one sample for each of them;
     the other lights one light sample and one sample of the proposal. `depth` is the path length of light that arrives over
     other surfaces: 2 leaves it out. `hide_emitters` leaves lights out of the background, as the integrator's option does.
     Only every `stride`-th tile of pixels along both axes is recorded, which bounds the memory of large pictures.
     """
 
-    grid: int = 2
+    grid: int | NDArray[np.int64] = 2
     seed: int = 0
     depth: int = 2
     proposal: DefensiveProposal = DefensiveProposal()
     hide_emitters: bool = False
     stride: int = 1
-    fine_grid: int = 6
 
 
 @dataclass
@@ -52,10 +51,9 @@ def record_paths(
     shape: mi.Shape,
     settings: RecordSettings,
     *,
-    fine: NDArray[np.bool_] | None = None,
     allow_dark: bool = False,
 ) -> RecordedPaths:
-    """Record the light that reaches the first hit on `shape` from the scene's sensor; pixels in `fine` (height, width) take more rays.
+    """Record the light that reaches the first hit on `shape` from the scene's sensor.
 
     Raises
     ------
@@ -65,9 +63,7 @@ def record_paths(
     with dr.suspend_grad():
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
-        grid = np.full((height, width), settings.grid)
-        if fine is not None:
-            grid[fine] = settings.fine_grid
+        grid = np.broadcast_to(settings.grid, (height, width))
         rays = primary_rays(sensor, grid, settings.seed, settings.stride)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))

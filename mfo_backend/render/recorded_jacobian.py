@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import gc
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import drjit as dr
@@ -29,6 +31,18 @@ class MaterialModel(Protocol):
     def evaluate(self, parameters: Mapping[str, Any], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
         """BSDF times cosine."""
         ...
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    """Keep Python from freeing NumPy-backed arrays meanwhile: Dr.Jit 1.5.0 aborts the process while it records a launch."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 class RecordedJacobian:
@@ -74,7 +88,8 @@ class RecordedJacobian:
         start, stop, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
         dr.eval(theta, out)
-        self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, start, stop, scale, out)
+        with _no_garbage_collection():
+            self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, start, stop, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 

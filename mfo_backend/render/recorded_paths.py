@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..types.image import Pixels
 
-ENOUGH_GROUPS = 4096  # kernel lanes that keep the vector units of a few cores busy
+ENOUGH_PARTS = 4096  # kernel lanes that keep the vector units of a few cores busy
 BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
 
 
@@ -41,7 +41,13 @@ class LaneGroups:
     @property
     def lanes(self) -> int:
         """Recorded lanes in all groups."""
-        return int((self.first_lane[self.member + 1] - self.first_lane[self.member]).sum())
+        return int(self.lanes_of_groups.sum())
+
+    @property
+    def lanes_of_groups(self) -> NDArray[np.int64]:
+        """Recorded lanes in each group."""
+        start, stop = self._lane_ranges
+        return stop - start
 
     def take(self, chosen: NDArray[np.int64]) -> LaneGroups:
         """Only the groups of these numbers."""
@@ -51,28 +57,42 @@ class LaneGroups:
         return LaneGroups(self.member[where], first, self.pixels[where], self.first_lane)
 
     @cached_property
+    def _lane_ranges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First and last + 1 recorded lane of each group; a group's pixels follow each other in the recording."""
+        return self.first_lane[self.member[self.first[:-1]]], self.first_lane[self.member[self.first[1:] - 1] + 1]
+
+    @cached_property
+    def _parts_per_group(self) -> NDArray[np.int64]:
+        start, stop = self._lane_ranges
+        longest = int(np.clip(self.lanes // ENOUGH_PARTS, 16, 256))
+        return np.maximum(-(-(stop - start) // longest), 1)
+
+    @cached_property
     def parts(self) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
         """First lane, last lane + 1 and one over the number of pixels, for each lane of the kernel.
 
-        A kernel lane is a group, or one pixel of a group where there are too few groups to keep all cores busy.
+        A kernel lane is a group or, where groups are long or few, a part of one: all cores stay busy and neighbours in a
+        vector register take about as many turns.
         """
-        count = np.diff(self.first)
-        start, stop, scale = self.first_lane[self.member], self.first_lane[self.member + 1], 1.0 / count
-        if len(count) >= ENOUGH_GROUPS:
-            start, stop = start[self.first[:-1]], stop[self.first[1:] - 1]
-        else:
-            scale = np.repeat(scale, count)
-        parts = (
-            mi.UInt32(start.astype(np.uint32)),
-            mi.UInt32(stop.astype(np.uint32)),
+        start, stop = self._lane_ranges
+        parts = self._parts_per_group
+        number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+        begin, length, parts_of = (np.repeat(a, parts) for a in (start, stop - start, parts))
+        bounds = [begin + length * k // parts_of for k in (number, number + 1)]
+        scale = np.repeat(1.0 / np.diff(self.first), parts)
+        arrays = (
+            mi.UInt32(bounds[0].astype(np.uint32)),
+            mi.UInt32(bounds[1].astype(np.uint32)),
             mi.Float(scale.astype(np.float32)),
         )
-        dr.eval(parts)
-        return parts
+        dr.eval(arrays)
+        return arrays
 
     def add_parts(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Sums over the kernel lanes of each group, along the first axis."""
-        return values if len(values) == len(self) else np.add.reduceat(values, self.first[:-1], axis=0)
+        if len(values) == len(self):
+            return values
+        return np.add.reduceat(values, np.cumsum(self._parts_per_group) - self._parts_per_group, axis=0)
 
     def average(self, image: Pixels) -> NDArray[np.float32]:
         """Mean of `image` (height, width, 3) over the pixels of each group, shape (g, 3)."""

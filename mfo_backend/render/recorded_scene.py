@@ -74,22 +74,22 @@ class RecordedScene:
         return SceneNeeds(True, depth, ())
 
     def record(
-        self, vector: NDArray[np.float64], *, grid: int, seed: int, near: bool, fine: NDArray[np.bool_] | None = None
+        self, vector: NDArray[np.float64], *, grid: int | NDArray[np.int64], seed: int, near: bool
     ) -> RecordedPaths:
-        """Record with `grid` squared rays a pixel; light over other surfaces is that of the material `vector`.
+        """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is that of the material `vector`.
 
-        `near` shapes the proposal for that material instead of for any; pixels in `fine` (height, width) take more rays.
+        `near` shapes the proposal for that material instead of for any.
         """
         self.renderer.show(vector)
         proposal = DefensiveProposal()
         if near:
             proposal = DefensiveProposal.around(float(self._value(vector, self.model.scanned[0])))
         hide = bool(getattr(self._integrator, "hide_emitters", False))
-        rays = float(self._covered) * grid * grid * (2 if self.needs.sampled else 1)
+        rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
         settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride)
         self.renderer.passes += 1.0
-        return record_paths(self.renderer.scene, self.renderer.shape, settings, fine=fine)
+        return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
         """The function from a vector to image and Jacobian (g, 3, 1 + K) of the groups, background included."""
