@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Adam's rate inside one stage.
 
-With a constant rate near a minimum Adam walks in steps of about that rate, the best loss stops improving, and the paper's
-rule of ten stale iterations ends the stage wherever it happens to be, often at its very start under FLIP. The decaying
-schedule answers each such stall by going back to the best values with a third of the rate and fresh moments; the stage ends by
-the same rule at the last level.
+With a constant rate near a minimum Adam walks in steps of about that rate, the best loss stops improving, and the
+paper's rule of ten stale iterations ends the stage wherever it happens to be, often at its very start under FLIP. The
+decaying schedule answers each such stall by going back to the best values with a third of the rate and fresh moments;
+the stage ends by the same rule at the last level.
 """
 
 from __future__ import annotations

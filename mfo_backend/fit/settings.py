@@ -40,8 +40,8 @@ class FitSettings:
     max_iterations, patience
         Of each stage; `patience` is the ten of the paper's rules.
     learning_rate, schedule
-        Adam's rate, in units of parameters that mostly span [0, 1], and whether it stays (``"constant"``, the paper's rules to the
-        letter) or falls to a third at each stall (``"decay"``, see `fit.schedule`).
+        Adam's rate as a share of each parameter's range, and whether it stays (``"constant"``, the paper's rules to
+        the letter) or falls to a third at each stall (``"decay"``, see `fit.schedule`).
     keep_optimizer_state
         Carry Adam's moments and rate into the next stage instead of a new optimisation.
     region

@@ -59,8 +59,8 @@ def run_stage(
 ) -> StageOutcome:
     """Minimise a loss of the picture over the box of `adam`, whose rate is that of the schedule's first level.
 
-    A step that leads to a loss or gradient that is not finite is taken back half way to the best iterate; three in a row
-    end the stage.
+    A step that leads to a loss or gradient that is not finite is taken back half way to the best iterate; three in a
+    row end the stage.
     """
     stopping = Stopping(rules)
     first_rate, level, strikes = adam.rate, 0, 0

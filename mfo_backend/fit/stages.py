@@ -156,7 +156,8 @@ class _StageLog:
 
 
 def _new_adam(renderer: Renderer, settings: FitSettings) -> Adam:
-    return Adam(renderer.table.lower, renderer.table.upper, settings.learning_rate)
+    lower, upper = renderer.table.lower, renderer.table.upper
+    return Adam(lower, upper, settings.learning_rate * (upper - lower))
 
 
 def _candidate(outcome: StageOutcome, before: Candidate) -> Candidate:

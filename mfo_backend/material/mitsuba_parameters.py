@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of Mitsuba's `principled` and the box in which its gradient is defined (Mitsuba 3.9.1).
 
-The box stays clear of the places where the plugin's derivative vanishes or overflows: weights of 0 and 1 (masked lobes),
-black base colour under transmission (infinite slope), roughness below 0.0316 (alpha is clamped at 0.001), a specular
-level of 0 (infinite slope) and an IOR of 1 (refraction half vector of length 0).
+The box stays clear of the places where the plugin's derivative vanishes or overflows: weights of 0 and 1 (masked
+lobes), black base colour under transmission (infinite slope), roughness below 0.0316 (alpha is clamped at 0.001), a
+specular level of 0 (infinite slope) and an IOR of 1 (refraction half vector of length 0).
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def select_parameters(
     Parameters
     ----------
     selection
-        ``"all"``, ``"reduced"`` (base colour, roughness, metallic, specular) or names. ``"all"`` holds `spec_trans` only
-        where the material transmits already, because an opaque object cannot show it.
+        ``"all"``, ``"reduced"`` (base colour, roughness, metallic, specular) or names. ``"all"`` holds `spec_trans`
+        only where the material transmits already: others could turn into glass on the way to a local minimum.
     present
         Names that the scene's material sets to something other than 0. With `eta` or `spec_trans` among them the
         fit works on `eta`, else on `specular`; the plugin takes one of the two.

@@ -22,7 +22,7 @@ Materials = Mapping[str, Mapping[str, Any]]  # `materials` of request.json
 class PreparedMaterial:
     """A scene whose target material can be differentiated.
 
-    `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the id of `target`'s BSDF.
+    `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the target's BSDF id.
     """
 
     table: ParameterTable

@@ -21,11 +21,6 @@ from .variant import load_variant
 _MASK_RAYS = 4  # rays per pixel and axis that look for the target
 
 
-def gradient_seed(seed: int) -> int:
-    """The seed of a pull-back: not the image's own, or the noise of both would correlate and bias the gradient."""
-    return (seed * 0x9E3779B1 + 0x7F4A7C15) % 2**32
-
-
 class MitsubaRenderer:
     """The `Renderer` protocol on a loaded Mitsuba scene."""
 
@@ -65,7 +60,12 @@ class MitsubaRenderer:
         self._update(vector, differentiable=False)
 
     def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Pullback]:
-        """See `Renderer.image_and_pullback`; the pull-back may be called any number of times, 2 passes each."""
+        """See `Renderer.image_and_pullback`; the pull-back may be called any number of times, 2 passes each.
+
+        The pull-back traces the paths of the picture itself, so a fit follows the slope of the very loss it compares.
+        With paths of their own (Mitsuba's default) the two disagree by their noise near the minimum and the fit goes
+        stale early: 12 random materials under a point light, 4 spp, ended at a mean FLIP of 0.30 instead of 0.21.
+        """
         vector = np.array(vector)
         image = self.image(vector, seed=seed, spp=spp)
 
@@ -76,7 +76,7 @@ class MitsubaRenderer:
             theta = self._update(vector, differentiable=True)
             gradient = mi.TensorXf(np.ascontiguousarray(pixel_gradient, dtype=np.float32))
             self._integrator.render_backward(
-                self._scene, self._params, gradient, self._sensor, _opaque(gradient_seed(seed)), spp
+                self._scene, self._params, gradient, self._sensor, _opaque(seed), spp
             )
             self.passes += 2.0
             return np.array(dr.grad(theta), dtype=np.float64)

@@ -19,8 +19,9 @@ class StoppingRules:
     """Thresholds of the three rules.
 
     `change` is the relative step of the loss that counts as one: 1e-6 is what float32 pictures resolve.
-    `improvement` is the relative gain of the best loss that counts as one. It is measured from the best loss at the last
-    gain that counted, so many small gains add up. 1e-4 in ten iterations is far below what an eye or a new seed shows.
+    `improvement` is the relative gain of the best loss that counts as one. It is measured from the best loss at the
+    last gain that counted, so many small gains add up. 1e-4 in ten iterations is far below what an eye or a new seed
+    shows.
     """
 
     patience: int = 10
