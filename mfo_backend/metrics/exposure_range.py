@@ -37,9 +37,9 @@ class ExposureRange:
             raise BadInputError(f"Exposure count is {self.count}: it must lie between 2 and 200.")
 
     @property
-    def values(self) -> Array:
-        """The exposures in stops, shape (count,)."""
-        return np.linspace(self.start, self.stop, self.count)
+    def values(self) -> list[float]:
+        """The `count` exposures in stops."""
+        return np.linspace(self.start, self.stop, self.count).tolist()
 
 
 def official_exposures(reference: Array, curve: ToneCurve = ToneCurve()) -> ExposureRange:  # noqa: B008  # frozen

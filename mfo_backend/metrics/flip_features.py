@@ -38,6 +38,13 @@ class Perceived:
     point: Array
 
 
+def norm(x: Array, y: Array) -> Array:
+    """sqrt(x^2 + y^2); unlike `np.hypot` it is vectorised, and nothing here comes near under- or overflow."""
+    squares = x * x
+    squares += y * y
+    return np.sqrt(squares, out=squares)
+
+
 class FlipFeatures:
     """`perceived` of linear RGB planes in [0, 1], with what the adjoint needs."""
 
@@ -45,8 +52,7 @@ class FlipFeatures:
         self._filters = filters
         opponent = mix(_RGB_TO_OPPONENT, planes)
         self._detail = filters.features(opponent[0])
-        edge = np.hypot(self._detail[0], self._detail[1])
-        point = np.hypot(self._detail[2], self._detail[3])
+        edge, point = norm(*self._detail[:2]), norm(*self._detail[2:])
 
         seen = mix(_OPPONENT_TO_RGB, filters.low_pass(opponent))
         self._unclipped = (seen >= 0) & (seen <= 1)

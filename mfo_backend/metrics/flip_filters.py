@@ -36,6 +36,11 @@ def csf_profiles(channel: str, pixels_per_degree: float) -> list[Array]:
     return [p / norm for p in profiles]
 
 
+def flip_reach(pixels_per_degree: float) -> int:
+    """Pixels to either side that an error depends on."""
+    return max(len(csf_profiles("Cz", pixels_per_degree)[0]), len(feature_profiles(pixels_per_degree)[0])) // 2
+
+
 def feature_profiles(pixels_per_degree: float) -> tuple[Array, Array, Array]:
     """Gaussian, its first and its second derivative; positive weights sum to 1, negative ones to -1."""
     sigma = 0.5 * _FEATURE_WIDTH_DEGREES * pixels_per_degree
@@ -56,12 +61,10 @@ class FlipFilters:
     """The filters for one image size; planes are (height, width)."""
 
     def __init__(self, height: int, width: int, pixels_per_degree: float, dtype: np.dtype) -> None:
-        def pair(kernel: Array) -> tuple[BandedFilter, BandedFilter]:
-            along_y = BandedFilter(kernel, height, dtype)
-            return along_y, along_y if height == width else BandedFilter(kernel, width, dtype)
-
-        self._csf = [[pair(p) for p in csf_profiles(channel, pixels_per_degree)] for channel in ("Y", "Cx", "Cz")]
-        self._gauss, self._edge, self._point = (pair(p) for p in feature_profiles(pixels_per_degree))
+        down, across = (_line_filters(length, pixels_per_degree, dtype) for length in (height, width))
+        luma, red_green, yellow_blue, yellow_blue_narrow, *features = zip(down, across, strict=True)
+        self._csf = [[luma], [red_green], [yellow_blue, yellow_blue_narrow]]
+        self._gauss, self._edge, self._point = features
 
     def low_pass(self, planes: Array) -> Array:
         """The opponent planes (3, height, width) as the eye resolves them."""
@@ -100,7 +103,14 @@ class FlipFilters:
         return out
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
+def _line_filters(length: int, pixels_per_degree: float, dtype: np.dtype) -> list[BandedFilter]:
+    """The low-passes of Y, Cx and twice Cz, then Gaussian, edge and point, for lines of `length` pixels."""
+    kernels = [profile for channel in _CSF for profile in csf_profiles(channel, pixels_per_degree)]
+    return [BandedFilter(k, length, dtype) for k in (*kernels, *feature_profiles(pixels_per_degree))]
+
+
+@lru_cache(maxsize=64)
 def flip_filters(height: int, width: int, pixels_per_degree: float, dtype: np.dtype) -> FlipFilters:
     """The filters of a size, built once."""
     return FlipFilters(height, width, pixels_per_degree, dtype)

@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .exposure_range import ExposureRange
-from .flip import FlipDifference, flip_features, pixels_of, planes_of
+from .flip import pixels_of, planes_of
 from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
+from .flip_reference import FlipComparison, FlipReference
 from .hdr_flip import HdrFlip
+from .pixel_check import check_image
 from .tone_mapping import DisplayView
 
 Array = NDArray[np.floating]
@@ -23,24 +25,24 @@ class FlipLoss:
     ) -> None:
         self.name = name
         self._view = view
-        self._pixels_per_degree = pixels_per_degree
+        self._shape = target.shape
         self._dtype = target.dtype
-        self._reference = flip_features(planes_of(target), pixels_per_degree).perceived
+        self._reference = FlipReference(planes_of(target), pixels_per_degree)
 
     def value(self, image: Array) -> float:
         """The mean error."""
-        return float(self._difference(image).error.mean(dtype=np.float64))
+        return float(self._compare(image).error.mean(dtype=np.float64))
 
     def value_and_gradient(self, image: Array) -> tuple[float, Array]:
         """The mean error and its gradient with respect to the scene-linear image."""
-        difference = self._difference(image)
-        weight = np.full_like(difference.error, 1 / difference.error.size)
-        gradient = self._view.light_pullback(image, pixels_of(difference.pullback(weight)))
-        return float(difference.error.mean(dtype=np.float64)), gradient.astype(image.dtype, copy=False)
+        comparison = self._compare(image)
+        weight = np.full_like(comparison.error, 1 / comparison.error.size)
+        gradient = pixels_of(comparison.pullback(weight)) * self._view.light_slope(image)
+        return float(comparison.error.mean(dtype=np.float64)), gradient.astype(image.dtype, copy=False)
 
-    def _difference(self, image: Array) -> FlipDifference:
-        light = planes_of(self._view.light(image).astype(self._dtype, copy=False))
-        return FlipDifference(self._reference, flip_features(light, self._pixels_per_degree))
+    def _compare(self, image: Array) -> FlipComparison:
+        check_image(image, self._shape)
+        return self._reference.compare(planes_of(self._view.light(image).astype(self._dtype, copy=False)))
 
 
 class HdrFlipLoss:
@@ -54,13 +56,16 @@ class HdrFlipLoss:
         pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE,
     ) -> None:
         self.name = name
+        self._shape = target.shape
         self._flip = HdrFlip(target, exposures=exposures, pixels_per_degree=pixels_per_degree)
 
     def value(self, image: Array) -> float:
         """The mean error."""
+        check_image(image, self._shape)
         return float(self._flip.map(image).mean(dtype=np.float64))
 
     def value_and_gradient(self, image: Array) -> tuple[float, Array]:
         """The mean error and its gradient with respect to the image."""
+        check_image(image, self._shape)
         error, gradient = self._flip.map_and_pullback(image, 1 / (image.shape[0] * image.shape[1]))
         return float(error.mean(dtype=np.float64)), gradient.astype(image.dtype, copy=False)

@@ -8,12 +8,15 @@ Andersson et al., "Visualizing Errors in Rendered High Dynamic Range Images", Eu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .exposure_range import ExposureRange, official_exposures
-from .flip import FlipDifference, flip_features, pixels_of, planes_of
+from .flip import pixels_of, planes_of
 from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
+from .flip_reference import FlipComparison, FlipReference
 from .pixel_check import check_finite, check_pair
 from .tone_curve import ToneCurve
 
@@ -53,15 +56,16 @@ class HdrFlip:
         self.dtype = np.dtype(np.float64 if reference.dtype == np.float64 else np.float32)
         self.exposures = exposures or official_exposures(reference, curve)
         self._curve = curve
-        self._pixels_per_degree = pixels_per_degree
         planes = planes_of(reference.astype(self.dtype, copy=False))
-        self._perceived = [
-            flip_features(curve.apply(planes, ev), pixels_per_degree).perceived for ev in self.exposures.values
-        ]
+        self._references = [FlipReference(curve.apply(planes, ev), pixels_per_degree) for ev in self.exposures.values]
 
     def map(self, test: Array) -> Array:
         """The error map (height, width) in [0, 1] of linear pixels (height, width, 3); negative values count as 0."""
-        return self._evaluate(planes_of(test.astype(self.dtype, copy=False)))[0]
+        planes = planes_of(test.astype(self.dtype, copy=False))
+        error = np.zeros(planes.shape[1:], self.dtype)
+        for _, comparison in self._compare(planes):
+            np.maximum(error, comparison.error, out=error)
+        return error
 
     def map_and_pullback(self, test: Array, weight: Array | float) -> tuple[Array, Array]:
         """The map, and the gradient (height, width, 3) of sum(weight * map) with respect to the test pixels.
@@ -69,29 +73,27 @@ class HdrFlip:
         Where exposures tie, the lowest one carries the gradient.
         """
         planes = planes_of(test.astype(self.dtype, copy=False))
-        error, winner, differences = self._evaluate(planes)
+        error = np.zeros(planes.shape[1:], self.dtype)
+        winner = np.full(error.shape, -1, np.int16)
+        comparisons = {}
+        for index, comparison in self._compare(planes):
+            larger = comparison.error > error
+            if larger.any():
+                np.copyto(error, comparison.error, where=larger)
+                winner[larger] = index
+                comparisons[index] = comparison
+
         gradient = np.zeros_like(planes)
-        for index, difference in differences.items():
+        for index, comparison in comparisons.items():
             won = winner == index
             if won.any():
-                ev = self.exposures.values[index]
-                shown = difference.pullback((won * weight).astype(self.dtype, copy=False))
-                gradient += self._curve.pullback(planes, ev, shown)
+                shown = comparison.pullback((won * weight).astype(self.dtype, copy=False))
+                gradient += self._curve.pullback(planes, self.exposures.values[index], shown)
         return error, pixels_of(gradient)
 
-    def _evaluate(self, planes: Array) -> tuple[Array, NDArray[np.int16], dict[int, FlipDifference]]:
-        error = np.full(planes.shape[1:], -1, self.dtype)
-        winner = np.zeros(error.shape, np.int16)
-        differences = {}
-        for index, ev in enumerate(self.exposures.values):
-            features = flip_features(self._curve.apply(planes, ev), self._pixels_per_degree)
-            difference = FlipDifference(self._perceived[index], features)
-            larger = difference.error > error
-            if larger.any():
-                np.copyto(error, difference.error, where=larger)
-                winner[larger] = index
-                differences[index] = difference
-        return error, winner, differences
+    def _compare(self, planes: Array) -> Iterator[tuple[int, FlipComparison]]:
+        for index, (ev, reference) in enumerate(zip(self.exposures.values, self._references, strict=True)):
+            yield index, reference.compare(self._curve.apply(planes, ev))
 
 
 def hdr_flip_map(

@@ -10,14 +10,20 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
-from .colour import linear_from_srgb
+from .colour import linear_from_srgb, srgb_from_linear
 from .exposure_range import lit_exposures
 from .flip_loss import FlipLoss, HdrFlipLoss
-from .mse import MseLoss
-from .pixel_check import check_finite, check_mask, check_size
+from .itp import Itp
+from .pixel_check import check_finite, check_mask
+from .pu21 import Pu21
+from .response import Displayed, OnDisplay, Response, Scaled, logarithmic_for, nits_per_unit, relative_to
+from .squared_loss import SquaredLoss
 from .tone_mapping import DisplayView
 
-LOSS_NAMES = ("mse-ldr", "mse-hdr", "flip-ldr", "flip-hdr")
+LDR_LOSSES = ("mse-ldr", "pu21-ldr", "itp-ldr", "flip-ldr")
+HDR_LOSSES = ("mse-hdr", "log-hdr", "relative-hdr", "pu21-hdr", "itp-hdr", "flip-hdr")
+LOSS_NAMES = LDR_LOSSES + HDR_LOSSES
+DISPLAY_NITS = 100.0  # white of a display in cd/m^2 (IEC 61966-2-1 has 80, a usual monitor is set brighter)
 
 
 class Loss(Protocol):
@@ -34,6 +40,18 @@ class Loss(Protocol):
         ...
 
 
+class ResidualLoss(Loss, Protocol):
+    """A loss that is a sum of squares, so that least squares can minimise it."""
+
+    def residual(self, image: Pixels) -> Pixels:
+        """The vector (height * width * 3,) whose squares sum to `value(image)`."""
+        ...
+
+    def residual_jacobian(self, image: Pixels, tangents: Pixels) -> Pixels:
+        """Its derivative (height * width * 3, count) along image derivatives (count, height, width, 3)."""
+        ...
+
+
 def make_loss(
     name: str, reference: Image, *, mask: NDArray[np.bool_] | None = None, display: DisplayView | None = None
 ) -> Loss:
@@ -42,8 +60,8 @@ def make_loss(
     Parameters
     ----------
     name
-        ``mse-ldr``, ``mse-hdr``, ``flip-ldr`` or ``flip-hdr``. The LDR losses compare what a display shows, the HDR
-        losses scene-linear values.
+        One of `LOSS_NAMES`. The LDR losses compare what a display shows, the HDR losses scene-linear values. All but
+        the FLIP losses are `ResidualLoss` as well.
     mask
         Pixels (height, width) that see the object; they choose exposures, the error is the mean over all pixels.
     display
@@ -61,47 +79,42 @@ def make_loss(
     check_finite(reference.pixels, "The reference")
     if mask is not None:
         check_mask(mask, reference.pixels.shape[:2])
-    loss = _ldr_loss(name, reference, mask, display) if name.endswith("-ldr") else _hdr_loss(name, reference, mask)
-    return _CheckedLoss(loss, reference.pixels.shape)
+    target = np.maximum(reference.pixels, 0)
+    kind, dynamic_range = name.split("-")
+    if dynamic_range == "hdr":
+        if reference.encoding is not Encoding.LINEAR:
+            raise BadInputError(
+                f"Loss {name} needs a scene-linear reference (EXR or HDR), but this one holds display values: "
+                f"use {'flip-ldr' if kind == 'flip' else 'mse-ldr'} or a linear reference."
+            )
+        if kind == "flip":
+            return HdrFlipLoss(name, target, lit_exposures(target, mask))
+        response = _hdr_response(kind, target, mask)
+        return SquaredLoss(name, response.apply(target), response)
 
-
-def _ldr_loss(name: str, reference: Image, mask: NDArray[np.bool_] | None, display: DisplayView | None) -> Loss:
     if reference.encoding is Encoding.SRGB:
         view = display or DisplayView()
-        shown = np.clip(reference.pixels, 0, 1)
-        light = linear_from_srgb(shown)
+        light = linear_from_srgb(np.minimum(target, 1))
     else:
-        view = display or DisplayView.for_scene(reference.pixels, mask)
-        shown, light = view.display(reference.pixels), view.light(reference.pixels)
-    return MseLoss(name, shown, view) if name == "mse-ldr" else FlipLoss(name, light, view)
+        view = display or DisplayView.for_scene(target, mask)
+        light = view.light(target)
+    if kind == "flip":
+        return FlipLoss(name, light, view)
+    if kind == "mse":
+        return SquaredLoss(name, srgb_from_linear(light), Displayed(view))
+    on_light = _absolute_response(kind, DISPLAY_NITS)
+    return SquaredLoss(name, on_light.apply(light), OnDisplay(view, on_light))
 
 
-def _hdr_loss(name: str, reference: Image, mask: NDArray[np.bool_] | None) -> Loss:
-    if reference.encoding is not Encoding.LINEAR:
-        raise BadInputError(
-            f"Loss {name} needs a scene-linear reference (EXR or HDR), but this one holds display values: "
-            f"use {name.replace('hdr', 'ldr')} or a linear reference."
-        )
-    target = np.maximum(reference.pixels, 0)
-    return MseLoss(name, target) if name == "mse-hdr" else HdrFlipLoss(name, target, lit_exposures(target, mask))
+def _hdr_response(kind: str, target: Pixels, mask: NDArray[np.bool_] | None) -> Response:
+    if kind == "mse":
+        return Scaled()
+    if kind == "log":
+        return logarithmic_for(target)
+    if kind == "relative":
+        return relative_to(target)
+    return _absolute_response(kind, nits_per_unit(target, mask))
 
 
-class _CheckedLoss:
-    """A loss that refuses images it is not defined for, so that no optimiser meets a NaN."""
-
-    def __init__(self, loss: Loss, shape: tuple[int, ...]) -> None:
-        self.name = loss.name
-        self._loss = loss
-        self._shape = shape
-
-    def value(self, image: Pixels) -> float:
-        self._check(image)
-        return self._loss.value(image)
-
-    def value_and_gradient(self, image: Pixels) -> tuple[float, Pixels]:
-        self._check(image)
-        return self._loss.value_and_gradient(image)
-
-    def _check(self, image: Pixels) -> None:
-        check_size(image, self._shape, "The rendered image")
-        check_finite(image, "The rendered image")
+def _absolute_response(kind: str, nits: float) -> Response:
+    return Pu21(nits) if kind == "pu21" else Itp(nits)

@@ -39,6 +39,12 @@ def check_pair(reference: Array, test: Array) -> None:
     check_finite(test, "The test image")
 
 
+def check_image(image: Array, shape: tuple[int, ...]) -> None:
+    """Raise `BadInputError` unless a rendered image is finite and of `shape`, so that no optimiser meets a NaN."""
+    check_size(image, shape, "The rendered image")
+    check_finite(image, "The rendered image")
+
+
 def check_mask(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> None:
     """Raise `BadInputError` unless `mask` has the reference's (height, width) and holds a pixel."""
     if mask.shape != shape:

@@ -60,14 +60,14 @@ class DisplayView:
         encoded = srgb_from_linear(self._exposed(linear))
         return encoded if self.gamma == 1 else encoded ** (1 / self.gamma)
 
-    def display_pullback(self, linear: Array, gradient: Array) -> Array:
-        """Gradient with respect to `linear` from one with respect to `display(linear)`; 0 where it is clipped."""
+    def display_slope(self, linear: Array) -> Array:
+        """Derivative of `display`; 0 where it is clipped."""
         exposed = self._exposed(linear)
         slope = srgb_from_linear_slope(exposed)
         if self.gamma != 1:
             encoded = np.maximum(srgb_from_linear(exposed), _GAMMA_SLOPE_FLOOR)
             slope = slope * encoded ** (1 / self.gamma - 1) / self.gamma
-        return gradient * slope * self._unclipped(linear) * 2.0**self.exposure_ev
+        return slope * self._exposed_slope(linear)
 
     def light(self, linear: Array) -> Array:
         """Linear light in [0, 1] an sRGB display emits for scene-linear values."""
@@ -75,16 +75,17 @@ class DisplayView:
             return self._exposed(linear)
         return linear_from_srgb(self.display(linear))
 
-    def light_pullback(self, linear: Array, gradient: Array) -> Array:
-        """Gradient with respect to `linear` from one with respect to `light(linear)`."""
+    def light_slope(self, linear: Array) -> Array:
+        """Derivative of `light`; 0 where it is clipped."""
         if self.gamma == 1:
-            return gradient * self._unclipped(linear) * 2.0**self.exposure_ev
-        return self.display_pullback(linear, gradient * linear_from_srgb_slope(self.display(linear)))
+            return self._exposed_slope(linear)
+        return self.display_slope(linear) * linear_from_srgb_slope(self.display(linear))
 
     def _exposed(self, linear: Array) -> Array:
         # dividing the limit, not multiplying the values, cannot overflow
         scale = 2.0**self.exposure_ev
         return np.clip(linear, 0, 1 / scale) * linear.dtype.type(scale)
 
-    def _unclipped(self, linear: Array) -> NDArray[np.bool_]:
-        return (linear >= 0) & (linear <= 2.0**-self.exposure_ev)
+    def _exposed_slope(self, linear: Array) -> Array:
+        scale = 2.0**self.exposure_ev
+        return ((linear >= 0) & (linear <= 1 / scale)) * linear.dtype.type(scale)

@@ -8,7 +8,8 @@ import pytest
 
 from mfo_backend.metrics.colour import linear_from_srgb
 from mfo_backend.metrics.exposure_range import ExposureRange, lit_exposures, official_exposures
-from mfo_backend.metrics.flip import FlipDifference, flip_features, flip_map, planes_of
+from mfo_backend.metrics.flip import flip_map, planes_of
+from mfo_backend.metrics.flip_reference import FlipReference
 from mfo_backend.metrics.hdr_flip import HdrFlip, hdr_flip_map
 from mfo_backend.metrics.tone_curve import ToneCurve
 from mfo_backend.types.errors import BadInputError
@@ -37,8 +38,7 @@ def ldr_map(reference, test, encoding, ppd):
     options = {} if ppd is None else {"pixels_per_degree": ppd}
     if encoding == "srgb":
         return flip_map(reference, test, **options)
-    features = [flip_features(planes_of(image), **options) for image in (reference, test)]
-    return FlipDifference(features[0].perceived, features[1]).error
+    return FlipReference(planes_of(reference), **options).compare(planes_of(test)).error
 
 
 def assert_golden(error, golden):
@@ -136,14 +136,10 @@ def test_ldr_gradient_equals_finite_differences(golden_pair, ppd):
     reference, test = (linear_from_srgb(image)[:20, 26:50] for image in golden_pair(np.float64))
     test = np.clip(test, 0.02, 0.98)
     weight = np.random.default_rng(0).random(test.shape[:2])
-    features = flip_features(planes_of(reference), ppd).perceived
-
-    def difference(image):
-        return FlipDifference(features, flip_features(planes_of(image), ppd))
-
-    gradient = np.moveaxis(difference(test).pullback(weight), 0, -1)
+    flip = FlipReference(planes_of(reference), ppd)
+    gradient = np.moveaxis(flip.compare(planes_of(test)).pullback(weight), 0, -1)
     directions = np.random.default_rng(1).standard_normal((12, *test.shape))
-    expected = directional(lambda image: (weight * difference(image).error).sum(), test, directions, 1e-7)
+    expected = directional(lambda image: (weight * flip.compare(planes_of(image)).error).sum(), test, directions, 1e-7)
     # the quotient's rounding: 1e-16 * 100 / 1e-7 = 1e-7 of values near 10; kinks crossed cost more
     np.testing.assert_allclose([(gradient * d).sum() for d in directions], expected, rtol=1e-5, atol=1e-5)
 

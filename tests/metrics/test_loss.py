@@ -9,7 +9,8 @@ import pytest
 from mfo_backend.metrics.flip_error import flip_error, hdr_flip_error
 from mfo_backend.metrics.flip_loss import FlipLoss
 from mfo_backend.metrics.loss import LOSS_NAMES, make_loss
-from mfo_backend.metrics.mse import MseLoss
+from mfo_backend.metrics.response import Displayed
+from mfo_backend.metrics.squared_loss import SquaredLoss
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
@@ -80,7 +81,7 @@ def test_ldr_gradients_equal_finite_differences_through_every_view(kind, view):
     rng = np.random.default_rng(5)
     target, image = rng.uniform(0.03, 0.6, (2, 14, 12, 3))
     image[:3] = 4.0  # clipped by every view
-    loss = MseLoss("mse", target, view) if kind == "mse" else FlipLoss("flip", target, view)
+    loss = SquaredLoss("mse", target, Displayed(view)) if kind == "mse" else FlipLoss("flip", target, view)
     _, gradient = loss.value_and_gradient(image)
     directions = rng.standard_normal((6, *image.shape))
     step = 1e-7
