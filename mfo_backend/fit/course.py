@@ -37,7 +37,12 @@ class Course:
     """Runs the named stages one after another and tells the listener."""
 
     def __init__(
-        self, renderer: Renderer, stages: tuple[str, ...], listener: Listener, should_stop: Callable[[], bool], began: float
+        self,
+        renderer: Renderer,
+        stages: tuple[str, ...],
+        listener: Listener,
+        should_stop: Callable[[], bool],
+        began: float,
     ) -> None:
         self.names = stages
         self.should_stop = should_stop
@@ -71,7 +76,9 @@ class Course:
             )
         )
 
-    def watch(self, stage: Stage, residuals: Callable[[Vector], NormalEquations]) -> Callable[[Vector], NormalEquations]:
+    def watch(
+        self, stage: Stage, residuals: Callable[[Vector], NormalEquations]
+    ) -> Callable[[Vector], NormalEquations]:
         """`residuals`, with every evaluation noted in `stage`."""
 
         def watched(x: Vector) -> NormalEquations:

@@ -85,7 +85,7 @@ class RecordedFit:
         return Problem(self.scene.evaluator(paths, groups), make(groups.average(self.reference)), groups)
 
     def start_from_nothing(self, make: MakeResidual) -> Solution:
-        """Stages `scan` and `start`: the best local solution from the scan's nodes, the scene's material and a random one."""
+        """Stages `scan` and `start`: the best solution from the scan's nodes, the scene's material and a random one."""
         plan, renderer = self.plan, self.scene.renderer
         sampled = self.scene.needs.sampled
         # where every light is exact, only the pixel's footprint is sampled
@@ -107,7 +107,7 @@ class RecordedFit:
         return best
 
     def _race(self, residuals: Callable[[Vector], NormalEquations], starts: list[Vector]) -> Solution:
-        """Bounded fits from all starts; those that fall behind are given up, and all but the first once it has solved it."""
+        """Bounded fits from all starts; those that fall behind are given up, and all others once one has solved it."""
         plan, found = self.plan, []
         for start in starts:
             first = self._solve(residuals, start, plan.trial_evaluations)
@@ -132,6 +132,11 @@ class RecordedFit:
         # a cost of 1e-11 is a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
         limits = SolveLimits(evaluations=evaluations, cost_change=1e-5, cost_floor=1e-11)
         return solve_bounded(residuals, start, self.table.lower, self.table.upper, limits, self.course.should_stop)
+
+    def solve_within(self, problem: Problem, start: Vector, lower: Vector, upper: Vector) -> Vector:
+        """A few steps with other bounds."""
+        limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
+        return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
     def last_problem(self, near: Vector, make: MakeResidual) -> Problem:
         """All residuals at the solution: a new and finer recording where the light is sampled, all pixels elsewhere."""

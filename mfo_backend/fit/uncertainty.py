@@ -37,8 +37,6 @@ def standard_deviations(jacobian: Vector, residual: Vector, table: ParameterTabl
     prior = float(np.mean(noise**2)) / PRIOR_SD**2
     inverse = np.linalg.inv(gram + prior * np.eye(k))
     covariance = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
-    # the model error is no independent noise: it may lie along a column, so its worst direction counts once more
-    covariance += MODEL_ERROR**2 * inverse
     return INFLATION * width * np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.sqrt(g / max(g - k / 3, 1))
 
 

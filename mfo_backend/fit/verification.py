@@ -19,6 +19,7 @@ VERIFY_STREAM = 0x5EED0000  # far from the seeds users choose, so that no iterat
 
 
 def check_reference(reference: Image, mask: NDArray[np.bool_]) -> None:
+    """Raise `BadInputError` unless the reference has the size of `mask` and shows something where the target is."""
     height, width = mask.shape
     if (reference.height, reference.width) != (height, width):
         raise BadInputError(
@@ -39,6 +40,7 @@ def stage_losses(
     settings: FitSettings,
     display: DisplayView | None,
 ) -> list[Loss]:
+    """The named losses over the settings' region, `background` standing in outside of it."""
     if settings.region == "image":
         return [make_loss(name, reference, mask=mask, display=display) for name in names]
     shown = fill_outside(reference, background, mask, (display or DisplayView()).display)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mitsuba's `principled` plugin as one plain, differentiable Dr.Jit function.
 
-Formulas: B. Burley, "Physically Based Shading at Disney" (2012) and its extension to a BSDF (2015), in the form of Mitsuba
-3.9.1 (`principled.cpp`, `principledhelpers.h`, `microfacet.h`, `fresnel.h`). All reflecting lobes on the front side; no
-transmission. Unlike the plugin no lobe is masked by "parameter > 0", so derivatives exist at the bounds.
+Formulas: B. Burley, "Physically Based Shading at Disney" (2012) and its extension to a BSDF (2015), in the form of
+Mitsuba 3.9.1 (`principled.cpp`, `principledhelpers.h`, `microfacet.h`, `fresnel.h`). All reflecting lobes on the front
+side; no transmission. Unlike the plugin no lobe is masked by "parameter > 0", so derivatives exist at the bounds.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ class MitsubaPrincipled:
     scanned = ("roughness", "clearcoat_gloss")
 
     def values(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """All values `evaluate` needs besides the free ones, from those of a material; missing ones are the plugin's defaults.
+        """All values `evaluate` needs besides the free ones, from those of a material; missing ones are the plugin's
+        defaults.
 
         Raises
         ------
@@ -61,7 +62,9 @@ class MitsubaPrincipled:
             If the material transmits light.
         """
         if given.get("spec_trans", 0.0) != 0.0:
-            raise BadInputError("Material with 'spec_trans': recorded paths hold reflected light only, use the preset 'paper'.")
+            raise BadInputError(
+                "Material with 'spec_trans': recorded paths hold reflected light only, use the preset 'paper'."
+            )
         unused = {"spec_trans", "specular" if "eta" in given else "eta"}
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
 
@@ -71,8 +74,8 @@ class MitsubaPrincipled:
         Parameters
         ----------
         parameters
-            A value for every name of `table` but `spec_trans`, with one of `specular` and `eta`: `mi.Float` or `mi.Color3f` of
-            width 1 or n, or Python floats.
+            A value for every name of `table` but `spec_trans`, with one of `specular` and `eta`: `mi.Float` or
+            `mi.Color3f` of width 1 or n, or Python floats.
         wi, wo
             Unit directions in the shading frame, towards camera and light.
         """

@@ -75,9 +75,7 @@ class MitsubaRenderer:
 
             theta = self._update(vector, differentiable=True)
             gradient = mi.TensorXf(np.ascontiguousarray(pixel_gradient, dtype=np.float32))
-            self._integrator.render_backward(
-                self._scene, self._params, gradient, self._sensor, _opaque(seed), spp
-            )
+            self._integrator.render_backward(self._scene, self._params, gradient, self._sensor, _opaque(seed), spp)
             self.passes += 2.0
             return np.array(dr.grad(theta), dtype=np.float64)
 

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Camera rays on a fixed, stratified set of positions in every pixel."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -17,8 +21,8 @@ TILE = 4  # pixels; a tile is the smallest residual when the recording itself is
 class PrimaryRays:
     """Rays for each pixel, pixels in tile order; `pixel_position` counts in that order.
 
-    Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every ray
-    counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
+    Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every
+    ray counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
     `filter_weight` adds up to 1 within a pixel.
     """
 
@@ -63,7 +67,8 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
     y = flat // width
     x = flat - y * width
     cell_y = cell // cells
-    # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per cent
+    # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per
+    # cent
     inside = (mi.Point2f(mi.Float(cell - cell_y * cells), mi.Float(cell_y)) + 0.5) / mi.Float(cells)
     offset, sign = _through_filter(film.rfilter(), inside)
     weight = 1.0 / mi.Float(cells * cells)
@@ -73,7 +78,9 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
         weight = sign / dr.gather(mi.Float, total, position)
     crop = film.crop_offset()
     size = mi.ScalarVector2f(film.size())
-    film_position = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]) / mi.Point2f(size)
+    film_position = mi.Point2f(
+        mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]
+    ) / mi.Point2f(size)
     ray, _ = sensor.sample_ray_differential(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
     return PrimaryRays(ray, position, weight, order, tile)
 

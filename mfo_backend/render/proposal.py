@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A density of directions that stays usable while the material moves."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
 from __future__ import annotations
 
 from dataclasses import dataclass

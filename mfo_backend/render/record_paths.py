@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trace a scene once and keep what a change of the target's material cannot alter."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import drjit as dr
 import mitsuba as mi
@@ -22,16 +26,17 @@ DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 class RecordSettings:
     """How many rays a recording takes.
 
-    `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and directional lights take one sample for each of them;
-    the other lights one light sample and one sample of the proposal. `depth` is the path length of light that arrives over
-    other surfaces: 2 leaves it out. `hide_emitters` leaves lights out of the background, as the integrator's option does.
-    Only every `stride`-th tile of pixels along both axes is recorded, which bounds the memory of large pictures.
+    `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and
+    directional lights take one sample for each of them; the other lights one light sample and one sample of the
+    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
+    leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
+    both axes is recorded, which bounds the memory of large pictures.
     """
 
     grid: int | NDArray[np.int64] = 2
     seed: int = 0
     depth: int = 2
-    proposal: DefensiveProposal = DefensiveProposal()
+    proposal: DefensiveProposal = field(default_factory=DefensiveProposal)
     hide_emitters: bool = False
     stride: int = 1
 
@@ -121,7 +126,9 @@ def _delta_lights(scene: mi.Scene, si, position: mi.UInt32, share: mi.Float) -> 
     return lanes
 
 
-def _sampled_lights(scene: mi.Scene, si, position: mi.UInt32, share: mi.Float, settings: RecordSettings) -> list[_Lanes]:
+def _sampled_lights(
+    scene: mi.Scene, si, position: mi.UInt32, share: mi.Float, settings: RecordSettings
+) -> list[_Lanes]:
     """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
     everywhere = list(scene.emitters())
     extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
@@ -235,6 +242,4 @@ def _merge(
     dr.eval(wi, wo, weight)
     count = np.bincount(position, minlength=len(rays.pixel))[covered]
     first = np.concatenate([[0], np.cumsum(count)])
-    return RecordedPaths(
-        wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant
-    )
+    return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant)

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pixels and their derivatives by all free values, from recorded paths, in one kernel."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
 from __future__ import annotations
 
 import gc
@@ -35,7 +39,7 @@ class MaterialModel(Protocol):
 
 @contextmanager
 def _no_garbage_collection() -> Iterator[None]:
-    """Keep Python from freeing NumPy-backed arrays meanwhile: Dr.Jit 1.5.0 aborts the process while it records a launch."""
+    """Keep Python from freeing NumPy-backed arrays: Dr.Jit 1.5.0 aborts if that happens while it records a launch."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -60,10 +64,10 @@ class RecordedJacobian:
 
     Notes
     -----
-    A lane of the kernel is a pixel or tile. It walks over its recorded lanes, evaluates the material and pushes one unit
-    tangent after the other through the same tape (forward mode), so 3 (1 + K) sums are all that leaves the kernel. Sums
-    run in a fixed order: the result is deterministic. The launch is recorded once (`dr.freeze`) and replayed; the output
-    is an argument because a frozen function would keep the size it had at the recording.
+    A lane of the kernel is a pixel or tile. It walks over its recorded lanes, evaluates the material and pushes one
+    unit tangent after the other through the same tape (forward mode), so 3 (1 + K) sums are all that leaves the kernel.
+    Sums run in a fixed order: the result is deterministic. The launch is recorded once (`dr.freeze`) and replayed; the
+    output is an argument because a frozen function would keep the size it had at the recording.
     """
 
     def __init__(self, model: MaterialModel, free: ParameterTable, fixed: Mapping[str, Value]) -> None:
@@ -79,10 +83,8 @@ class RecordedJacobian:
         # a recording is made anew when the relation of the array sizes changes; that is rare and no cause for a warning
         self._launch = dr.freeze(self._kernel, auto_opaque=False, warn_after=1000)
 
-    def __call__(
-        self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
-    ) -> NDArray[np.float32]:
-        """Mean radiance of the groups, without the constant part, then its derivative by each free value: (g, 3, 1 + K)."""
+    def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
+        """Mean radiance of the groups without the constant part, then its derivatives: (g, 3, 1 + K)."""
         width = self.table.length + 1
         theta = mi.Float(np.asarray(vector, np.float32))
         start, stop, scale = groups.parts
@@ -93,24 +95,31 @@ class RecordedJacobian:
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
-    def _kernel(self, theta, constants, wi, wo, weight, start, stop, scale, out):  # noqa: ANN001, ANN202
+    def _kernel(self, theta, constants, wi, wo, weight, start, stop, scale, out):
         width = self.table.length + 1
 
-        def body(lane, stop, sums):  # noqa: ANN001, ANN202
+        def body(lane, stop, sums):
             columns = self._columns(
                 theta, constants, *(dr.gather(type(a), a, lane) for a in (wi, wo)), dr.gather(mi.Color3f, weight, lane)
             )
-            return lane + 1, stop, [s + c[k] for k in range(3) for s, c in zip(sums[k * width :], columns, strict=False)]
+            return (
+                lane + 1,
+                stop,
+                [s + c[k] for k in range(3) for s, c in zip(sums[k * width :], columns, strict=False)],
+            )
 
         sums = [mi.Float(0.0) for _ in range(3 * width)]
         _, _, sums = dr.while_loop(
-            (mi.UInt32(start), mi.UInt32(stop), sums), lambda lane, stop, sums: lane < stop, body, label="recorded paths"
+            (mi.UInt32(start), mi.UInt32(stop), sums),
+            lambda lane, stop, sums: lane < stop,
+            body,
+            label="recorded paths",
         )
         row = dr.arange(mi.UInt32, dr.width(start)) * (3 * width)
         for column, total in enumerate(sums):
             dr.scatter(out, total * scale, row + column, mode=dr.ReduceMode.Permute)
 
-    def _columns(self, theta, constants, wi, wo, weight) -> list[mi.Color3f]:  # noqa: ANN001
+    def _columns(self, theta, constants, wi, wo, weight) -> list[mi.Color3f]:
         """The weighted BSDF value and its derivative by each free value."""
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         dr.enable_grad(*values)

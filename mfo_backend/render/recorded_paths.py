@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Light paths that do not depend on the material: where they reach the target, from where, and what they carry.
 
-For fixed geometry, camera and light only the BSDF at the first hit changes during a fit. A lane keeps the two directions
-in the shading frame and the weight by which the BSDF value counts in its pixel; an iteration then needs no rays and no
-random numbers, so the objective is deterministic.
+For fixed geometry, camera and light only the BSDF at the first hit changes during a fit. A lane keeps the two
+directions in the shading frame and the weight by which the BSDF value counts in its pixel; an iteration then needs no
+rays and no random numbers, so the objective is deterministic.
 """
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
 
 from __future__ import annotations
 
@@ -26,8 +30,8 @@ BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
 class LaneGroups:
     """Covered pixels that are averaged into one residual each: single pixels or tiles of pixels.
 
-    `member` lists the positions of all groups' pixels in the recording, `first` (g + 1) where each group's begin; `pixels`
-    are their flat indices in the image, `first_lane` the recording's.
+    `member` lists the positions of all groups' pixels in the recording, `first` (g + 1) where each group's begin;
+    `pixels` are their flat indices in the image, `first_lane` the recording's.
     """
 
     member: NDArray[np.int64]
@@ -71,8 +75,8 @@ class LaneGroups:
     def parts(self) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
         """First lane, last lane + 1 and one over the number of pixels, for each lane of the kernel.
 
-        A kernel lane is a group or, where groups are long or few, a part of one: all cores stay busy and neighbours in a
-        vector register take about as many turns.
+        A kernel lane is a group or, where groups are long or few, a part of one: all cores stay busy and neighbours in
+        a vector register take about as many turns.
         """
         start, stop = self._lane_ranges
         parts = self._parts_per_group
@@ -121,8 +125,8 @@ class RecordedPaths:
     coverage
         Share of each covered pixel's filter weight that lies on the target.
     constant
-        What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects seen
-        in covered pixels; 0 elsewhere.
+        What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
+        seen in covered pixels; 0 elsewhere.
     """
 
     wi: mi.Vector3f
@@ -136,6 +140,7 @@ class RecordedPaths:
 
     @property
     def lanes(self) -> int:
+        """Number of recorded lanes."""
         return int(self.first[-1])
 
     @property

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A renderer's scene as recorded paths: which rays to take, what to leave out, and images with Jacobians from them."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
 from __future__ import annotations
 
 import math
@@ -23,11 +27,11 @@ from .recorded_paths import LaneGroups, RecordedPaths
 
 MODELS: dict[str, Callable[[], MaterialModel]] = {"mitsuba_principled": MitsubaPrincipled}
 
-# Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the noise
-# of 64 samples a pixel.
+# Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
+# noise of 64 samples a pixel.
 NEGLIGIBLE_INDIRECT = 0.005
 MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
-DEEPEST = 16  # path length of a scene without a limit; what a longer path carries is below float32 noise for most albedos
+DEEPEST = 16  # path length of a scene without a limit
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,9 @@ class RecordedScene:
 
     def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
         if renderer.model not in MODELS:
-            raise BadInputError(f"Material model {renderer.model!r} has no recorded-path version: use the preset 'paper'.")
+            raise BadInputError(
+                f"Material model {renderer.model!r} has no recorded-path version: use the preset 'paper'."
+            )
         self.renderer = renderer
         self._covered = covered
         self.model = MODELS[renderer.model]()
@@ -76,7 +82,8 @@ class RecordedScene:
     def record(
         self, vector: NDArray[np.float64], *, grid: int | NDArray[np.int64], seed: int, near: bool
     ) -> RecordedPaths:
-        """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is that of the material `vector`.
+        """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
+        that of the material `vector`.
 
         `near` shapes the proposal for that material instead of for any.
         """
@@ -91,7 +98,9 @@ class RecordedScene:
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
-    def evaluator(self, paths: RecordedPaths, groups: LaneGroups) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
+    def evaluator(
+        self, paths: RecordedPaths, groups: LaneGroups
+    ) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
         """The function from a vector to image and Jacobian (g, 3, 1 + K) of the groups, background included."""
         constant = groups.average(paths.constant)
         # 1 + 0.2 K: Mitsuba's principled takes 564 operations for a value and 2098 with 14 derivatives
@@ -126,10 +135,10 @@ def _values_of(renderer: MitsubaRenderer, model: MaterialModel) -> dict[str, Val
         name = next((part for part in parts if part in model.table.names), None)
         if name is None:
             continue
-        if parts[-1] not in (name, "value"):
-            if parts[-1] == "data":
-                raise BadInputError(f"Parameter {name!r} is a texture: recorded paths need one value, use the preset 'paper'.")
-            continue
+        if parts[parts.index(name) + 1 :] not in ([], ["value"]):
+            raise BadInputError(
+                f"Parameter {name!r} is a texture: recorded paths need one value, use the preset 'paper'."
+            )
         numbers = np.array(keys[key], np.float64).ravel()
         size = model.table[name].size
         values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))

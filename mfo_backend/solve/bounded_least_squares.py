@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Levenberg-Marquardt inside a box, on normal equations in float64.
 
-Damping after H. B. Nielsen, "Damping Parameter in Marquardt's Method" (IMM-REP-1999-05); scaling by the largest diagonal
-seen after J. J. More, "The Levenberg-Marquardt Algorithm" (1978). Steps are exact minima of the damped quadratic in the
-box, so a solution on a bound is reached like any other.
+Damping after H. B. Nielsen, "Damping Parameter in Marquardt's Method" (IMM-REP-1999-05); scaling by the largest
+diagonal seen after J. J. More, "The Levenberg-Marquardt Algorithm" (1978). Steps are exact minima of the damped
+quadratic in the box, so a solution on a bound is reached like any other.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ Residuals = Callable[[Vector], NormalEquations]
 class SolveLimits:
     """When to stop.
 
-    `cost_change` is relative, `step` is relative to the width of the box, `cost_floor` is absolute. `damping` is the first
-    one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away.
+    `cost_change` is relative, `step` is relative to the width of the box, `cost_floor` is absolute. `damping` is the
+    first one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away.
     """
 
     evaluations: int = 60
@@ -53,7 +53,7 @@ class SolveLimits:
 
 @dataclass(frozen=True)
 class Solution:
-    """The best point found, its normal equations, and the cost after each evaluation (inf for a rejected non-finite one)."""
+    """The best point found, its normal equations, and the cost of each evaluation (inf where it was not finite)."""
 
     x: Vector
     equations: NormalEquations

@@ -39,8 +39,9 @@ class StageReport:
 class FitResult:
     """The recovered values and how they came about.
 
-    `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how well
-    the picture determines each value, where the preset finds out; `notes` are sentences on what was left out or kept.
+    `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
+    well the picture determines each value, where the preset finds out; `notes` are sentences on what was left out or
+    kept.
     """
 
     status: Status

@@ -46,8 +46,11 @@ def test_equals_the_plugin_of_mitsuba(seed):
     values = random_values(seed)
     wi, wo = directions(100 + seed)
     expected = plugin_value(values, wi, wo)
-    got = np.array(MitsubaPrincipled().evaluate({k: mi.Float(v) if isinstance(v, float) else mi.Color3f(v) for k, v in
-                                                 values.items()}, wi, wo))
+    got = np.array(
+        MitsubaPrincipled().evaluate(
+            {k: mi.Float(v) if isinstance(v, float) else mi.Color3f(v) for k, v in values.items()}, wi, wo
+        )
+    )
     assert expected.max() > 0.1
     # 1e-5 of the value plus 1e-6: float32 with another order of operations
     np.testing.assert_allclose(got, expected, rtol=1e-5, atol=1e-6)
@@ -62,7 +65,9 @@ def test_an_index_of_refraction_replaces_the_specular_level():
     np.testing.assert_allclose(np.array(by_eta), np.array(by_level), rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("absent", ["metallic", "anisotropic", "spec_tint", "clearcoat", "sheen", "sheen_tint", "flatness"])
+@pytest.mark.parametrize(
+    "absent", ["metallic", "anisotropic", "spec_tint", "clearcoat", "sheen", "sheen_tint", "flatness"]
+)
 def test_a_lobe_left_out_equals_a_lobe_of_weight_zero(absent):
     values = {k: mi.Color3f(v) if isinstance(v, list) else mi.Float(v) for k, v in random_values(3).items()}
     wi, wo = directions(5)
@@ -77,7 +82,9 @@ def test_a_lobe_left_out_equals_a_lobe_of_weight_zero(absent):
 def test_derivatives_are_finite_on_the_whole_box_and_equal_differences_inside(name, at):
     model = MitsubaPrincipled()
     parameter = model.table[name]
-    value = {"lower": parameter.lower, "upper": parameter.upper, "inside": 0.5 * (parameter.lower + parameter.upper)}[at]
+    value = {"lower": parameter.lower, "upper": parameter.upper, "inside": 0.5 * (parameter.lower + parameter.upper)}[
+        at
+    ]
     wi, wo = directions(7, 512)
     others = {k: mi.Color3f(v) if isinstance(v, list) else mi.Float(v) for k, v in random_values(1).items()}
 
