@@ -8,21 +8,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..metrics.loss import Loss, make_loss
+from ..metrics.loss import Loss
 from ..metrics.tone_mapping import DisplayView
 from ..render.renderer import Interrupted, Renderer
-from ..types.errors import BadInputError
 from ..types.event import Listener, Started
-from ..types.image import Encoding, Image, Pixels
+from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
-from .region import MaskedLoss, fill_outside
 from .settings import FitSettings
 from .stages import Candidate, run_stages
-
-_VERIFY_STREAM = 0x5EED0000  # far from the seeds users choose, so that no iteration saw these random numbers
+from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 
 
 @dataclass(frozen=True)
@@ -63,10 +59,10 @@ def fit_material(
     """
     began = time.monotonic()
     mask = renderer.target_mask()
-    _check(reference, mask)
+    check_reference(reference, mask)
     names = settings.stage_names(reference.encoding)
     start = Candidate(renderer.start, renderer.image(renderer.start, seed=settings.seed, spp=settings.spp))
-    losses = _losses(names, reference, start.image, mask, settings, display)
+    losses = stage_losses(names, reference, start.image, mask, settings, display)
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     stages = run_stages(renderer, losses, start, settings, listener=listener, should_stop=should_stop, began=began)
     candidates, status = stages.candidates, stages.status
@@ -88,45 +84,18 @@ def fit_material(
         recovered=renderer.table.unpack(candidates[best].vector),
         bounds={p.name: (p.lower, p.upper) for p in renderer.table},
         stages=stages.reports,
-        errors=_errors(reference, candidates[0].image, candidates[best].image, mask, display),
+        errors=picture_errors(reference, candidates[0].image, candidates[best].image, mask, display),
         seconds=time.monotonic() - began,
         passes=renderer.passes,
     )
     return FitOutcome(result, candidates[0].image, candidates[best].image)
 
 
-def _check(reference: Image, mask: NDArray[np.bool_]) -> None:
-    height, width = mask.shape
-    if (reference.height, reference.width) != (height, width):
-        raise BadInputError(
-            f"Reference is {reference.width}x{reference.height} but the scene renders {width}x{height}: "
-            "give a picture of that size or change the render resolution."
-        )
-    if not mask.any():
-        raise BadInputError("The camera does not see the target: move the camera or unhide the object.")
-    if not reference.pixels[mask].any():
-        raise BadInputError("The reference is black where the target is: check the picture and its light.")
-
-
-def _losses(
-    names: Sequence[str],
-    reference: Image,
-    background: Pixels,
-    mask: NDArray[np.bool_],
-    settings: FitSettings,
-    display: DisplayView | None,
-) -> list[Loss]:
-    if settings.region == "image":
-        return [make_loss(name, reference, mask=mask, display=display) for name in names]
-    shown = fill_outside(reference, background, mask, (display or DisplayView()).display)
-    return [MaskedLoss(make_loss(name, shown, mask=mask, display=display), background, mask) for name in names]
-
-
 def _verify(
     renderer: Renderer, candidates: Sequence[Candidate], settings: FitSettings, should_stop: Callable[[], bool]
 ) -> tuple[Candidate, ...] | None:
     """The candidates with pictures under a new seed, or None if the user cancelled meanwhile."""
-    seed = settings.seed ^ _VERIFY_STREAM
+    seed = settings.seed ^ VERIFY_STREAM
     verified = []
     for candidate in candidates:
         if should_stop():
@@ -142,18 +111,3 @@ def _verify(
 def _best(candidates: Sequence[Candidate], loss: Loss) -> int:
     """Index of the least loss; of equal ones the earliest."""
     return int(np.argmin([loss.value(candidate.image) for candidate in candidates]))
-
-
-def _errors(
-    reference: Image, start: Pixels, result: Pixels, mask: NDArray[np.bool_], display: DisplayView | None
-) -> dict[str, tuple[float, float]]:
-    """Mean differences of the whole pictures, [start, result]; HDR-FLIP only for a linear reference."""
-    linear = reference.encoding is Encoding.LINEAR
-    names = {"flip": "flip-ldr", "mse": "mse-hdr" if linear else "mse-ldr"} | (
-        {"hdr_flip": "flip-hdr"} if linear else {}
-    )
-    errors = {}
-    for key, name in names.items():
-        loss = make_loss(name, reference, mask=mask, display=display)
-        errors[key] = (loss.value(start), loss.value(result))
-    return errors

@@ -12,7 +12,7 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding
 
 _CHOICES: dict[str, tuple[str, ...]] = {
-    "preset": ("paper",),
+    "preset": ("paper", "fast", "balanced"),
     "range": ("auto", "hdr", "ldr"),
     "schedule": ("decay", "constant"),
     "region": ("target", "image"),

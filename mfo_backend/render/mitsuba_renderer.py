@@ -46,6 +46,20 @@ class MitsubaRenderer:
         self.passes += 1.0
         return self._render(seed, spp)
 
+    @property
+    def scene(self) -> Any:
+        """The loaded Mitsuba scene; its target shows the values of the last picture, or of `show`."""
+        return self._scene
+
+    @property
+    def shape(self) -> Any:
+        """The target's shape."""
+        return next(s for s in self._scene.shapes() if s.id() == self._shape_id)
+
+    def show(self, vector: Vector) -> None:
+        """Give the target these values without rendering."""
+        self._update(vector, differentiable=False)
+
     def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Pullback]:
         """See `Renderer.image_and_pullback`; the pull-back may be called any number of times, 2 passes each.
 
@@ -80,8 +94,7 @@ class MitsubaRenderer:
         position = mi.Point2f((column + 0.5) / columns, (row + 0.5) / rows)
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
         surface = self._scene.ray_intersect_preliminary(ray)
-        shape = next(s for s in self._scene.shapes() if s.id() == self._shape_id)
-        hit = surface.is_valid() & (surface.shape == mi.ShapePtr(shape))
+        hit = surface.is_valid() & (surface.shape == mi.ShapePtr(self.shape))
         return np.array(hit).reshape(height, _MASK_RAYS, width, _MASK_RAYS).any(axis=(1, 3))
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:

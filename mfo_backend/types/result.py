@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from .certainty import Certainty
 from .parameter import Value
 from .status import Status
 
@@ -38,7 +39,9 @@ class StageReport:
 class FitResult:
     """The recovered values and how they came about.
 
-    `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``.
+    `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
+    well the picture determines each value, where the preset finds out; `notes` are sentences on what was left out or
+    kept.
     """
 
     status: Status
@@ -51,3 +54,5 @@ class FitResult:
     errors: dict[str, tuple[float, float]]
     seconds: float
     passes: float
+    certainty: dict[str, Certainty] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From pixels and their Jacobian to normal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metrics.response import ChannelResponse, Logarithmic, Response
+from ..solve.bounded_least_squares import NormalEquations
+
+Vector = NDArray[np.float64]
+Rows = NDArray[np.float32]
+ImageAndJacobian = Callable[[Vector], Rows]  # (g, 3, 1 + k): the image and its derivatives
+
+
+class Residual(Protocol):
+    """The signed difference of an image (g, 3) to a reference, and its derivative by the image.
+
+    The derivative is (g, 3) when each output depends on its own channel only, else (g, 3 outputs, 3 channels).
+    """
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """Values (g, 3) and derivative."""
+        ...
+
+
+class ResponseResidual:
+    """The difference of a pointwise response to image and reference (g, 3)."""
+
+    def __init__(self, response: Response, reference: Rows) -> None:
+        self._response = response
+        self._target = response.apply(reference)
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values = self._response.apply(image) - self._target
+        if isinstance(self._response, ChannelResponse):
+            return values, self._response.slope(image)
+        unit = np.broadcast_to(np.eye(3, dtype=image.dtype)[:, None, :], (3, *image.shape))
+        return values, np.moveaxis(self._response.push(image, unit), 0, 2)
+
+
+def log_residual(reference: Rows) -> ResponseResidual:
+    """log(1 + 3 L / median): compressive, so highlights and shadows both count; the median lies mid-curve."""
+    lit = reference[reference > 0.0]
+    median = float(np.median(lit)) if lit.size else 1.0
+    return ResponseResidual(Logarithmic(median / 3.0), reference)
+
+
+class RelativeResidual:
+    """(I - R) / (I + 0.1 mean R), the weight held constant in the derivative.
+
+    Unbiased under noise of the reference, where a compressive residual is not: the weight may not come from noisy
+    pixels.
+    """
+
+    def __init__(self, reference: Rows) -> None:
+        self._reference = reference
+        self._floor = np.float32(max(0.1 * float(reference.mean()), 1e-12))
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        weight = 1.0 / (np.maximum(image, 0.0) + self._floor)
+        return (image - self._reference) * weight, weight
+
+
+class CensoredResidual:
+    """Another residual that does not look above `limit` where the reference (g, 3) is clipped there.
+
+    Elsewhere the image stays unclipped: a clipped one would have no slope to come back by.
+    """
+
+    def __init__(self, residual: Residual, reference: Rows, limit: float) -> None:
+        self._residual = residual
+        self._limit = np.float32(limit)
+        self._clipped = reference >= 0.99 * limit
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        over = self._clipped & (image > self._limit)
+        values, slope = self._residual(np.where(over, self._limit, image))
+        return values, slope * np.where(over, np.float32(0.0), np.float32(1.0))
+
+
+def residual_rows(table: Rows, residual: Residual) -> NDArray[np.float64]:
+    """Values and derivatives (g, 3, 1 + k) of the residual from those of the image."""
+    values, slope = residual(table[:, :, 0])
+    if slope.ndim == 2:
+        rows = np.multiply(table, slope[..., None], dtype=np.float64)
+    else:
+        rows = np.matmul(slope, table).astype(np.float64)
+    rows[:, :, 0] = values
+    return rows
+
+
+def normal_equations(evaluate: ImageAndJacobian, residual: Residual) -> Callable[[Vector], NormalEquations]:
+    """The least-squares problem of `residual` over the images of `evaluate`, per residual; sums in float64."""
+
+    def at(x: Vector) -> NormalEquations:
+        rows = residual_rows(evaluate(x), residual)
+        rows = rows.reshape(-1, rows.shape[-1])
+        gram = (rows.T @ rows) / len(rows)
+        return NormalEquations(0.5 * float(gram[0, 0]), gram[1:, 0], gram[1:, 1:])
+
+    return at

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trace a scene once and keep what a change of the target's material cannot alter."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.errors import BadInputError
+from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
+from .proposal import DefensiveProposal
+from .recorded_paths import RecordedPaths
+
+DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
+
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """How many rays a recording takes.
+
+    `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and
+    directional lights take one sample for each of them; the other lights one light sample and one sample of the
+    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
+    leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
+    both axes is recorded, which bounds the memory of large pictures.
+    """
+
+    grid: int | NDArray[np.int64] = 2
+    seed: int = 0
+    depth: int = 2
+    proposal: DefensiveProposal = field(default_factory=DefensiveProposal)
+    hide_emitters: bool = False
+    stride: int = 1
+
+
+@dataclass
+class _Lanes:
+    """One technique's lanes before they are merged."""
+
+    wi: mi.Vector3f
+    wo: mi.Vector3f
+    weight: mi.Color3f
+    position: mi.UInt32
+
+
+def record_paths(
+    scene: mi.Scene,
+    shape: mi.Shape,
+    settings: RecordSettings,
+    *,
+    allow_dark: bool = False,
+) -> RecordedPaths:
+    """Record the light that reaches the first hit on `shape` from the scene's sensor.
+
+    Raises
+    ------
+    BadInputError
+        If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
+    """
+    with dr.suspend_grad():
+        sensor = scene.sensors()[0]
+        width, height = (int(v) for v in sensor.film().crop_size())
+        grid = np.broadcast_to(settings.grid, (height, width))
+        rays = primary_rays(sensor, grid, settings.seed, settings.stride)
+        hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
+        on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+        dr.eval(rays, hit, on_target)
+        index = dr.compress(on_target)
+        if dr.width(index) == 0:
+            raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
+        position = dr.gather(mi.UInt32, rays.pixel_position, index)
+        filter_weight = dr.gather(mi.Float, rays.filter_weight, index)
+        ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
+        hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
+        if shape.bsdf().class_name() == "TwoSided":
+            si = _face_camera(si)
+        dr.eval(si, position, filter_weight)
+        lanes = _delta_lights(scene, si, position, filter_weight)
+        lanes += _sampled_lights(scene, si, position, filter_weight, settings)
+
+        covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
+        constant = _background(scene, rays, on_target, covered, settings)
+        merged = _merge(lanes, rays, covered, coverage, constant)
+        if merged.lanes == 0 and not allow_dark:
+            raise BadInputError("No light reaches the target: add a light or a world background.")
+        return merged
+
+
+def indirect_share(scene: mi.Scene, shape: mi.Shape, depth: int) -> float:
+    """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
+    with dr.suspend_grad():
+        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2), allow_dark=True)
+        everything = record_paths(scene, shape, RecordSettings(grid=1, depth=depth), allow_dark=True)
+        sums = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) for p in (direct, everything)]
+    return (sums[1] - sums[0]) / max(sums[0], 1e-30)
+
+
+def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    """Turn shading frames towards the camera, as the `twosided` plugin does: (x, y, z) -> (x, y, -z)."""
+    back = si.wi.z < 0.0
+    si.sh_frame.n = dr.select(back, -si.sh_frame.n, si.sh_frame.n)
+    si.wi.z = dr.abs(si.wi.z)
+    return si
+
+
+def _delta_lights(scene: mi.Scene, si, position: mi.UInt32, share: mi.Float) -> list[_Lanes]:
+    """One exact sample for each light of no extent."""
+    lanes = []
+    for emitter in scene.emitters():
+        if not mi.has_flag(emitter.flags(), DELTA):
+            continue
+        ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
+        wo = si.to_local(ds.d)
+        lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
+        lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
+        lanes.append(_compress(si.wi, wo, value * share, position, lit))
+    return lanes
+
+
+def _sampled_lights(
+    scene: mi.Scene, si, position: mi.UInt32, share: mi.Float, settings: RecordSettings
+) -> list[_Lanes]:
+    """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
+    everywhere = list(scene.emitters())
+    extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
+    indirect = settings.depth > 2
+    if not extended and not indirect:
+        return []
+    count = dr.width(position)
+    sampler = fresh_sampler(settings.seed + 0x51ED270, count)
+    proposal = settings.proposal
+    front = si.wi.z > 0.0
+    # each extended light is chosen with the same probability
+    choice = 1.0 / max(len(extended), 1)
+    lanes = []
+    if extended:
+        table = mi.UInt32(np.array(extended, np.uint32))
+        pick = dr.minimum(mi.UInt32(sampler.next_1d() * len(extended)), len(extended) - 1)
+        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
+        ds, value = emitter.sample_direction(si, sampler.next_2d(), front)
+        wo = si.to_local(ds.d)
+        lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
+        lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
+        light_density = ds.pdf * choice
+        mis = light_density / (light_density + proposal.density(si.wi, wo))
+        lanes.append(_compress(si.wi, wo, value * (share * mis / choice), position, lit))
+
+    wo = proposal.sample(si.wi, sampler.next_1d(), sampler.next_2d())
+    density = proposal.density(si.wi, wo)
+    valid = front & (wo.z > 0.0) & (density > 0.0)
+    ray = si.spawn_ray(si.to_world(wo))
+    far = scene.ray_intersect(ray, valid)
+    emitter = far.emitter(scene, valid)
+    emission = emitter.eval(far, valid)
+    ds = mi.DirectionSample3f(scene, far, si)
+    light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
+    weight = emission / (light_density + density)
+    if indirect:
+        # a path tracer's radiance along the ray, less what the ray meets directly
+        integrator = mi.load_dict({"type": "path", "max_depth": settings.depth - 1})
+        radiance, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray), None, valid & far.is_valid())
+        weight += dr.maximum(radiance - emission, 0.0) / density
+    weight *= share
+    lanes.append(_compress(si.wi, wo, weight, position, valid & (dr.max(weight) > 0.0)))
+    return lanes
+
+
+def _compress(wi: mi.Vector3f, wo: mi.Vector3f, weight: mi.Color3f, position: mi.UInt32, keep: mi.Bool) -> _Lanes:
+    weight = mi.Color3f(weight)
+    keep = keep & dr.all(dr.isfinite(weight))
+    dr.eval(wi, wo, weight, keep)
+    index = dr.compress(keep)
+    return _Lanes(
+        dr.gather(mi.Vector3f, wi, index),
+        dr.gather(mi.Vector3f, wo, index),
+        dr.gather(mi.Color3f, weight, index),
+        dr.gather(mi.UInt32, position, index),
+    )
+
+
+def _coverage(pixels: int, position: mi.UInt32, share: mi.Float) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    total = np.bincount(np.array(position), np.array(share), pixels)
+    covered = np.flatnonzero(total > 0.0)
+    return covered, total[covered].astype(np.float32)
+
+
+def _background(
+    scene: mi.Scene, rays: PrimaryRays, on_target: mi.Bool, covered: NDArray[np.int64], settings: RecordSettings
+) -> NDArray[np.float32]:
+    """Radiance of camera rays that pass by the target, in covered pixels only."""
+    film = scene.sensors()[0].film()
+    width, height = (int(v) for v in film.crop_size())
+    image = np.zeros((width * height, 3), np.float32)
+    beside = np.zeros(width * height, bool)
+    beside[covered] = True
+    wanted = ~on_target & dr.gather(mi.Bool, mi.Bool(beside), rays.pixel_position)
+    index = dr.compress(wanted)
+    if dr.width(index) > 0:
+        sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
+        integrator = mi.load_dict(
+            {"type": "path", "max_depth": max(settings.depth, 2), "hide_emitters": settings.hide_emitters}
+        )
+        ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
+        radiance, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray))
+        value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
+        dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
+        flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
+        for channel in range(3):
+            image[:, channel] = np.bincount(flat, value[channel].numpy(), width * height)
+    return image.reshape(height, width, 3)
+
+
+def _merge(
+    lanes: list[_Lanes],
+    rays: PrimaryRays,
+    covered: NDArray[np.int64],
+    coverage: NDArray[np.float32],
+    constant: NDArray[np.float32],
+) -> RecordedPaths:
+    """One lane array, ordered by tile and pixel."""
+    position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
+    rank = np.empty(len(position), np.uint32)
+    rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
+    wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
+    begin = 0
+    for part in lanes:
+        end = begin + dr.width(part.position)
+        if end > begin:
+            target = mi.UInt32(rank[begin:end])
+            for merged, value in ((wi, part.wi), (wo, part.wo), (weight, part.weight)):
+                dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
+        begin = end
+    dr.eval(wi, wo, weight)
+    count = np.bincount(position, minlength=len(rays.pixel))[covered]
+    first = np.concatenate([[0], np.cumsum(count)])
+    return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant)

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pixels and their derivatives by all free values, from recorded paths, in one kernel."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.parameter import ParameterTable, Value
+from .recorded_paths import LaneGroups, RecordedPaths
+
+
+class MaterialModel(Protocol):
+    """A reflecting material as a plain Dr.Jit function of its values and two directions."""
+
+    name: str
+    table: ParameterTable
+    scanned: tuple[str, ...]  # values a global start scans: the main lobe's width first
+
+    def values(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """All values `evaluate` needs besides the free ones, from those of a material."""
+        ...
+
+    def evaluate(self, parameters: Mapping[str, Any], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
+        """BSDF times cosine."""
+        ...
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    """Keep Python from freeing NumPy-backed arrays: Dr.Jit 1.5.0 aborts if that happens while it records a launch."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+class RecordedJacobian:
+    """The image of recorded paths as a function of a material's free values.
+
+    Parameters
+    ----------
+    model
+        The material.
+    free
+        The values that vary.
+    fixed
+        All other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
+        value needs no new kernel.
+
+    Notes
+    -----
+    A lane of the kernel is a pixel or tile. It walks over its recorded lanes, evaluates the material and pushes one
+    unit tangent after the other through the same tape (forward mode), so 3 (1 + K) sums are all that leaves the kernel.
+    Sums run in a fixed order: the result is deterministic. The launch is recorded once (`dr.freeze`) and replayed; the
+    output is an argument because a frozen function would keep the size it had at the recording.
+    """
+
+    def __init__(self, model: MaterialModel, free: ParameterTable, fixed: Mapping[str, Value]) -> None:
+        self.model = model
+        self.table = free
+        values = {name: value for name, value in fixed.items() if name not in free.names}
+        self._absent = [name for name, value in values.items() if value == 0.0]
+        self._fixed_table = [model.table[name] for name in values if name not in self._absent]
+        constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
+        self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
+        dr.eval(self._constants)
+        self.evaluations = 0
+        # a recording is made anew when the relation of the array sizes changes; that is rare and no cause for a warning
+        self._launch = dr.freeze(self._kernel, auto_opaque=False, warn_after=1000)
+
+    def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
+        """Mean radiance of the groups without the constant part, then its derivatives: (g, 3, 1 + K)."""
+        width = self.table.length + 1
+        theta = mi.Float(np.asarray(vector, np.float32))
+        start, stop, scale = groups.parts
+        out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
+        dr.eval(theta, out)
+        with _no_garbage_collection():
+            self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, start, stop, scale, out)
+        self.evaluations += 1
+        return groups.add_parts(out.numpy().reshape(-1, 3, width))
+
+    def _kernel(self, theta, constants, wi, wo, weight, start, stop, scale, out):
+        width = self.table.length + 1
+
+        def body(lane, stop, sums):
+            columns = self._columns(
+                theta, constants, *(dr.gather(type(a), a, lane) for a in (wi, wo)), dr.gather(mi.Color3f, weight, lane)
+            )
+            return (
+                lane + 1,
+                stop,
+                [s + c[k] for k in range(3) for s, c in zip(sums[k * width :], columns, strict=False)],
+            )
+
+        sums = [mi.Float(0.0) for _ in range(3 * width)]
+        _, _, sums = dr.while_loop(
+            (mi.UInt32(start), mi.UInt32(stop), sums),
+            lambda lane, stop, sums: lane < stop,
+            body,
+            label="recorded paths",
+        )
+        row = dr.arange(mi.UInt32, dr.width(start)) * (3 * width)
+        for column, total in enumerate(sums):
+            dr.scatter(out, total * scale, row + column, mode=dr.ReduceMode.Permute)
+
+    def _columns(self, theta, constants, wi, wo, weight) -> list[mi.Color3f]:
+        """The weighted BSDF value and its derivative by each free value."""
+        values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
+        dr.enable_grad(*values)
+        result = self.model.evaluate(self._parameters(values, constants), wi, wo) * weight
+        columns = [dr.detach(result)]
+        for value in values:
+            dr.set_grad(value, 1.0)
+            dr.enqueue(dr.ADMode.Forward, value)
+            dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
+            columns.append(mi.Color3f(dr.grad(result)))
+            dr.clear_grad(result)
+        return columns
+
+    def _parameters(self, values: list[mi.Float], constants: mi.Float) -> dict[str, Any]:
+        parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)
+        rest = [dr.gather(mi.Float, constants, mi.UInt32(k)) for k in range(sum(p.size for p in self._fixed_table))]
+        for table, entries in ((self.table, iter(values)), (self._fixed_table, iter(rest))):
+            for p in table:
+                parameters[p.name] = next(entries) if p.size == 1 else mi.Color3f(*(next(entries) for _ in range(3)))
+        return parameters

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Light paths that do not depend on the material: where they reach the target, from where, and what they carry.
+
+For fixed geometry, camera and light only the BSDF at the first hit changes during a fit. A lane keeps the two
+directions in the shading frame and the weight by which the BSDF value counts in its pixel; an iteration then needs no
+rays and no random numbers, so the objective is deterministic.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.image import Pixels
+
+ENOUGH_PARTS = 4096  # kernel lanes that keep the vector units of a few cores busy
+BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
+
+
+@dataclass(frozen=True, eq=False)
+class LaneGroups:
+    """Covered pixels that are averaged into one residual each: single pixels or tiles of pixels.
+
+    `member` lists the positions of all groups' pixels in the recording, `first` (g + 1) where each group's begin;
+    `pixels` are their flat indices in the image, `first_lane` the recording's.
+    """
+
+    member: NDArray[np.int64]
+    first: NDArray[np.int64]
+    pixels: NDArray[np.int64]
+    first_lane: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.first) - 1
+
+    @property
+    def lanes(self) -> int:
+        """Recorded lanes in all groups."""
+        return int(self.lanes_of_groups.sum())
+
+    @property
+    def lanes_of_groups(self) -> NDArray[np.int64]:
+        """Recorded lanes in each group."""
+        start, stop = self._lane_ranges
+        return stop - start
+
+    def take(self, chosen: NDArray[np.int64]) -> LaneGroups:
+        """Only the groups of these numbers."""
+        count = np.diff(self.first)[chosen]
+        first = np.concatenate([[0], np.cumsum(count)])
+        where = np.repeat(self.first[chosen] - first[:-1], count) + np.arange(first[-1])
+        return LaneGroups(self.member[where], first, self.pixels[where], self.first_lane)
+
+    @cached_property
+    def _lane_ranges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First and last + 1 recorded lane of each group; a group's pixels follow each other in the recording."""
+        return self.first_lane[self.member[self.first[:-1]]], self.first_lane[self.member[self.first[1:] - 1] + 1]
+
+    @cached_property
+    def _parts_per_group(self) -> NDArray[np.int64]:
+        start, stop = self._lane_ranges
+        longest = int(np.clip(self.lanes // ENOUGH_PARTS, 16, 256))
+        return np.maximum(-(-(stop - start) // longest), 1)
+
+    @cached_property
+    def parts(self) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
+        """First lane, last lane + 1 and one over the number of pixels, for each lane of the kernel.
+
+        A kernel lane is a group or, where groups are long or few, a part of one: all cores stay busy and neighbours in
+        a vector register take about as many turns.
+        """
+        start, stop = self._lane_ranges
+        parts = self._parts_per_group
+        number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+        begin, length, parts_of = (np.repeat(a, parts) for a in (start, stop - start, parts))
+        bounds = [begin + length * k // parts_of for k in (number, number + 1)]
+        scale = np.repeat(1.0 / np.diff(self.first), parts)
+        arrays = (
+            mi.UInt32(bounds[0].astype(np.uint32)),
+            mi.UInt32(bounds[1].astype(np.uint32)),
+            mi.Float(scale.astype(np.float32)),
+        )
+        dr.eval(arrays)
+        return arrays
+
+    def add_parts(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Sums over the kernel lanes of each group, along the first axis."""
+        if len(values) == len(self):
+            return values
+        return np.add.reduceat(values, np.cumsum(self._parts_per_group) - self._parts_per_group, axis=0)
+
+    def average(self, image: Pixels) -> NDArray[np.float32]:
+        """Mean of `image` (height, width, 3) over the pixels of each group, shape (g, 3)."""
+        flat = image.reshape(-1, image.shape[-1])[self.pixels]
+        count = np.diff(self.first)
+        if len(flat) == len(self):
+            return flat
+        sums = np.add.reduceat(flat.astype(np.float64), self.first[:-1], axis=0)
+        return (sums / count[:, None]).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class RecordedPaths:
+    """All lanes of one recording, ordered by tile, then pixel.
+
+    Attributes
+    ----------
+    wi, wo
+        Unit directions to the camera and to the light in the shading frame.
+    weight
+        Incident radiance x visibility x multiple importance weight / density x pixel filter, linear Rec.709.
+    pixel, tile
+        Flat index of each covered pixel (row * width + column) and the number of its tile.
+    first
+        Lanes of covered pixel p are `first[p]` to `first[p + 1]`; shape (p + 1,).
+    coverage
+        Share of each covered pixel's filter weight that lies on the target.
+    constant
+        What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
+        seen in covered pixels; 0 elsewhere.
+    """
+
+    wi: mi.Vector3f
+    wo: mi.Vector3f
+    weight: mi.Color3f
+    pixel: NDArray[np.int64]
+    tile: NDArray[np.int64]
+    first: NDArray[np.int64]
+    coverage: NDArray[np.float32]
+    constant: Pixels
+
+    @property
+    def lanes(self) -> int:
+        """Number of recorded lanes."""
+        return int(self.first[-1])
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the lanes."""
+        return self.lanes * BYTES_PER_LANE
+
+    @property
+    def interior(self) -> NDArray[np.bool_]:
+        """Covered pixels without background in them."""
+        return self.coverage > 0.999
+
+    def pixel_groups(self, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
+        """One group for each covered pixel, or for those in `keep`."""
+        member = np.arange(len(self.pixel)) if keep is None else np.flatnonzero(keep)
+        return LaneGroups(member, np.arange(len(member) + 1), self.pixel[member], self.first)
+
+    def tile_groups(self, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
+        """One group for each tile with a covered pixel, or for those whose covered pixels are all in `keep`."""
+        begin = np.flatnonzero(np.diff(self.tile, prepend=-1))
+        first = np.append(begin, len(self.tile))
+        groups = LaneGroups(np.arange(len(self.pixel)), first, self.pixel, self.first)
+        return groups if keep is None else groups.take(np.flatnonzero(np.logical_and.reduceat(keep, begin)))

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A renderer's scene as recorded paths: which rays to take, what to leave out, and images with Jacobians from them."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..material.mitsuba_principled import MitsubaPrincipled
+from ..types.errors import BadInputError
+from ..types.parameter import Value
+from .mitsuba_renderer import MitsubaRenderer
+from .proposal import DefensiveProposal
+from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
+from .recorded_jacobian import MaterialModel, RecordedJacobian
+from .recorded_paths import LaneGroups, RecordedPaths
+
+MODELS: dict[str, Callable[[], MaterialModel]] = {"mitsuba_principled": MitsubaPrincipled}
+
+# Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
+# noise of 64 samples a pixel.
+NEGLIGIBLE_INDIRECT = 0.005
+MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
+DEEPEST = 16  # path length of a scene without a limit
+
+
+@dataclass(frozen=True)
+class SceneNeeds:
+    """What a recording of this scene has to hold, and why something is left out (sentences for the report)."""
+
+    sampled: bool
+    depth: int
+    notes: tuple[str, ...]
+
+
+class RecordedScene:
+    """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target.
+
+    Raises
+    ------
+    BadInputError
+        If the material has textures or a lobe that recorded paths cannot hold.
+    """
+
+    def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
+        if renderer.model not in MODELS:
+            raise BadInputError(
+                f"Material model {renderer.model!r} has no recorded-path version: use the preset 'paper'."
+            )
+        self.renderer = renderer
+        self._covered = covered
+        self.model = MODELS[renderer.model]()
+        self._fixed = self.model.values(_values_of(renderer, self.model))
+        self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
+        self._integrator = renderer.scene.integrator()
+        self.needs = self._probe()
+
+    def _probe(self) -> SceneNeeds:
+        """Named rules on what to trace: light kinds, and light over other surfaces by a probe of 1 ray a pixel."""
+        scene = self.renderer.scene
+        sampled = any(not mi.has_flag(e.flags(), DELTA) for e in scene.emitters())
+        limit = int(getattr(self._integrator, "max_depth", 2))
+        depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
+        if depth <= 2:
+            return SceneNeeds(sampled, 2, ())
+        share = indirect_share(scene, self.renderer.shape, depth)
+        if share < NEGLIGIBLE_INDIRECT:
+            note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
+            return SceneNeeds(sampled, 2, (note,))
+        return SceneNeeds(True, depth, ())
+
+    def record(
+        self, vector: NDArray[np.float64], *, grid: int | NDArray[np.int64], seed: int, near: bool
+    ) -> RecordedPaths:
+        """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
+        that of the material `vector`.
+
+        `near` shapes the proposal for that material instead of for any.
+        """
+        self.renderer.show(vector)
+        proposal = DefensiveProposal()
+        if near:
+            proposal = DefensiveProposal.around(float(self._value(vector, self.model.scanned[0])))
+        hide = bool(getattr(self._integrator, "hide_emitters", False))
+        rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
+        stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
+        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride)
+        self.renderer.passes += 1.0
+        return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def evaluator(
+        self, paths: RecordedPaths, groups: LaneGroups
+    ) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
+        """The function from a vector to image and Jacobian (g, 3, 1 + K) of the groups, background included."""
+        constant = groups.average(paths.constant)
+        # 1 + 0.2 K: Mitsuba's principled takes 564 operations for a value and 2098 with 14 derivatives
+        share = len(groups.pixels) / max(len(paths.pixel), 1)
+        cost = share * (1.0 + 0.2 * self.renderer.table.length)
+
+        def at(vector: NDArray[np.float64]) -> NDArray[np.float32]:
+            table = self.jacobian(vector, paths, groups)
+            table[:, :, 0] += constant
+            self.renderer.passes += cost
+            return table
+
+        return at
+
+    def _value(self, vector: NDArray[np.float64], name: str) -> Value:
+        table = self.renderer.table
+        return table.unpack(vector)[name] if name in table.names else self._fixed[name]
+
+
+def _values_of(renderer: MitsubaRenderer, model: MaterialModel) -> dict[str, Value]:
+    """The values of the target's material in the scene.
+
+    Raises
+    ------
+    BadInputError
+        If one of them is a texture.
+    """
+    keys = mi.traverse(renderer.shape.bsdf())
+    values: dict[str, Value] = {}
+    for key in keys.keys():  # noqa: SIM118  the traversed object has no iterator of keys
+        parts = key.split(".")
+        name = next((part for part in parts if part in model.table.names), None)
+        if name is None:
+            continue
+        if parts[parts.index(name) + 1 :] not in ([], ["value"]):
+            raise BadInputError(
+                f"Parameter {name!r} is a texture: recorded paths need one value, use the preset 'paper'."
+            )
+        numbers = np.array(keys[key], np.float64).ravel()
+        size = model.table[name].size
+        values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))
+    dr.eval()
+    return values

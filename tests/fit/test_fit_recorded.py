@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole fits on synthetic truths: the values behind the reference are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.recover_material import recover_material
+from mfo_backend.fit.settings import FitSettings
+from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.render.renderer import load_renderer
+from mfo_backend.types.certainty import Level
+from mfo_backend.types.event import Progress, StageEnd, Started
+from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.status import Status
+from tests.render.scenes import POINT, SKY, write_scene
+
+REDUCED = ["base_color", "roughness", "metallic", "specular"]
+TRUTHS = [
+    {"base_color": (0.7, 0.2, 0.1), "roughness": 0.35, "metallic": 0.2, "specular": 0.6},
+    {"base_color": (0.05, 0.3, 0.6), "roughness": 0.7, "metallic": 0.8, "specular": 0.3},
+    {"base_color": (0.9, 0.9, 0.85), "roughness": 0.2, "metallic": 0.95, "specular": 0.5},
+]
+
+
+def fit(renderer, reference, *, preset="fast", encoding=Encoding.LINEAR, stop=lambda: False, display=None):
+    events = []
+    settings = FitSettings(preset=preset, verify_spp=32)
+    outcome = recover_material(
+        renderer, Image(reference, encoding), settings, display=display, listener=events.append, should_stop=stop
+    )
+    return outcome, events
+
+
+def load(folder, lights, names=REDUCED, **options):
+    return load_renderer(write_scene(folder, lights, **options), "target", model="mitsuba_principled", parameters=names)
+
+
+def relative_rms(a, b, mask):
+    return float(np.sqrt(np.mean((a - b)[mask] ** 2) / np.mean(b[mask] ** 2)))
+
+
+@pytest.mark.parametrize("truth", TRUTHS, ids=["plastic", "metal-blue", "metal-white"])
+def test_point_light_is_solved_from_nothing(tmp_path, truth):
+    renderer = load(tmp_path, POINT, size=32)
+    x = renderer.table.pack(truth)
+    reference = renderer.image(x, seed=5, spp=2048)
+    outcome, events = fit(renderer, reference)
+    mask = renderer.target_mask()
+    result = renderer.image(renderer.table.pack(outcome.result.recovered), seed=5, spp=2048)
+    # the same random numbers: what is left is the error of the values; 2048 samples leave 0.5 % in the highlights of
+    # the reference
+    assert relative_rms(result, reference, mask) < 0.01
+    assert outcome.result.status is Status.CONVERGED
+    assert outcome.result.passes < 300  # a pass is one primal picture
+    assert [type(e) for e in events if isinstance(e, (Started, StageEnd))] == [Started] + [StageEnd] * 3
+    assert any(isinstance(e, Progress) for e in events)
+    assert outcome.result.errors["mse"][1] < outcome.result.errors["mse"][0]
+
+
+def test_sky_and_four_samples_a_pixel_reach_the_noise(tmp_path):
+    renderer = load(tmp_path, SKY + POINT, size=48)
+    x = renderer.table.pack(TRUTHS[0])
+    reference = renderer.image(x, seed=5, spp=4)
+    outcome, _ = fit(renderer, reference)
+    found = renderer.table.pack(outcome.result.recovered)
+    clean, result = (renderer.image(v, seed=9, spp=256) for v in (x, found))
+    mask = renderer.target_mask()
+    noise = relative_rms(reference, clean, mask)
+    assert relative_rms(result, clean, mask) < 0.25 * noise  # 100 tiles of 64 samples average the noise away
+    np.testing.assert_allclose(found[:4], x[:4], atol=0.05)
+
+
+def test_balanced_never_has_more_flip_than_fast(tmp_path):
+    renderer = load(tmp_path, POINT, size=32)
+    reference = renderer.image(renderer.table.pack(TRUTHS[1]), seed=5, spp=64)
+    fast, _ = fit(renderer, reference)
+    balanced, events = fit(renderer, reference, preset="balanced")
+    assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "start", "refine", "itp", "pu21"]
+    assert balanced.result.errors["hdr_flip"][1] <= fast.result.errors["hdr_flip"][1] * 1.0001
+
+
+def test_a_clipped_display_picture_is_fitted_below_its_white(tmp_path):
+    renderer = load(tmp_path, POINT, size=32)
+    x = renderer.table.pack(TRUTHS[2])
+    linear = renderer.image(x, seed=5, spp=256)
+    view = DisplayView(exposure_ev=6.0)
+    mask = renderer.target_mask()
+    shown = view.display(linear)
+    assert 0.002 < (shown[mask] >= 1.0).mean() < 0.5
+    outcome, _ = fit(renderer, shown, encoding=Encoding.SRGB, display=view)
+    result = renderer.image(renderer.table.pack(outcome.result.recovered), seed=5, spp=256)
+    assert np.abs(view.display(result) - shown)[mask].mean() < 0.004  # one step of an 8-bit picture
+
+
+def test_a_value_the_picture_does_not_show_stays_the_users(tmp_path):
+    # a black dielectric: sheen tint has nothing to colour without sheen
+    names = [*REDUCED, "sheen_tint", "sheen"]
+    material = '<float name="sheen" value="0.001"/><float name="sheen_tint" value="0.7"/>'
+    renderer = load(tmp_path, POINT, names, size=32, material=material)
+    truth = renderer.table.pack({**TRUTHS[0], "metallic": 0.999, "sheen": 0.001, "sheen_tint": 0.2})
+    outcome, _ = fit(renderer, renderer.image(truth, seed=5, spp=256))
+    assert outcome.result.certainty["sheen_tint"].level is Level.NOT_VISIBLE
+    assert outcome.result.recovered["sheen_tint"] == pytest.approx(0.7, abs=1e-6)
+    assert "sheen_tint" in outcome.result.notes[-1]
+
+
+def test_the_start_is_kept_where_nothing_is_better(tmp_path):
+    renderer = load(tmp_path, POINT, size=24)
+    reference = renderer.image(renderer.start, seed=5, spp=256)
+    outcome, _ = fit(renderer, reference)
+    assert outcome.result.errors["mse"][1] <= outcome.result.errors["mse"][0] * 1.01
+
+
+def test_cancel_returns_the_best_so_far(tmp_path):
+    renderer = load(tmp_path, POINT, size=24)
+    reference = renderer.image(renderer.table.pack(TRUTHS[0]), seed=5, spp=64)
+    calls = iter(range(10**6))
+    outcome, _ = fit(renderer, reference, stop=lambda: next(calls) > 20)
+    assert outcome.result.status is Status.CANCELLED
+    assert np.isfinite(renderer.table.pack(outcome.result.recovered)).all()

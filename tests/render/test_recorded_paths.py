@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Oracle: Mitsuba's own path tracing of the same scene with many samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.render.renderer import load_renderer
+from mfo_backend.types.errors import BadInputError
+from tests.render.scenes import AREA, FLOOR, POINT, SKY, SUN_AND_SPOT, write_scene
+
+NAMES = ["base_color", "roughness", "metallic", "specular", "clearcoat", "clearcoat_gloss"]
+VALUES = {"base_color": (0.7, 0.3, 0.1), "roughness": 0.4, "metallic": 0.3, "specular": 0.6, "clearcoat": 0.5,
+          "clearcoat_gloss": 0.2}  # fmt: skip
+
+
+def recorded_scene(folder, lights, **options):
+    renderer = load_renderer(
+        write_scene(folder, lights, **options), "target", model="mitsuba_principled", parameters=NAMES
+    )
+    from mfo_backend.render.recorded_scene import RecordedScene  # needs the variant that the renderer sets
+
+    return renderer, RecordedScene(renderer, int(renderer.target_mask().sum()))
+
+
+@pytest.mark.parametrize(
+    ("lights", "depth", "rfilter", "grid", "tolerance"),
+    [
+        # exact lights: what is left is the noise of the path-traced picture and of the footprint's 64 samples
+        (POINT, 2, "box", 8, 0.01),
+        (POINT, 2, "gaussian", 12, 0.02),
+        (SUN_AND_SPOT, 2, "box", 8, 0.01),
+        # sampled lights: two samples a ray, tiles of 16 pixels
+        (SKY, 2, "box", 12, 0.02),
+        (AREA + POINT, 2, "box", 12, 0.02),
+        (AREA + SKY + FLOOR, 5, "box", 12, 0.02),
+    ],
+    ids=["point", "point-gaussian", "sun-spot", "sky", "two-areas-point", "floor-indirect"],
+)
+def test_equals_the_path_traced_picture(tmp_path, lights, depth, rfilter, grid, tolerance):
+    renderer, scene = recorded_scene(tmp_path, lights, depth=depth, rfilter=rfilter)
+    x = renderer.table.pack(VALUES)
+    paths = scene.record(x, grid=grid, seed=3, near=False)
+    groups = paths.tile_groups()
+    got = scene.evaluator(paths, groups)(x)[:, :, 0]
+    expected = groups.average(renderer.image(x, seed=7, spp=1024))
+    error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
+    assert error < tolerance
+    np.testing.assert_allclose(
+        got.sum(axis=0), expected.sum(axis=0), rtol=0.3 * tolerance
+    )  # noise averages out, bias would not
+
+
+def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, AREA + SKY)
+    x = renderer.table.pack({**VALUES, "roughness": 0.12})
+    means = []
+    for near in (False, True):
+        paths = scene.record(x, grid=16, seed=5, near=near)
+        means.append(scene.evaluator(paths, paths.tile_groups())(x)[:, :, 0].mean(axis=0))
+    np.testing.assert_allclose(means[0], means[1], rtol=0.01)  # 256 rays a pixel
+
+
+def test_delta_lights_take_one_lane_for_each_ray_and_36_bytes(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, POINT)
+    paths = scene.record(renderer.start, grid=2, seed=0, near=False)
+    covered = int(renderer.target_mask().sum())
+    assert not scene.needs.sampled
+    assert paths.lanes <= 4 * covered
+    assert paths.bytes == 36 * paths.lanes
+    assert 0.0 < paths.coverage.min() < 1.0
+    assert paths.coverage.max() == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_large_picture_is_recorded_by_tiles(tmp_path, monkeypatch):
+    renderer, scene = recorded_scene(tmp_path, SKY)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_LANES", 4000)
+    paths = scene.record(renderer.start, grid=4, seed=0, near=False)
+    assert paths.lanes <= 4000
+    assert len(np.unique(paths.tile)) >= 2
+
+
+def test_the_same_seed_gives_the_same_recording(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, SKY)
+    first, second = (scene.record(renderer.start, grid=3, seed=11, near=False) for _ in range(2))
+    for name in ("wi", "wo", "weight"):
+        np.testing.assert_array_equal(np.array(getattr(first, name)), np.array(getattr(second, name)))
+
+
+def test_light_over_other_surfaces_is_left_out_where_there_is_none(tmp_path):
+    _, alone = recorded_scene(tmp_path, POINT, depth=6)
+    assert alone.needs.depth == 2
+    assert "left out" in alone.needs.notes[0]
+    _, with_floor = recorded_scene(tmp_path, POINT + FLOOR, depth=6)
+    assert with_floor.needs.depth == 6
+    assert with_floor.needs.notes == ()
+
+
+def test_a_target_out_of_sight_is_refused(tmp_path):
+    hidden = '<transform name="to_world"><translate y="-30"/></transform>'
+    renderer = load_renderer(
+        write_scene(tmp_path, POINT, shape=hidden), "target", model="mitsuba_principled", parameters=NAMES
+    )
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    with pytest.raises(BadInputError, match="No pixel sees the target"):
+        RecordedScene(renderer, 1).record(renderer.start, grid=2, seed=0, near=False)
+
+
+def test_a_texture_is_refused(tmp_path):
+    texture = """<texture type="checkerboard" name="clearcoat"/>"""
+    renderer = load_renderer(
+        write_scene(tmp_path, POINT, material=texture), "target", model="mitsuba_principled", parameters=["roughness"]
+    )
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    with pytest.raises(BadInputError, match="'clearcoat' is a texture"):
+        RecordedScene(renderer, 1)
