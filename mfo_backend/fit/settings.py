@@ -42,6 +42,8 @@ class FitSettings:
     learning_rate, schedule
         Adam's rate as a share of each parameter's range, and whether it stays (``"constant"``, the paper's rules to
         the letter) or falls to a third at each stall (``"decay"``, see `fit.schedule`).
+        Ten random materials and starts (reduced set, point light, 64x64, HDR) ended above the noise floor by a mean
+        FLIP over the object of 0.0005 with decay from 0.05, 0.0019 from 0.02, and 0.031 with a constant 0.05.
     keep_optimizer_state
         Carry Adam's moments and rate into the next stage instead of a new optimisation.
     region
@@ -58,7 +60,7 @@ class FitSettings:
     patience: int = 10
     spp: int = 16
     verify_spp: int = 64
-    learning_rate: float = 0.02
+    learning_rate: float = 0.05
     schedule: str = "decay"
     keep_optimizer_state: bool = False
     region: str = "target"

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..scene.scene_xml import find_target, prepare_for_fit, read_scene, to_text
 from ..types.errors import BadInputError
 from ..types.image import Pixels
-from .material_model import Materials, PreparedMaterial, material_model
+from .material_model import material_model
+from .prepared_material import Materials, PreparedMaterial
 from .renderer import Pullback, Vector
 from .variant import load_variant
 
@@ -89,7 +90,8 @@ class MitsubaRenderer:
         width, height = (int(n) for n in self._sensor.film().crop_size())
         columns, rows = width * _MASK_RAYS, height * _MASK_RAYS
         index = dr.arange(mi.UInt32, columns * rows)
-        position = mi.Point2f((index % columns + 0.5) / columns, (index // columns + 0.5) / rows)
+        column, row = mi.Float(index % columns), mi.Float(index // columns)
+        position = mi.Point2f((column + 0.5) / columns, (row + 0.5) / rows)
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
         surface = self._scene.ray_intersect_preliminary(ray)
         hit = surface.is_valid() & (surface.shape == mi.ShapePtr(self.shape))
@@ -129,10 +131,13 @@ def load_mitsuba_renderer(
     load_variant()
     import mitsuba as mi
 
+    from ..material.principled_plugin import register
+
+    register()
     with _two_threads():
         try:
-            # optimize=False: merging equal objects would take away the ids of shapes and materials
-            scene = mi.load_string(to_text(document), optimize=False)
+            # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
+            scene = mi.load_string(to_text(document), optimize=False, parallel=False)
         except RuntimeError as error:
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():

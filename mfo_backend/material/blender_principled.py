@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Blender's Principled BSDF as Cycles evaluates it: one function of parameter values and two directions.
+
+Directions are unit vectors in the frame tangent, bitangent, normal and point away from the surface: `wi` towards the
+camera, `wo` towards the light. Values are f_r |cos(wo)| in linear Rec.709, without the 1 / n^2 of radiance in glass
+(Cycles leaves it out). Subsurface scattering is replaced by a diffuse lobe. The code is generic over the Dr.Jit float type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import drjit as dr
+
+from .cycles_model import CyclesModel
+from .diffuse import lambert, oren_nayar
+from .fresnel import dielectric
+from .layers import Layers, layer_stack
+from .lobes import ALL_LOBES, Lobes
+from .microfacet import density, reflection, smith_lambda
+
+BLENDER_5_0 = CyclesModel()
+
+
+def blender_principled(
+    parameters: Mapping[str, Any], wi: Any, wo: Any, lobes: Lobes = ALL_LOBES, model: CyclesModel = BLENDER_5_0
+) -> Any:
+    """f_r |cos| for light from `wo` seen from `wi`, RGB.
+
+    Parameters
+    ----------
+    parameters
+        By name of `BLENDER_PRINCIPLED`: numbers, tuples or Dr.Jit arrays; missing ones are Blender's defaults.
+    lobes
+        What to evaluate; parts left out count as absent (`needed_lobes`).
+    model
+        Blender version and distribution (`cycles_model`).
+    """
+    layers = layer_stack(parameters, wi, lobes, model)
+    return evaluate(layers, layers.to_frame(wo))
+
+
+def emitted(
+    parameters: Mapping[str, Any], wi: Any, lobes: Lobes = ALL_LOBES, model: CyclesModel = BLENDER_5_0
+) -> Any:
+    """Radiance emitted towards `wi`, RGB, dimmed by alpha, sheen and coat above the emitting layer."""
+    return layer_stack(parameters, wi, lobes, model).emission
+
+
+def evaluate(layers: Layers, wo: Any) -> Any:
+    """f_r |cos| of the stack for light from `wo` in the frame of the layers."""
+    wi = layers.wi
+    above = wo.z > 0
+    h = dr.normalize(wi + type(wi)(wo.x, wo.y, dr.abs(wo.z)))
+    c = dr.minimum(dr.dot(wi, h), 1)
+    up = type(wo)(wo.x, wo.y, dr.maximum(wo.z, 1e-7))
+    value: Any = 0
+    if layers.metal is not None or layers.specular is not None:
+        fresnel: Any = 0
+        if layers.metal is not None and layers.metal_fresnel is not None:
+            fresnel += layers.metal * layers.metal_fresnel(c)
+        if layers.specular is not None and layers.specular_fresnel is not None:
+            fresnel += layers.specular * layers.specular_fresnel(c)
+        value += fresnel * reflection(wi, up, h, layers.ax, layers.ay)
+    if layers.coat is not None:
+        lobe = reflection(wi, up, h, layers.coat_alpha, layers.coat_alpha)
+        value += layers.coat * (lobe * dielectric(c, layers.coat_ior))
+    if layers.glass is not None and layers.glass_fresnel is not None:
+        lobe = reflection(wi, up, h, layers.glass_alpha, layers.glass_alpha)
+        value += layers.glass * layers.glass_fresnel(c) * lobe
+    if layers.sheen is not None and layers.sheen_shape is not None:
+        value += layers.sheen * layers.sheen_shape.value(up)
+    if layers.diffuse is not None:
+        if layers.diffuse_roughness is None:
+            value += layers.diffuse * lambert(up)
+        else:
+            value += layers.diffuse * oren_nayar(wi, up, layers.base, layers.diffuse_roughness)
+    if layers.subsurface is not None:
+        value += layers.subsurface * lambert(up)
+    value = dr.select(above & (wi.z > 0), value, 0)
+    if layers.glass is not None and layers.glass_fresnel is not None:
+        value += refracted(layers, wo)
+    return value
+
+
+def refraction_normal(layers: Layers, wo: Any) -> tuple[Any, Any, Any]:
+    """Half vector of refraction on the side of the view, (n / length)^2 |wo.h| (the Jacobian dh/dwo), and whether a
+    microfacet of that normal really bends `wi` to `wo`."""
+    n, wi = layers.glass_ior, layers.wi
+    h = -(wi + wo * n)
+    squared = dr.maximum(dr.squared_norm(h), 1e-14)
+    h = h * dr.rsqrt(squared)
+    h = dr.select(h.z < 0, -h, h)
+    possible = (dr.dot(wi, h) > 0) & (dr.dot(wo, h) < 0)
+    return h, dr.square(n) / squared * dr.abs(dr.dot(wo, h)), possible
+
+
+def refracted(layers: Layers, wo: Any) -> Any:
+    """f_r |cos| of light that comes through the surface from `wo` below it.
+
+    Cycles also evaluates pairs that no microfacet can connect, which its own sampling never reaches; so does this.
+    """
+    assert layers.glass_fresnel is not None
+    wi, alpha = layers.wi, layers.glass_alpha
+    h, jacobian, _ = refraction_normal(layers, wo)
+    c = dr.abs(dr.dot(wi, h))
+    g2 = dr.rcp(1 + smith_lambda(wi, alpha, alpha) + smith_lambda(wo, alpha, alpha))
+    lobe = density(h, alpha, alpha) * g2 * c * jacobian / dr.maximum(wi.z, 1e-7)
+    return dr.select((wo.z < 0) & (wi.z > 0), layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe, 0)

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What distinguishes the Principled BSDF of one Blender version from that of another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..types.errors import BadInputError
+
+DISTRIBUTIONS = ("MULTI_GGX", "GGX")
+
+
+@dataclass(frozen=True)
+class CyclesModel:
+    """Switches of the evaluation. The albedo tables are the same in all versions from 4.2 to 5.2.
+
+    Attributes
+    ----------
+    multiple_scattering
+        Energy compensation of metal, specular and glass, the node's "Multiscatter GGX".
+    coat_compensation
+        The coat is compensated and layered by its tabulated albedo (from 4.5), else by the Fresnel term at the view.
+    diffuse_roughness
+        Energy-preserving Oren-Nayar exists (from 4.3); before, the diffuse lobe is Lambert's.
+    film_fourier
+        Thin film through the Fourier transform of the colour matching functions and also on metal (from 5.0); before,
+        through Gaussian fits of them and on dielectrics only.
+    """
+
+    multiple_scattering: bool = True
+    coat_compensation: bool = True
+    diffuse_roughness: bool = True
+    film_fourier: bool = True
+
+
+def cycles_model(version: Sequence[int] = (5, 0), distribution: str = "MULTI_GGX") -> CyclesModel:
+    """The switches of Blender `version` (major, minor, ...), 4.2 or newer.
+
+    Raises
+    ------
+    BadInputError
+        If the version is older than 4.2 or the distribution is unknown.
+    """
+    major_minor = tuple(version)[:2]
+    if major_minor < (4, 2):
+        raise BadInputError(f"Blender {'.'.join(map(str, version))} has another Principled BSDF: use 4.2 or newer.")
+    if distribution not in DISTRIBUTIONS:
+        raise BadInputError(f"Unknown distribution {distribution!r}: choose {' or '.join(DISTRIBUTIONS)}.")
+    return CyclesModel(
+        multiple_scattering=distribution == "MULTI_GGX",
+        coat_compensation=major_minor >= (4, 5),
+        diffuse_roughness=major_minor >= (4, 3),
+        film_fourier=major_minor >= (5, 0),
+    )

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables on the unit interval, square or cube, read with multilinear interpolation in Dr.Jit arrays."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from .clamp import saturate
+
+
+class GridTable:
+    """Values on a regular grid whose first and last nodes lie on 0 and 1 of each axis.
+
+    The corners of a cell are stored side by side, which turns 2^d scattered loads into one or two of four numbers.
+
+    Parameters
+    ----------
+    tables
+        Arrays of equal shape (n0, ...), one to three axes. `choice` in a lookup picks one of them.
+    """
+
+    def __init__(self, *tables: NDArray[Any]) -> None:
+        self.shape = tables[0].shape
+        self.dimensions = len(self.shape)
+        corners = [
+            [table[tuple(slice(c, n - 1 + c) for c, n in zip(corner, self.shape, strict=True))] for table in tables]
+            for corner in itertools.product((0, 1), repeat=self.dimensions)
+        ]
+        self.cells = int(np.prod([n - 1 for n in self.shape]))
+        # (tables * cells, corners): the last axis of the grid varies fastest among the corners
+        self.corners = np.moveaxis(np.asarray(corners, np.float64), 0, -1).reshape(-1, 2**self.dimensions)
+        self._buffers: dict[type, Any] = {}
+
+    def buffer(self, float_type: type) -> Any:
+        """The corners as an evaluated array of `float_type`, made once."""
+        if float_type not in self._buffers:
+            values = float_type(self.corners.astype(np.float64 if dr.type_v(float_type) == dr.VarType.Float64 else "f4").ravel())
+            dr.make_opaque(values)
+            self._buffers[float_type] = values
+        return self._buffers[float_type]
+
+    def __call__(self, *places: Any, choice: Any = None) -> Any:
+        """The value at `places`, one array in [0, 1] per axis; differentiable in them, constant outside."""
+        float_type = type(places[0])
+        index_type = dr.uint32_array_t(float_type)
+        index = index_type(0)
+        fractions = []
+        for place, count in zip(places, self.shape, strict=True):
+            scaled = saturate(place) * (count - 1)
+            node = dr.minimum(index_type(dr.detach(scaled)), count - 2)
+            fractions.append(scaled - float_type(node))
+            index = index * (count - 1) + node
+        if choice is not None:
+            index += choice * self.cells
+        values = self._corners_at(index, float_type)
+        for fraction in reversed(fractions):
+            values = [a + (b - a) * fraction for a, b in zip(values[::2], values[1::2], strict=True)]
+        return values[0]
+
+    def _corners_at(self, index: Any, float_type: type) -> list[Any]:
+        count = 2**self.dimensions
+        width = min(count, 4)
+        suffix = "f64" if dr.type_v(float_type) == dr.VarType.Float64 else "f"
+        packet = getattr(sys.modules[float_type.__module__], f"Array{width}{suffix}")
+        buffer, parts = self.buffer(float_type), count // width
+        packets = [dr.gather(packet, buffer, index * parts + part) for part in range(parts)]
+        return [value for values in packets for value in values]
+
+
+@cache
+def cycles_table(*names: str, plane: int | None = None) -> GridTable:
+    """Tables measured in Cycles (`tools/make_tables.py`): `names` of equal shape, or one `plane` of a stack of them."""
+    archive = resources.files(__package__) / "tables" / "cycles_albedo.npz"
+    with archive.open("rb") as file, np.load(file, allow_pickle=False) as data:
+        return GridTable(*(data[name] if plane is None else data[name][plane] for name in names))
+
+

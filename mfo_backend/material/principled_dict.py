@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sockets of Blender's Principled node as properties of the plugin `blender_principled`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from ..types.errors import BadInputError
+from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
+
+# Sockets without effect here: normals and tangents are the mesh's, subsurface is replaced by a diffuse lobe
+_IGNORED = {"Normal", "Coat Normal", "Tangent", "Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR"}
+_IGNORED |= {"Subsurface Anisotropy", "Thin Wall"}
+
+
+def blender_principled_dict(
+    sockets: Mapping[str, Mapping[str, Any]],
+    *,
+    distribution: str = "MULTI_GGX",
+    version: Sequence[int] = (5, 0),
+    free: Collection[str] = (),
+) -> dict[str, Any]:
+    """Properties for `mi.load_dict` from `{"Base Color": {"value": [r, g, b]}, ...}`, colours linear Rec.709.
+
+    A socket with a `texture` becomes a nested bitmap read without colour conversion. Sockets at their default are left
+    out unless `free`, so that their lobes stay out of the kernel.
+
+    Raises
+    ------
+    BadInputError
+        If a socket is unknown or a value has the wrong number of components.
+    """
+    result: dict[str, Any] = {
+        "type": "blender_principled",
+        "distribution": distribution,
+        "blender_version": ".".join(str(part) for part in tuple(version)[:2]),
+    }
+    if free:
+        result["free"] = ",".join(BLENDER_PRINCIPLED.select(free).names)
+    for socket, content in sockets.items():
+        if socket in _IGNORED:
+            continue
+        if socket not in PARAMETER_OF_SOCKET:
+            raise BadInputError(
+                f"Unknown socket {socket!r} of the Principled BSDF: known are {', '.join(PARAMETER_OF_SOCKET)}."
+            )
+        item = BLENDER_PRINCIPLED[PARAMETER_OF_SOCKET[socket]]
+        if content.get("texture"):
+            result[item.name] = {"type": "bitmap", "filename": str(content["texture"]), "raw": True}
+            continue
+        value = content["value"]
+        components = tuple(float(v) for v in value) if isinstance(value, Sequence) else (float(value),)
+        if len(components) != item.size:
+            raise BadInputError(
+                f"Socket {socket!r} has {len(components)} components, allowed are {item.size}: give "
+                f"{'linear red, green and blue' if item.size == 3 else 'one number'}."
+            )
+        default = item.default if isinstance(item.default, tuple) else (item.default,)
+        if components != default or item.name in free:
+            result[item.name] = {"type": "rgb", "value": list(components)} if item.size == 3 else components[0]
+    return result

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Mitsuba plugin `blender_principled`. Choose the variant, an RGB one with derivatives, before importing this.
+
+Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a nested texture read at the surface point,
+further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will change
+after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later brings
+the lobe back and compiles anew. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
+`<id>.<name>.data`.
+
+A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
+on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
+tells the radiance by view direction. The tangent is that of Mitsuba's shading frame, dp/du of the UV map.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ..types.parameter import Value
+from .blender_principled import evaluate
+from .cycles_model import cycles_model
+from .layers import Layers, layer_stack
+from .lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
+from .lobes import needed_lobes
+from .principled_parameters import BLENDER_PRINCIPLED
+
+PLUGIN_NAME = "blender_principled"
+
+
+class BlenderPrincipled(mi.BSDF):
+    """Blender's Principled BSDF, two-sided, with Cycles' two-directional convention (`wi` is the camera's side)."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        mi.BSDF.__init__(self, props)
+        version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
+        self.model = cycles_model(version, props.get("distribution", "MULTI_GGX"))
+        self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
+        BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
+        self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
+        fixed: dict[str, Value | None] = {}
+        for item in BLENDER_PRINCIPLED:
+            value = props.get(item.name, item.default)
+            if isinstance(value, mi.Texture):
+                fixed[item.name] = None
+            elif item.size == 3:
+                value = mi.Color3f(value)
+                fixed[item.name] = tuple(float(value[k][0]) for k in range(3))
+            else:
+                fixed[item.name] = float(value)
+                value = mi.Float(value)
+            setattr(self, item.name, value)
+        self.fixed = fixed
+        self._choose_lobes()
+        # A lobe that is left out keeps its literal values, which the compiler removes
+        for item in BLENDER_PRINCIPLED:
+            if item.name in self.given or item.name in self.free:
+                dr.make_opaque(getattr(self, item.name))
+
+    def _choose_lobes(self) -> None:
+        self.lobes = needed_lobes(self.fixed, self.free)
+        both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        varying = mi.BSDFFlags.SpatiallyVarying if None in self.fixed.values() else mi.BSDFFlags.Empty
+        components = [mi.BSDFFlags.GlossyReflection | both | varying]
+        if self.lobes.dielectric or self.lobes.sheen:
+            components.append(mi.BSDFFlags.DiffuseReflection | both | varying)
+        if self.lobes.transmission:
+            components.append(mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.NonSymmetric | both | varying)
+        if self.lobes.alpha:
+            components.append(mi.BSDFFlags.Null | both | varying)
+        if self.lobes.anisotropic:
+            components = [flag | mi.BSDFFlags.Anisotropic for flag in components]
+        self.m_components = components
+        flags = components[0]
+        for flag in components[1:]:
+            flags |= flag
+        self.m_flags = flags
+
+    def traverse(self, callback: Any) -> None:
+        """Show every value; those of lobes that are left out too, so that a caller can set them."""
+        for item in BLENDER_PRINCIPLED:
+            callback.put(item.name, getattr(self, item.name), mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: list[str] | None = None) -> None:
+        """Trace the lobes of the changed values from now on, whatever they are."""
+        changed = {key.split(".")[0] for key in keys or ()} & set(BLENDER_PRINCIPLED.names)
+        if changed - self.free:
+            self.free |= changed
+            self._choose_lobes()
+        for name in changed:
+            dr.make_opaque(getattr(self, name))
+
+    def values_at(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> dict[str, Any]:
+        """Parameter values at a surface point, by name."""
+        values: dict[str, Any] = {}
+        for item in BLENDER_PRINCIPLED:
+            value = getattr(self, item.name)
+            if isinstance(value, mi.Texture):
+                value = value.eval_1(si, active) if item.size == 1 else mi.Color3f(value.eval(si, active))
+            values[item.name] = value
+        return values
+
+    def _layers(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Layers:
+        return layer_stack(self.values_at(si, active), si.wi, self.lobes, self.model)
+
+    def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
+        return lobe_choice(layers, with_transparency=self.lobes.alpha)
+
+    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool = True) -> Any:
+        """f_r |cos|, RGB."""
+        layers = self._layers(si, active)
+        return dr.select(active, mi.Color3f(evaluate(layers, layers.to_frame(wo))), 0)
+
+    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool = True) -> Any:
+        """Density of `sample` per solid angle."""
+        layers = self._layers(si, active)
+        return dr.select(active, pdf(layers, self._choice(ctx, layers), layers.to_frame(wo)), 0)
+
+    def eval_pdf(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool = True
+    ) -> tuple[Any, Any]:
+        """`eval` and `pdf`, the layers evaluated once."""
+        layers = self._layers(si, active)
+        local = layers.to_frame(wo)
+        density = pdf(layers, self._choice(ctx, layers), local)
+        return dr.select(active, mi.Color3f(evaluate(layers, local)), 0), dr.select(active, density, 0)
+
+    def sample(
+        self,
+        ctx: mi.BSDFContext,
+        si: mi.SurfaceInteraction3f,
+        sample1: mi.Float,
+        sample2: mi.Point2f,
+        active: mi.Bool = True,
+    ) -> tuple[mi.BSDFSample3f, Any]:
+        """A direction of any lobe and value over density; straight through with probability 1 - alpha."""
+        layers = self._layers(si, active)
+        choice = self._choice(ctx, layers)
+        local, lobe, valid = sample(layers, choice, sample1, sample2)
+        valid &= active
+        density = pdf(layers, choice, local)
+        weight = mi.Color3f(evaluate(layers, local)) / dr.maximum(density, 1e-30)
+        weight = dr.select(density > 0, weight, 0)
+        glass = lobe == NAMES.index("glass")
+        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
+        kind = dr.select(glass & (local.z < 0), mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
+        if choice["transparent"] is not None:
+            through = lobe == NAMES.index("transparent")
+            density = dr.select(through, choice["transparent"], density)
+            weight = dr.select(through, mi.Color3f(layers.transparency / dr.maximum(density, 1e-12)), weight)
+            kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.Null), kind)
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = layers.from_frame(local)
+        bs.pdf = dr.select(valid, density, 0)
+        bs.eta = 1.0  # radiance is not scaled at the interface
+        bs.sampled_type = kind
+        bs.sampled_component = mi.UInt32(0)
+        return bs, dr.select(valid, weight, 0)
+
+    def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+        """Share of light that passes unchanged, 1 - alpha."""
+        alpha = self.values_at(si, active)["alpha"]
+        return dr.select(active, mi.Color3f(1 - alpha), 0) if self.lobes.alpha else mi.Color3f(0)
+
+    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+        """Base colour."""
+        return mi.Color3f(self.values_at(si, active)["base_color"])
+
+    def to_string(self) -> str:
+        """Short description."""
+        shown = ", ".join(f"{name}={getattr(self, name)}" for name in self.given)
+        return f"BlenderPrincipled[{shown}]"
+
+
+def register() -> None:
+    """Make `blender_principled` known to Mitsuba in the current variant."""
+    mi.register_bsdf(PLUGIN_NAME, BlenderPrincipled)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import builtins
+import subprocess
+import sys
+from pathlib import Path
+
+import mitsuba as mi
+import pytest
+
+from mfo_backend.render.variant import load_variant
+from mfo_backend.types.errors import SetupError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_sets_a_variant_with_derivatives_and_keeps_it() -> None:
+    name = load_variant()
+    assert name == mi.variant()
+    assert name.endswith("_ad_rgb")
+    assert load_variant() == name
+    assert load_variant(name) == name
+
+
+def test_names_the_variant_that_does_not_exist() -> None:
+    before = load_variant()
+    with pytest.raises(SetupError, match="llvm_ad_purple is not built into this Mitsuba"):
+        load_variant("llvm_ad_purple")
+    assert mi.variant() == before
+
+
+def test_says_that_mitsuba_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without_mitsuba(name: str, *args, **kwargs):
+        if name == "mitsuba":
+            raise ImportError("No module named 'mitsuba'")
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without_mitsuba)
+    with pytest.raises(SetupError, match=r"install mitsuba 3\.9\.1"):
+        load_variant()
+
+
+def test_layers_above_import_no_renderer() -> None:
+    program = "import sys, mfo_backend.fit.fit_material; print('mitsuba' in sys.modules or 'drjit' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.strip() == "False"
