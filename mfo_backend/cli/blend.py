@@ -5,21 +5,22 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..fit.settings import FitSettings
 from ..job.fit_scene import fit_scene
-from ..job.progress import EventWriter
-from ..job.run_job import run_job
-from ..job.stop import StopSignal
+from ..job.protocol_stream import take_stdout
 from ..types.errors import BadInputError, MfoError, SetupError
 from ..types.status import Status
 from .blender_host import BlenderHost, find_blender_host
 from .fit_options import add_fit_options, fit_from_options
+from .result_text import result_text
+from .run import leave
+from .run_folder import run_folder
 
 _ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
@@ -56,21 +57,24 @@ def run(arguments: argparse.Namespace) -> int:
     """Export, fit and apply; the exit code is that of the fit."""
     if arguments.save_as and not arguments.apply:
         raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
+    options = fit_from_options(arguments)
+    FitSettings.from_request(options)  # a wrong option is known before Blender is started
     host = find_blender_host(arguments.blender)
+    stream = take_stdout() if arguments.json else None
     job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
-    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, fit_from_options(arguments))
-    saved = None
+    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, options)
+    saved, notes = None, fit.notes
     if arguments.apply:
         saved = arguments.save_as or arguments.file
-        applied = apply_result(host, arguments.file, fit.job, saved)
-        fit = BlendFit(fit.job, fit.result, (*fit.notes, *applied))
-    if arguments.json:
-        answer = {**fit.result, "notes": fit.notes, "job": str(fit.job), "saved": str(saved) if saved else None}
-        print(json.dumps(answer, ensure_ascii=False))
+        notes += apply_result(host, arguments.file, fit.job, saved)
+    if stream is not None:
+        answer = {**fit.result, "notes": notes, "folder": str(fit.job), "saved": str(saved) if saved else None}
+        print(json.dumps(answer, ensure_ascii=False), file=stream)
+        stream.close()
     else:
-        for line in (*fit.notes, *summary(fit), *([f"saved {saved}"] if saved else [])):
-            print(line)
-    return Status(fit.result["status"]).exit_code
+        lines = [*(f"note: {note}" for note in notes), result_text(fit.result), f"Report: {fit.job / 'index.html'}"]
+        print("\n".join([*lines, *([f"Saved: {saved}"] if saved else [])]))
+    return leave(Status(fit.result["status"]))
 
 
 def fit_blend(
@@ -86,33 +90,13 @@ def fit_blend(
     exported = host.call(
         "export", blend, "--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)
     )
-    events = EventWriter(bar=sys.stderr.isatty())
-    stop = StopSignal(cancel_file=job / "cancel")
-    with stop.watching():
-        status = run_job(job, events, stop, fitter=fit_scene)
-    result = job / "result.json"
-    if not result.is_file():
-        raise _ERRORS.get(status, MfoError)(events.last_sentence)
-    return BlendFit(job, json.loads(result.read_text("utf-8")), tuple(exported.get("notes", ())))
+    done = run_folder(job, fit_scene)
+    if done.result is None:
+        raise _ERRORS.get(done.status, MfoError)(done.sentence)
+    return BlendFit(job, done.result, tuple(exported.get("notes", ())))
 
 
 def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path) -> tuple[str, ...]:
     """Save `blend` with the recovered values on its material; returns what was skipped, in sentences."""
     applied = host.call("apply", blend, "--job", job, "--save-as", save_as)
     return tuple(applied.get("notes", ()))
-
-
-def summary(fit: BlendFit) -> list[str]:
-    """Lines for the terminal: outcome, errors, values and where the report is."""
-    result = fit.result
-    lines = [result["sentence"]]
-    lines += [f"{name}: {start:.4f} -> {end:.4f}" for name, (start, end) in result["errors"].items()]
-    for name, value in result["recovered"].items():
-        lines.append(f"  {name} = {_shown(value)}  (was {_shown(result['initial'][name])})")
-    lines.append(f"{result['seconds']:.1f} s, report: {fit.job / 'index.html'}")
-    return lines
-
-
-def _shown(value: Any) -> str:
-    """A scalar or colour with three digits."""
-    return ", ".join(f"{v:.3f}" for v in value) if isinstance(value, (list, tuple)) else f"{value:.3f}"

@@ -9,12 +9,12 @@ from typing import Any
 
 def result_text(result: Mapping[str, Any]) -> str:
     """Values and image differences before and after, from the content of result.json."""
-    rows = [("", "start", "result")]
-    rows += [
-        (name, _numbers(result["initial"].get(name)), _numbers(value)) for name, value in result["recovered"].items()
-    ]
-    rows += [(f"mean {name}", *map(_numbers, pair)) for name, pair in result["errors"].items()]
-    widths = [max(len(row[column]) for row in rows) for column in range(3)]
+    rows = [("", "start", "result", "")]
+    for name, value in result["recovered"].items():
+        level = result.get("certainty", {}).get(name, {}).get("level", "")
+        rows.append((name, _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " ")))
+    rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     return "\n".join(lines)
 

@@ -27,7 +27,8 @@ class FitSettings:
     Attributes
     ----------
     model, parameters
-        Material model, and the names to fit, ``"all"`` or ``"reduced"``.
+        Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
+        holds Blender's socket values, else Mitsuba's.
     losses
         Stages in order, ``"mse"`` or ``"flip"``. The paper's method is the pair; one alone is its comparison.
     range
@@ -50,7 +51,7 @@ class FitSettings:
         Pixels the losses look at: those that see the target, or all.
     """
 
-    model: str = "mitsuba_principled"
+    model: str = "auto"
     preset: str = "paper"
     parameters: str | tuple[str, ...] = "all"
     losses: tuple[str, ...] = ("mse", "flip")

@@ -66,24 +66,30 @@ def fit_scene(
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit, so the imports below stay here
-    from ..fit.fit_material import fit_material
+    from ..fit.recover_material import recover_material
     from ..render.interruptible import InterruptibleRenderer, NativeThread
-    from ..render.renderer import load_renderer
+    from ..render.renderer import Renderer, load_renderer
     from ..render.variant import load_variant
 
-    thread = NativeThread(should_stop)
-    variant = thread.call(load_variant)
-    renderer = thread.call(
-        lambda: load_renderer(
+    def load() -> tuple[str, Renderer]:
+        variant = load_variant()
+        return variant, load_renderer(
             folder.root / request.scene,
             request.target.shape_id,
             model=request.fit.model,
             parameters=request.fit.parameters,
             materials=_materials(folder, request),
         )
+
+    if request.fit.preset == "paper":
+        thread = NativeThread(should_stop)
+        variant, renderer = thread.call(load)
+        renderer = InterruptibleRenderer(renderer, thread)
+    else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
+        variant, renderer = load()
+    outcome = recover_material(
+        renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
     )
-    renderer = InterruptibleRenderer(renderer, thread)
-    outcome = fit_material(renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop)
     return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
 
 

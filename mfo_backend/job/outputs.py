@@ -52,7 +52,7 @@ def write_outputs(
         subtitle=_subtitle(request),
         result=outcome.result,
         pictures=pictures,
-        notes=notes,
+        notes=(*notes, *outcome.result.notes),
         versions=versions(outcome.variant),
     )
     write_atomically(folder.report, report_html(report).encode("utf-8"))

@@ -43,6 +43,7 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "recovered": result.recovered,
         "bounds": result.bounds,
         "errors": result.errors,
+        "certainty": {n: {"sd": c.sd, "level": c.level.value} for n, c in result.certainty.items()},
         "stages": [
             {
                 "name": stage.name,
@@ -59,7 +60,7 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         ],
         "seconds": result.seconds,
         "passes": result.passes,
-        "notes": list(notes),
+        "notes": [*notes, *result.notes],
         "versions": versions(variant),
     }
 

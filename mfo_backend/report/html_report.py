@@ -106,7 +106,10 @@ def _pictures(pictures: Mapping[str, bytes]) -> str:
 
 
 def _value_table(result: FitResult) -> str:
-    table = _table(("Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"), value_rows(result))
+    heads = ["Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"]
+    if result.certainty:
+        heads.append("How sure")
+    table = _table(heads, value_rows(result))
     return f'{table}<p class="soft">Colours are linear Rec.709.</p>' if table else ""
 
 

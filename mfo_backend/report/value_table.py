@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from ..metrics.colour import srgb_from_linear
+from ..types.certainty import Certainty, Level
 from ..types.parameter import Value
 from ..types.result import FitResult
 
@@ -35,7 +36,17 @@ def _row(name: str, result: FitResult) -> str:
     cells += [f"<td>{_shown(value)}</td>" for value in (initial, recovered)]
     cells.append(f'<td class="bounds">{bounds[0]:.4g} to {bounds[1]:.4g}</td>' if bounds else "<td></td>")
     cells.append(f'<td class="where">{_track(initial, recovered, bounds)}</td>')
+    if result.certainty:
+        cells.append(f"<td>{_certainty(result.certainty.get(name))}</td>")
     return f"<tr>{''.join(cells)}</tr>"
+
+
+def _certainty(certainty: Certainty | None) -> str:
+    """The level in words with the standard deviation, where that says something."""
+    if certainty is None:
+        return ""
+    spread = f" ±{max(certainty.sd):.2g}" if certainty.level is not Level.NOT_VISIBLE else ""
+    return certainty.level.value.replace("_", " ") + spread
 
 
 def _shown(value: Value | None) -> str:
