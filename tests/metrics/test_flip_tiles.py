@@ -70,6 +70,18 @@ def test_only_tiles_that_see_a_difference_are_computed(work):
     assert work["features"] == 2 + 6 + 5  # the reference's side of the first tile was there already
 
 
+@pytest.mark.usefixtures("small_tiles")
+def test_only_tiles_with_weight_are_pulled_back(work):
+    reference, test = images()
+    comparison = FlipReference(planes_of(reference)).compare(planes_of(test))
+    weight = np.zeros(SIZE)
+    weight[40, 10] = 1
+    gradient = comparison.pullback(weight)
+    assert work["pullback"] == 1
+    reached = np.argwhere(np.abs(gradient).max(axis=0) > 0)
+    assert (np.abs(reached - [40, 10]).max(axis=0) == 10).all()  # the low-pass of Cz reaches ten pixels
+
+
 def test_the_references_side_is_computed_once(work):
     reference, test = images()
     flip = HdrFlip(reference, exposures=ExposureRange(-3, 1, 5))
