@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.metrics import flip_reference
+from mfo_backend.metrics import flip_reference, hdr_flip
 from mfo_backend.metrics.exposure_range import ExposureRange
 from mfo_backend.metrics.flip import planes_of
 from mfo_backend.metrics.flip_reference import FlipReference
@@ -88,6 +88,18 @@ def test_the_references_side_is_computed_once(work):
     for scale in (1.0, 0.9, 0.8):
         flip.map(test * scale)
     assert work["features"] == 5 + 3 * 5
+
+
+def test_large_pictures_are_computed_again_instead_of_kept(monkeypatch, work):
+    reference, test = images()
+    flip = HdrFlip(reference, exposures=ExposureRange(-3, 1, 5))
+    error, gradient = flip.map_and_pullback(test, 1.0)
+    kept = work["features"]
+    monkeypatch.setattr(hdr_flip, "_KEPT", 0)
+    again = flip.map_and_pullback(test, 1.0)
+    assert work["features"] == kept + 5 + work["pullback"] // 2
+    np.testing.assert_array_equal(again[0], error)
+    np.testing.assert_array_equal(again[1], gradient)
 
 
 def test_exposures_that_cannot_win_or_do_not_win_cost_no_gradient(work):
