@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.metrics import flip_reference
+from mfo_backend.metrics import flip_reference, hdr_flip
 from mfo_backend.metrics.exposure_range import ExposureRange
 from mfo_backend.metrics.flip import planes_of
 from mfo_backend.metrics.flip_reference import FlipReference
@@ -70,12 +70,36 @@ def test_only_tiles_that_see_a_difference_are_computed(work):
     assert work["features"] == 2 + 6 + 5  # the reference's side of the first tile was there already
 
 
+@pytest.mark.usefixtures("small_tiles")
+def test_only_tiles_with_weight_are_pulled_back(work):
+    reference, test = images()
+    comparison = FlipReference(planes_of(reference)).compare(planes_of(test))
+    weight = np.zeros(SIZE)
+    weight[40, 10] = 1
+    gradient = comparison.pullback(weight)
+    assert work["pullback"] == 1
+    reached = np.argwhere(np.abs(gradient).max(axis=0) > 0)
+    assert (np.abs(reached - [40, 10]).max(axis=0) == 10).all()  # the low-pass of Cz reaches ten pixels
+
+
 def test_the_references_side_is_computed_once(work):
     reference, test = images()
     flip = HdrFlip(reference, exposures=ExposureRange(-3, 1, 5))
     for scale in (1.0, 0.9, 0.8):
         flip.map(test * scale)
     assert work["features"] == 5 + 3 * 5
+
+
+def test_large_pictures_are_computed_again_instead_of_kept(monkeypatch, work):
+    reference, test = images()
+    flip = HdrFlip(reference, exposures=ExposureRange(-3, 1, 5))
+    error, gradient = flip.map_and_pullback(test, 1.0)
+    kept = work["features"]
+    monkeypatch.setattr(hdr_flip, "_KEPT", 0)
+    again = flip.map_and_pullback(test, 1.0)
+    assert work["features"] == kept + 5 + work["pullback"] // 2
+    np.testing.assert_array_equal(again[0], error)
+    np.testing.assert_array_equal(again[1], gradient)
 
 
 def test_exposures_that_cannot_win_or_do_not_win_cost_no_gradient(work):
