@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..versions import cycles_settings
 from .findings import Findings
-from .mesh_arrays import CornerMesh, joined, world_mesh
 from .material_model import Material
+from .mesh_arrays import CornerMesh, joined, world_mesh
 from .ply_file import TriangleMesh
 from .read_camera import read_camera, read_pixel_filter
 from .read_light import read_light

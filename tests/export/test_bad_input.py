@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 import pytest
+
 from blender_addon.export.job import ExportError, check_export, export_job
 
 from .scenes import add_camera, add_mesh, add_quad, diffuse_material, new_material, world_color
@@ -105,9 +106,7 @@ def test_refused_with_one_sentence(spoil: Any, scene: Any, tmp_path: Path) -> No
 def test_object_that_is_no_mesh(scene: Any) -> None:
     item = bpy.data.objects.new("Handle", None)
     bpy.context.collection.objects.link(item)
-    assert check_export(bpy.context, item)[0] == [
-        "The object to fit is 'Handle' (Empty): select an object with faces."
-    ]
+    assert check_export(bpy.context, item)[0] == ["The object to fit is 'Handle' (Empty): select an object with faces."]
     assert check_export(bpy.context, None)[0] == ["The object to fit is nothing: select an object with faces."]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+
 from blender_addon.export.job import check_export
 
 from .scenes import add_camera, add_light, add_quad, diffuse_material, emission_material, new_material, world_color
@@ -39,7 +40,9 @@ def read_exr(path: Any) -> np.ndarray:
 
 def test_every_socket_is_in_the_request(scene: Any, export: Any) -> None:
     world_color(scene, 1.0)
-    material = new_material("Glaze", Base_Color=(0.1, 0.2, 0.3), Roughness=0.25, Coat_Weight=0.5, Thin_Film_Thickness=300.0)
+    material = new_material(
+        "Glaze", Base_Color=(0.1, 0.2, 0.3), Roughness=0.25, Coat_Weight=0.5, Thin_Film_Thickness=300.0
+    )
     principled(material).distribution = "GGX"
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(add_quad("Target", 1.0, 0.0, material), fit={"preset": "paper", "parameters": "reduced"})
@@ -106,7 +109,9 @@ def test_rows_of_a_picture_are_top_first(scene: Any, export: Any) -> None:
     pixels = np.zeros((2, 4, 4), np.float32)
     pixels[1, 2] = (3.0, 2.0, 1.0, 1.0)  # Blender's second row is the upper one
     image.pixels.foreach_set(pixels.ravel())
-    material.node_tree.links.new(image_node(material, image).outputs["Color"], principled(material).inputs["Base Color"])
+    material.node_tree.links.new(
+        image_node(material, image).outputs["Color"], principled(material).inputs["Base Color"]
+    )
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(add_quad("Target", 1.0, 0.0, material))
     path = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]["texture"]
@@ -162,8 +167,8 @@ def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycle
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(target)
     assert [note for note in report.notes if "toon" in note] == [
-        "Material 'toon' of 'Quad 3' starts with the node 'Toon BSDF' (Toon BSDF), which is not exported; it is shown as "
-        "grey."
+        "Material 'toon' of 'Quad 3' starts with the node 'Toon BSDF' (Toon BSDF), which is not exported; it is shown "
+        "as grey."
     ]
     expected, found = render_cycles(), render_mitsuba(report, 256)
     for index in range(3):

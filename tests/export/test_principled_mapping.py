@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from blender_addon.export.principled_mapping import (
     _ggx_albedos,
     effective_ior,
@@ -58,8 +59,8 @@ def test_everything_stays_in_range() -> None:
     generator = np.random.default_rng(5)
     for _ in range(200):
         values = {
-            "base_color": generator.random(3), "metallic": generator.random(), "roughness": 0.04 + 0.96 * generator.random(),
-            "eta": 1.01 + 1.5 * generator.random(), "spec_trans": generator.random(), "clearcoat": generator.random(),
+            "base_color": generator.random(3), "metallic": generator.random(),
+            "roughness": 0.04 + 0.96 * generator.random(), "eta": 1.01 + 1.5 * generator.random(), "spec_trans": generator.random(), "clearcoat": generator.random(),
             "clearcoat_gloss": generator.random(), "sheen": generator.random(), "spec_tint": generator.random(),
             "sheen_tint": generator.random(), "anisotropic": generator.random(),
         }  # fmt: skip

@@ -10,11 +10,23 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+
 from blender_addon.export.job import ExportError, check_export, export_job
 
 from .scenes import add_camera, add_light, add_quad, diffuse_material, new_material, world_color
 
-SKIPPED = {"rna_type", "original", "is_evaluated", "session_uid", "tag", "preview", "bound_box", "bindcode", "pixels"}
+SKIPPED = {
+    "rna_type",
+    "original",
+    "is_evaluated",
+    "session_uid",
+    "tag",
+    "preview",
+    "bound_box",
+    "bindcode",
+    "pixels",
+    "use_nodes",
+}
 
 
 def describe(value: Any, depth: int = 0) -> Any:
@@ -112,6 +124,7 @@ def test_nothing_changes(mode: str, target: Any, tmp_path: Path) -> None:
 def test_nothing_changes_when_it_is_refused(target: Any, tmp_path: Path) -> None:
     bpy.context.scene.world = None
     bpy.data.lights[0].energy = 0.0
+    bpy.context.view_layer.update()
     before = fingerprint()
     with pytest.raises(ExportError, match="no light"):
         export_job(bpy.context, target, tmp_path / "job", reference=None, fit={})
