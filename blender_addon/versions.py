@@ -68,6 +68,21 @@ def node_tree_of(owner: Any) -> bpy.types.NodeTree | None:
     return tree if owner.use_nodes else None
 
 
+def has_compositor(scene: bpy.types.Scene) -> bool:
+    """Whether rendered pictures pass through compositing nodes (a node group from Blender 5.0 on)."""
+    if not scene.render.use_compositing:
+        return False
+    if hasattr(scene, "compositing_node_group"):
+        return scene.compositing_node_group is not None
+    return bool(scene.use_nodes and scene.node_tree is not None)
+
+
+def overrides_of(view_layer: bpy.types.ViewLayer) -> list[str]:
+    """Return the names of the material and (from Blender 4.3 on) world that replace all others in `view_layer`."""
+    owners = (getattr(view_layer, name, None) for name in ("material_override", "world_override"))
+    return [owner.name for owner in owners if owner is not None]
+
+
 def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Return the shading normal of every face corner, custom normals included, (corners, 3)."""
     normals = np.empty(len(mesh.loops) * 3, dtype=np.float32)

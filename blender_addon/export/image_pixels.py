@@ -34,7 +34,7 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
         raise UnreadableImageError(f"is a {image.source.lower()}; only single pictures are supported")
     width, height = image.size
     if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)):
-        raise UnreadableImageError("has no pixels; is its file missing?")
+        raise UnreadableImageError("has no pixels (is its file missing?)")
     channels = image.channels
     raw = np.empty(width * height * channels, dtype=np.float32)
     image.pixels.foreach_get(raw)

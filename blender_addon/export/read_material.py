@@ -106,13 +106,13 @@ def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings
     except UnsupportedNodeError as problem:
         if is_target:
             findings.error(
-                f"{socket.name} of material '{material}' is linked to {problem}, which is not supported: unlink it or "
-                "use an image texture."
+                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported: unlink it "
+                "or use an image texture."
             )
         else:
             findings.note(
-                f"{socket.name} of material '{material}' is linked to {problem}, which is not supported; the socket's "
-                "own value is used."
+                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported; the "
+                "socket's own value is used."
             )
         return Socket(plain_value(socket), True)
 

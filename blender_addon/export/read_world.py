@@ -35,7 +35,7 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> W
         return _background(node, exposure)
     except UnsupportedNodeError as problem:
         findings.error(
-            f"World '{world.name}' uses {problem}, which is not supported: link one Background with a colour or an "
+            f"World '{world.name}' uses {problem}, which cannot be exported: link one Background with a colour or an "
             "Environment Texture."
         )
         return BLACK
@@ -69,7 +69,7 @@ def _environment(node: bpy.types.Node) -> tuple[NDArray[np.float32], NDArray[np.
     try:
         pixels = np.ascontiguousarray(read_pixels(node.image)[:, :, :3])
     except UnreadableImageError as problem:
-        raise UnsupportedNodeError(f"the image '{node.image.name}', which {problem}") from None
+        raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     source = source_of(node.inputs["Vector"])
     matrix = np.eye(4)
     if source is not None and source.node.bl_idname == "ShaderNodeMapping":

@@ -124,8 +124,8 @@ def _evaluate(output: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
         gamma = _constant(node.inputs["Gamma"])
         return _apply(_input(node.inputs["Color"]), lambda a: np.where(a > 0.0, np.maximum(a, 0.0) ** gamma, a))
     if kind == "ShaderNodeInvert":
-        factor = _constant(node.inputs["Fac"])
-        return _apply(_input(node.inputs["Color"]), lambda a: a + factor * (1.0 - 2.0 * a))
+        factor = _constant(node.inputs[0])
+        return _apply(_input(node.inputs[1]), lambda a: a + factor * (1.0 - 2.0 * a))
     if kind == "ShaderNodeRGBToBW":
         return _apply(_input(node.inputs[0]), lambda a: (a @ LUMINANCE)[..., None] if a.shape[-1] == 3 else a)
     if kind in ("ShaderNodeSeparateColor", "ShaderNodeSeparateRGB"):
@@ -182,7 +182,7 @@ def _image(node: bpy.types.Node, output: str) -> Texture:
     try:
         pixels = read_pixels(node.image)
     except UnreadableImageError as problem:
-        raise UnsupportedNodeError(f"the image '{node.image.name}', which {problem}") from None
+        raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     chosen = pixels[:, :, 3:4] if output == "Alpha" else pixels[:, :, :3]
     return Texture(chosen, _uv_matrix(node), WRAPS[node.extension], FILTERS[node.interpolation])
 

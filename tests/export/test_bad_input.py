@@ -72,6 +72,10 @@ def no_faces(scene: Any, target: Any) -> None:
     target.data.clear_geometry()
 
 
+def override(scene: Any, target: Any) -> None:
+    bpy.context.view_layer.material_override = diffuse_material("Clay", (1, 1, 1))
+
+
 CASES: dict[Callable[[Any, Any], None], str] = {
     no_camera: "The scene has no camera: add one and make it the active camera.",
     panorama: "Camera 'Camera' is of type Pano: make it Perspective or Orthographic.",
@@ -86,6 +90,7 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     covered: "The camera does not see 'Target': it is hidden behind 'Lid'.",
     hidden: "Object 'Target' is hidden in the render: show it.",
     dark: "The scene has no light: add a light or give the world a colour.",
+    override: "View layer 'ViewLayer' replaces materials or the world by 'Clay': remove the override.",
     no_faces: "No face of 'Target' uses its active material slot 1: choose another.",
 }
 
