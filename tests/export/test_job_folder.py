@@ -34,7 +34,7 @@ def test_appears_whole(tmp_path: Path) -> None:
 
 def test_failure_leaves_nothing(tmp_path: Path) -> None:
     def stop() -> None:
-        with new_job_folder(tmp_path / "job") as partial:
+        with new_job_folder(tmp_path / "new" / "er" / "job") as partial:
             fill(partial)
             raise RuntimeError("stop")
 
