@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-import mathutils
+import mathutils  # pyright: ignore[reportMissingImports]
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,15 +56,31 @@ def active_output(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
 def node_tree_of(owner: Any) -> bpy.types.NodeTree | None:
     """Return the shader nodes of a material, world or light; None when it does not use them.
 
-    From Blender 5.0 on `use_nodes` is deprecated and always true for materials and worlds; reading it there is a
-    warning, so it is asked for only where it means something.
+    `use_nodes` is deprecated, always true and a warning to read: for materials and worlds from Blender 5.0 on, for
+    lights from 5.2 on.
     """
     tree = getattr(owner, "node_tree", None)
     if tree is None:
         return None
-    if isinstance(owner, bpy.types.Light) or bpy.app.version < (5, 0, 0):
-        return tree if owner.use_nodes else None
-    return tree
+    switch = owner.bl_rna.properties.get("use_nodes")
+    if switch is None or getattr(switch, "is_deprecated", False):
+        return tree
+    return tree if owner.use_nodes else None
+
+
+def has_compositor(scene: bpy.types.Scene) -> bool:
+    """Whether rendered pictures pass through compositing nodes (a node group from Blender 5.0 on)."""
+    if not scene.render.use_compositing:
+        return False
+    if hasattr(scene, "compositing_node_group"):
+        return scene.compositing_node_group is not None
+    return bool(scene.use_nodes and scene.node_tree is not None)
+
+
+def overrides_of(view_layer: bpy.types.ViewLayer) -> list[str]:
+    """Return the names of the material and (from Blender 4.3 on) world that replace all others in `view_layer`."""
+    owners = (getattr(view_layer, name, None) for name in ("material_override", "world_override"))
+    return [owner.name for owner in owners if owner is not None]
 
 
 def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:

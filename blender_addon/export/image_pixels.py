@@ -13,7 +13,7 @@ LINEAR_NAMES = ("Linear Rec.709", "Linear", "scene_linear")
 SRGB_NAMES = ("sRGB",)
 
 
-class UnreadableImage(Exception):
+class UnreadableImageError(Exception):
     """The pixels cannot be had; the message is the end of a sentence that starts with the image's name."""
 
 
@@ -27,14 +27,14 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
 
     Raises
     ------
-    UnreadableImage
+    UnreadableImageError
         If the file is missing, the image is a movie or tiled, or its colour space is not one we decode.
     """
     if image.source in ("MOVIE", "SEQUENCE", "TILED"):
-        raise UnreadableImage(f"is a {image.source.lower()}; only single pictures are supported")
+        raise UnreadableImageError(f"is a {image.source.lower()}; only single pictures are supported")
     width, height = image.size
     if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)):
-        raise UnreadableImage("has no pixels; is its file missing?")
+        raise UnreadableImageError("has no pixels (is its file missing?)")
     channels = image.channels
     raw = np.empty(width * height * channels, dtype=np.float32)
     image.pixels.foreach_get(raw)
@@ -53,5 +53,5 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     if space in SRGB_NAMES:
         pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
     elif space not in LINEAR_NAMES:
-        raise UnreadableImage(f"has the colour space {space}; set it to sRGB, Linear Rec.709 or Non-Color")
+        raise UnreadableImageError(f"has the colour space {space}; set it to sRGB, Linear Rec.709 or Non-Color")
     return pixels

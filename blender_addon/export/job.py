@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import bpy
+import tomllib
 
 from .findings import ExportError, Findings
 from .job_folder import GENERATOR, new_job_folder
@@ -26,7 +26,7 @@ __all__ = ["ExportError", "ExportReport", "check_export", "export_job"]
 
 @dataclass(frozen=True)
 class ExportReport:
-    """What was written: the folder, the content of request.json, and a sentence for each thing left out or approximated."""
+    """What was written: the folder, the content of request.json, a sentence for each thing left out or approximated."""
 
     folder: Path
     request: dict[str, Any]

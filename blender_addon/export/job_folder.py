@@ -9,7 +9,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .findings import ExportError
@@ -33,6 +33,7 @@ def new_job_folder(folder: Path) -> Iterator[Path]:
     """
     _refuse_foreign(folder)
     partial: Path | None = None
+    missing = [parent for parent in folder.parents if not parent.exists()]
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".partial", dir=folder.parent))
@@ -44,6 +45,10 @@ def new_job_folder(folder: Path) -> Iterator[Path]:
     finally:
         if partial is not None:
             shutil.rmtree(partial, ignore_errors=True)
+        if not folder.exists():
+            for parent in missing:
+                with suppress(OSError):
+                    parent.rmdir()
 
 
 def _refuse_foreign(folder: Path) -> None:

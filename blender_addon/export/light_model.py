@@ -95,3 +95,15 @@ def spread_falloff(tangent: NDArray[np.float64], spread: float) -> NDArray[np.fl
     half = max(spread, 1e-3) / 2.0
     limit = math.tan(half)
     return np.clip(limit - tangent, 0.0, None) / (limit - half)
+
+
+def irradiance_at(light: Light, point: Vector) -> float:
+    """Return about how much light, mean of the channels, arrives at `point` on a surface that faces it."""
+    if light.kind == "SUN":
+        return float(sun_irradiance(light).mean())
+    square = max(float(np.sum((light.position - point) ** 2)), 1e-6)
+    if light.kind == "AREA":
+        return float(area_radiance(light).mean()) * area_of(light) / (square + area_of(light))
+    if light.kind == "POINT" and light.radius > 0.0:
+        return float(sphere_radiance(light).mean()) * math.pi * light.radius**2 / max(square, light.radius**2)
+    return float(point_intensity(light).mean()) / square

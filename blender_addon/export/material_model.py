@@ -25,7 +25,7 @@ class Texture:
 
 @dataclass(frozen=True)
 class Socket:
-    """A socket's value (float, bool or three linear Rec.709 numbers), whether it is linked, the picture it is linked to."""
+    """A socket's value (float, bool or three linear Rec.709 numbers), whether it is linked, and to which picture."""
 
     value: Any
     linked: bool = False

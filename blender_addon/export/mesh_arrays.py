@@ -45,9 +45,7 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
     uvs = mesh.uvs[slots].reshape(-1, 2) * (1.0, -1.0) + (0.0, 1.0)
     corners = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
-    corners = corners + np.float32(0.0)  # -0.0 and 0.0 are one vertex
-    unique, index = np.unique(corners.view([("", np.float32)] * 8).reshape(-1), return_inverse=True)
-    vertices = unique.view(np.float32).reshape(-1, 8)
+    vertices, index = _shared(corners + np.float32(0.0))  # -0.0 and 0.0 are one vertex
     triangles = index.reshape(-1, 3).astype(np.int32)
     if mirrored:
         triangles = triangles[:, ::-1]
@@ -76,6 +74,18 @@ def turned(mesh: TriangleMesh, offset: float) -> TriangleMesh:
     """Return the back of `mesh`: turned around and moved by `offset` metres against its normals."""
     positions = (mesh.positions - offset * mesh.normals).astype(np.float32)
     return TriangleMesh(positions, -mesh.normals, mesh.uvs, np.ascontiguousarray(mesh.triangles[:, ::-1]))
+
+
+def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return the distinct rows of `rows` (n, 8) and the index of each row among them."""
+    # sorting 64-bit hashes takes a tenth of the time of sorting rows
+    factors = np.random.default_rng(0).integers(1, 2**63, rows.shape[1], dtype=np.uint64) * np.uint64(2) + np.uint64(1)
+    hashes = (rows.view(np.uint32).astype(np.uint64) * factors).sum(axis=1, dtype=np.uint64)
+    _, first, index = np.unique(hashes ^ (hashes >> np.uint64(32)), return_index=True, return_inverse=True)
+    if (rows[first][index] == rows).all():
+        return rows[first], index
+    _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)  # two rows had one hash
+    return rows[first], index.reshape(-1)
 
 
 def _face_normals(triangles: NDArray[np.float64], mirrored: bool) -> NDArray[np.float64]:

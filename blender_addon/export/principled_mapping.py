@@ -38,7 +38,7 @@ UNMATCHED = {
 
 
 def sockets_to_mitsuba(sockets: Mapping[str, Any]) -> Values:
-    """Map Principled v2 socket values (missing ones have Blender's defaults) to parameters of Mitsuba's `principled`."""
+    """Map Principled v2 socket values (Blender's defaults where missing) to parameters of Mitsuba's `principled`."""
     base = np.asarray(_get(sockets, "Base Color", (0.8, 0.8, 0.8)), dtype=np.float64)[:3].clip(0.0)
     metallic = _unit(_get(sockets, "Metallic", 0.0))
     roughness = _unit(_get(sockets, "Roughness", 0.5))
@@ -134,7 +134,7 @@ def _ggx_albedos(roughness: float) -> tuple[float, float, float]:
 
 
 def _reflected_energy(alpha: float, mu: float) -> tuple[float, float]:
-    """Integrate G2 / G1(V) over GGX's visible normals, by stratified sampling of D * cos (Walter et al. 2007, eq. 35)."""
+    """Integrate white GGX reflection by stratified sampling of D * cos (Walter et al. 2007, eq. 35)."""
     u, phi = np.meshgrid((np.arange(96) + 0.5) / 96, (np.arange(48) + 0.5) / 48 * 2.0 * math.pi)
     cos_h = 1.0 / np.sqrt(1.0 + alpha**2 * u / (1.0 - u))
     sin_h = np.sqrt(1.0 - cos_h**2)

@@ -43,8 +43,6 @@ def read_light(
         return None
     if not data.use_shadow:
         findings.note(f"Light '{name}' casts no shadows in Blender; in the fit it does.")
-    if getattr(data, "use_custom_distance", False):
-        pass  # an EEVEE setting, Cycles has none
     _note_linking(evaluated, findings)
     return Light(
         kind=data.type,

@@ -9,11 +9,11 @@ from ..versions import PRINCIPLED, active_output, node_tree_of
 from .color_space import to_rec709
 from .findings import Findings
 from .material_model import Material, Socket, grey
-from .shader_graph import UnsupportedNode, plain_value, read_socket, source_of, surface_of
+from .shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 
 NORMAL_SOCKETS = ("Normal", "Coat Normal", "Tangent")
 SKIPPED_SOCKETS = ("Weight",)
-# shaders of other objects that have a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
+# shaders of other objects with a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
 SIMPLE_SHADERS = {
     "ShaderNodeBsdfDiffuse": ("diffuse", {"Base Color": "Color"}, {}),
     "ShaderNodeEmission": ("emission", {"Emission Color": "Color", "Emission Strength": "Strength"}, {}),
@@ -103,16 +103,16 @@ def _read_principled(
 def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings: Findings) -> Socket:
     try:
         return read_socket(socket)
-    except UnsupportedNode as problem:
+    except UnsupportedNodeError as problem:
         if is_target:
             findings.error(
-                f"{socket.name} of material '{material}' is linked to {problem}, which is not supported: unlink it or "
-                "use an image texture."
+                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported: unlink it "
+                "or use an image texture."
             )
         else:
             findings.note(
-                f"{socket.name} of material '{material}' is linked to {problem}, which is not supported; the socket's "
-                "own value is used."
+                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported; the "
+                "socket's own value is used."
             )
         return Socket(plain_value(socket), True)
 

@@ -7,10 +7,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..versions import cycles_settings
+from ..versions import cycles_settings, has_compositor, overrides_of
 from .findings import Findings
-from .mesh_arrays import CornerMesh, joined, world_mesh
 from .material_model import Material
+from .mesh_arrays import CornerMesh, joined, world_mesh
 from .ply_file import TriangleMesh
 from .read_camera import read_camera, read_pixel_filter
 from .read_light import read_light
@@ -33,6 +33,14 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
         findings.error(f"The object to fit is {what}: select an object with faces.")
         return None
+    if overrides_of(view_layer):
+        findings.error(
+            f"View layer '{view_layer.name}' replaces materials or the world by '{overrides_of(view_layer)[0]}': "
+            "remove the override."
+        )
+        return None
+    if has_compositor(scene):
+        findings.note("Compositing nodes are left out: a reference that went through them holds more than the render.")
     with render_state(view_layer, scene):
         depsgraph = context.evaluated_depsgraph_get()
         camera = read_camera(scene, depsgraph, findings)
@@ -148,6 +156,9 @@ class _Walk:
         return self.bsdfs[key]
 
     def _note_visibility(self, item: bpy.types.Object) -> None:
+        for system in item.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                self.findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
         off = [
             label
             for name, label in (

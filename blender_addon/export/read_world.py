@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..versions import active_output, node_tree_of
 from .color_space import to_rec709
 from .findings import Findings
-from .image_pixels import UnreadableImage, read_pixels
-from .shader_graph import UnsupportedNode, mapping_matrix, read_socket, source_of, surface_of
+from .image_pixels import UnreadableImageError, read_pixels
+from .shader_graph import UnsupportedNodeError, mapping_matrix, read_socket, source_of, surface_of
 from .world_model import World, resample
 
 BLACK = World(np.zeros(3))
@@ -33,9 +33,9 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> W
         return BLACK
     try:
         return _background(node, exposure)
-    except UnsupportedNode as problem:
+    except UnsupportedNodeError as problem:
         findings.error(
-            f"World '{world.name}' uses {problem}, which is not supported: link one Background with a colour or an "
+            f"World '{world.name}' uses {problem}, which cannot be exported: link one Background with a colour or an "
             "Environment Texture."
         )
         return BLACK
@@ -43,10 +43,10 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> W
 
 def _background(node: bpy.types.Node, exposure: float) -> World:
     if node.bl_idname not in ("ShaderNodeBackground", "ShaderNodeEmission"):
-        raise UnsupportedNode(f"the node '{node.name}' ({node.bl_label})")
+        raise UnsupportedNodeError(f"the node '{node.name}' ({node.bl_label})")
     strength = read_socket(node.inputs["Strength"])
     if strength.texture is not None:
-        raise UnsupportedNode("a picture on Strength")
+        raise UnsupportedNodeError("a picture on Strength")
     scale = max(float(strength.value), 0.0) * exposure
     source = source_of(node.inputs["Color"])
     if source is not None and source.node.bl_idname == "ShaderNodeTexEnvironment":
@@ -54,22 +54,22 @@ def _background(node: bpy.types.Node, exposure: float) -> World:
         return World(np.full(3, scale), pixels, lookup)
     color = read_socket(node.inputs["Color"])
     if color.texture is not None:
-        raise UnsupportedNode("an Image Texture instead of an Environment Texture")
+        raise UnsupportedNodeError("an Image Texture instead of an Environment Texture")
     return World(np.asarray(color.value, dtype=np.float64).clip(0.0) * scale)
 
 
 def _environment(node: bpy.types.Node) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
     if node.image is None:
-        raise UnsupportedNode(f"the node '{node.name}' without an image")
+        raise UnsupportedNodeError(f"the node '{node.name}' without an image")
     if node.projection != "EQUIRECTANGULAR":
-        raise UnsupportedNode(f"the node '{node.name}' with mirror ball projection")
+        raise UnsupportedNodeError(f"the node '{node.name}' with mirror ball projection")
     mapping = node.texture_mapping
     if any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0):
-        raise UnsupportedNode(f"the texture mapping inside the node '{node.name}'")
+        raise UnsupportedNodeError(f"the texture mapping inside the node '{node.name}'")
     try:
         pixels = np.ascontiguousarray(read_pixels(node.image)[:, :, :3])
-    except UnreadableImage as problem:
-        raise UnsupportedNode(f"the image '{node.image.name}', which {problem}") from None
+    except UnreadableImageError as problem:
+        raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     source = source_of(node.inputs["Vector"])
     matrix = np.eye(4)
     if source is not None and source.node.bl_idname == "ShaderNodeMapping":
@@ -77,12 +77,12 @@ def _environment(node: bpy.types.Node) -> tuple[NDArray[np.float32], NDArray[np.
         vector = source.node.inputs["Vector"]
         source = source_of(vector)
         if source is None:
-            raise UnsupportedNode(f"the Mapping node '{vector.node.name}' without a texture coordinate")
+            raise UnsupportedNodeError(f"the Mapping node '{vector.node.name}' without a texture coordinate")
     if source is not None and (source.node.bl_idname, source.name) not in (
         ("ShaderNodeTexCoord", "Generated"),
         ("ShaderNodeNewGeometry", "Position"),
     ):
-        raise UnsupportedNode(f"the coordinate '{source.name}' of the node '{source.node.name}'")
+        raise UnsupportedNodeError(f"the coordinate '{source.name}' of the node '{source.node.name}'")
     lookup, offset = matrix[:3, :3], matrix[:3, 3]
     if np.allclose(lookup @ lookup.T, np.eye(3), atol=1e-6) and np.linalg.det(lookup) > 0.0 and not offset.any():
         return pixels, lookup

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .exr_file import write_exr
 from .findings import ExportError
-from .image_pixels import SRGB_NAMES, UnreadableImage, read_pixels
+from .image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from .png_file import write_png
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
@@ -22,7 +22,7 @@ DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference ready to be written as `name`: either the file `source` or `pixels` (linear float32 or display uint8)."""
+    """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8)."""
 
     name: str
     encoding: str  # linear or srgb
@@ -48,7 +48,7 @@ class Reference:
 def read_reference(
     reference: Path | bpy.types.Image | None, scene: bpy.types.Scene, size: tuple[int, int]
 ) -> Reference | None:
-    """Return the reference for a picture of `size` (width, height), stretched to square pixels where the scene's are not.
+    """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def read_reference(
 def _from_image(image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool) -> Reference:
     try:
         pixels = np.ascontiguousarray(read_pixels(image)[:, :, :3])
-    except UnreadableImage as problem:
+    except UnreadableImageError as problem:
         raise ExportError(f"The reference '{image.name}' {problem}.") from None
     height, width = pixels.shape[:2]
     render = scene.render
@@ -118,7 +118,7 @@ def _refuse_view(scene: bpy.types.Scene, name: str) -> None:
     if reasons:
         raise ExportError(
             f"The reference {name} holds display colours and the scene uses {' and '.join(reasons)}, which cannot be "
-            "undone: render the reference as OpenEXR, or set the view transform to Standard without look and render again."
+            "undone: render the reference as OpenEXR, or render it again with the view transform Standard and no look."
         )
 
 

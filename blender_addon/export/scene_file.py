@@ -13,16 +13,19 @@ from .camera_model import sensor_element
 from .exr_file import write_exr
 from .findings import Findings
 from .light_elements import Surroundings, has_surface, light_elements
+from .light_model import irradiance_at
 from .material_elements import bsdf_element, emission_element
 from .material_model import Texture
 from .mesh_arrays import turned
 from .ply_file import TriangleMesh, write_ply
 from .scene_data import TARGET_BSDF, SceneData, Shape
-from .world_model import world_element
-from .xml_scene import Element, add, boolean, integer, plugin, reference, scene_text, string
+from .world_model import world_element, world_irradiance
+from .xml_scene import Element, add, boolean, integer, plugin, reference, scalar, scene_text, string
 
 # the back of an open emitter lies this part of the scene's radius behind its front
 BACK_OFFSET = 1e-5
+# a weak emitter may still matter elsewhere: it is sampled at least this often, relative to the strongest
+LEAST_WEIGHT = 0.1
 
 
 @dataclass
@@ -78,10 +81,15 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
         ),
         sensor_element(scene.camera, scene.settings.pixel_filter, scene.settings.spp),
     ]
+    emitters: list[tuple[Element, float]] = []
     world = world_element(scene.world, files.picture)
-    children += [] if world is None else [world]
+    if world is not None:
+        emitters.append((world, world_irradiance(scene.world)))
     for index, light in enumerate(scene.lights):
-        children += light_elements(light, f"light_{index + 1:04d}", around, files.picture, findings)
+        elements = light_elements(light, f"light_{index + 1:04d}", around, files.picture, findings)
+        emitters += [(element, irradiance_at(light, middle) / len(elements)) for element in elements]
+    _weigh(emitters)
+    children += [element for element, _ in emitters]
     for identifier, material in scene.materials.items():
         is_target = identifier == TARGET_BSDF
         children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
@@ -89,6 +97,15 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
         children += _shape_elements(shape, scene, radius * BACK_OFFSET, files)
     files.text = scene_text(children)
     return files
+
+
+def _weigh(emitters: list[tuple[Element, float]]) -> None:
+    """Let Mitsuba sample each emitter in proportion to what it gives the target, not all equally often."""
+    most = max((irradiance for _, irradiance in emitters), default=0.0)
+    for element, irradiance in emitters if len(emitters) > 1 else []:
+        emitter = element.find("emitter") if element.tag == "shape" else element
+        assert emitter is not None
+        add(emitter, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
 
 
 def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneFiles) -> list[Element]:
@@ -125,6 +142,7 @@ def _hide_emitters(scene: SceneData, findings: Findings) -> bool:
         inside = -pixels < x < scene.camera.width + pixels and -pixels < y < scene.camera.height + pixels
         if inside and depth[0] > 0.0:
             findings.note(f"Light '{light.name}' is in view: Mitsuba shows its surface, Cycles does not.")
+    surfaces = [light for light in surfaces if light.kind != "SUN"]
     if surfaces and (scene.world.is_lit or len(scene.lights) > 1):
         names = ", ".join(f"'{light.name}'" for light in surfaces)
         findings.note(f"Lights with a size ({names}) block light that comes from behind them; in Cycles they do not.")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..versions import active_output
 from .color_space import to_rec709
-from .image_pixels import UnreadableImage, read_pixels
+from .image_pixels import UnreadableImageError, read_pixels
 from .material_model import Socket, Texture
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
@@ -29,7 +29,7 @@ MATH = {
 }
 
 
-class UnsupportedNode(Exception):
+class UnsupportedNodeError(Exception):
     """A node tree holds something that is not exported; the message names it, as part of a sentence."""
 
 
@@ -73,7 +73,7 @@ def emission_of(tree: bpy.types.NodeTree) -> NDArray[np.float64] | None:
         return None
     try:
         color, strength = read_socket(node.inputs["Color"]), read_socket(node.inputs["Strength"])
-    except UnsupportedNode:
+    except UnsupportedNodeError:
         return None
     if color.texture is not None or strength.texture is not None:
         return None
@@ -85,7 +85,7 @@ def read_socket(socket: bpy.types.NodeSocket) -> Socket:
 
     Raises
     ------
-    UnsupportedNode
+    UnsupportedNodeError
         If it is linked to something that is neither a constant nor a picture with simple operations.
     """
     source = source_of(socket)
@@ -113,7 +113,7 @@ def _evaluate(output: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
     node = output.node
     kind = node.bl_idname
     if node.mute:
-        raise UnsupportedNode(f"the muted node '{node.name}'")
+        raise UnsupportedNodeError(f"the muted node '{node.name}'")
     if kind == "ShaderNodeValue":
         return np.array([output.default_value], dtype=np.float64)
     if kind == "ShaderNodeRGB":
@@ -124,18 +124,18 @@ def _evaluate(output: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
         gamma = _constant(node.inputs["Gamma"])
         return _apply(_input(node.inputs["Color"]), lambda a: np.where(a > 0.0, np.maximum(a, 0.0) ** gamma, a))
     if kind == "ShaderNodeInvert":
-        factor = _constant(node.inputs["Fac"])
-        return _apply(_input(node.inputs["Color"]), lambda a: a + factor * (1.0 - 2.0 * a))
+        factor = _constant(node.inputs[0])
+        return _apply(_input(node.inputs[1]), lambda a: a + factor * (1.0 - 2.0 * a))
     if kind == "ShaderNodeRGBToBW":
         return _apply(_input(node.inputs[0]), lambda a: (a @ LUMINANCE)[..., None] if a.shape[-1] == 3 else a)
     if kind in ("ShaderNodeSeparateColor", "ShaderNodeSeparateRGB"):
         if getattr(node, "mode", "RGB") != "RGB":
-            raise UnsupportedNode(f"the node '{node.name}' in mode {node.mode}")
+            raise UnsupportedNodeError(f"the node '{node.name}' in mode {node.mode}")
         channel = list(node.outputs).index(output)
         return _apply(_input(node.inputs[0]), lambda a: a[..., min(channel, a.shape[-1] - 1)][..., None])
     if kind == "ShaderNodeMath" and node.operation in MATH:
         return _math(node)
-    raise UnsupportedNode(f"the node '{node.name}' ({node.bl_label})")
+    raise UnsupportedNodeError(f"the node '{node.name}' ({node.bl_label})")
 
 
 def _input(socket: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
@@ -146,7 +146,7 @@ def _input(socket: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
 def _constant(socket: bpy.types.NodeSocket) -> float:
     value = _input(socket)
     if isinstance(value, Texture):
-        raise UnsupportedNode(f"a picture on '{socket.name}' of the node '{socket.node.name}'")
+        raise UnsupportedNodeError(f"a picture on '{socket.name}' of the node '{socket.node.name}'")
     return float(value[0])
 
 
@@ -159,7 +159,7 @@ def _apply(value: Texture | NDArray[np.float64], function: Any) -> Texture | NDA
 def _math(node: bpy.types.Node) -> Texture | NDArray[np.float64]:
     first, second = _input(node.inputs[0]), _input(node.inputs[1])
     if isinstance(first, Texture) and isinstance(second, Texture):
-        raise UnsupportedNode(f"the node '{node.name}' with two pictures")
+        raise UnsupportedNodeError(f"the node '{node.name}' with two pictures")
     picture = first if isinstance(first, Texture) else second if isinstance(second, Texture) else None
 
     def grey(value: Texture | NDArray[np.float64]) -> NDArray[np.float64]:
@@ -174,15 +174,15 @@ def _math(node: bpy.types.Node) -> Texture | NDArray[np.float64]:
 
 def _image(node: bpy.types.Node, output: str) -> Texture:
     if node.image is None:
-        raise UnsupportedNode(f"the node '{node.name}' without an image")
+        raise UnsupportedNodeError(f"the node '{node.name}' without an image")
     if node.projection != "FLAT":
-        raise UnsupportedNode(f"the node '{node.name}' with {node.projection.title()} projection")
+        raise UnsupportedNodeError(f"the node '{node.name}' with {node.projection.title()} projection")
     if node.extension not in WRAPS:
-        raise UnsupportedNode(f"the node '{node.name}' with extension Clip")
+        raise UnsupportedNodeError(f"the node '{node.name}' with extension Clip")
     try:
         pixels = read_pixels(node.image)
-    except UnreadableImage as problem:
-        raise UnsupportedNode(f"the image '{node.image.name}', which {problem}") from None
+    except UnreadableImageError as problem:
+        raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     chosen = pixels[:, :, 3:4] if output == "Alpha" else pixels[:, :, :3]
     return Texture(chosen, _uv_matrix(node), WRAPS[node.extension], FILTERS[node.interpolation])
 
@@ -191,21 +191,21 @@ def _uv_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
     """Return the (3, 3) matrix from the mesh's UV to the picture's, for UV links with or without a Mapping node."""
     mapping = node.texture_mapping
     if any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0):
-        raise UnsupportedNode(f"the texture mapping inside the node '{node.name}'")
+        raise UnsupportedNodeError(f"the texture mapping inside the node '{node.name}'")
     source = source_of(node.inputs["Vector"])
     matrix = np.eye(3)
     if source is not None and source.node.bl_idname == "ShaderNodeMapping":
         matrix = _flat(mapping_matrix(source.node), source.node)
         source = source_of(source.node.inputs["Vector"])
         if source is None:
-            raise UnsupportedNode(f"the Mapping before '{node.name}' without a texture coordinate")
+            raise UnsupportedNodeError(f"the Mapping before '{node.name}' without a texture coordinate")
     if source is None:
         return matrix
     if source.node.bl_idname == "ShaderNodeTexCoord" and source.name == "UV":
         return matrix
     if source.node.bl_idname == "ShaderNodeUVMap" and not source.node.uv_map:
         return matrix
-    raise UnsupportedNode(f"the coordinate '{source.name}' of the node '{source.node.name}'")
+    raise UnsupportedNodeError(f"the coordinate '{source.name}' of the node '{source.node.name}'")
 
 
 def mapping_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
@@ -213,10 +213,10 @@ def mapping_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
 
     Raises
     ------
-    UnsupportedNode
+    UnsupportedNodeError
         If one of its inputs is linked to more than a constant, or its type is Normal.
     """
-    from mathutils import Euler
+    from mathutils import Euler  # pyright: ignore[reportMissingImports]
 
     location, rotation, scale = (
         np.array(read_socket(node.inputs[name]).value) if name in node.inputs and node.inputs[name].enabled else default
@@ -232,11 +232,11 @@ def mapping_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
         matrix[:3, :3] = np.diag(np.divide(1.0, scale, out=np.zeros(3), where=scale != 0.0)) @ turn.T
         matrix[:3, 3] = -matrix[:3, :3] @ location
     else:
-        raise UnsupportedNode(f"the Mapping node '{node.name}' of type Normal")
+        raise UnsupportedNodeError(f"the Mapping node '{node.name}' of type Normal")
     return matrix
 
 
 def _flat(matrix: NDArray[np.float64], node: bpy.types.Node) -> NDArray[np.float64]:
     if abs(matrix[0, 2]) + abs(matrix[1, 2]) > 1e-6:
-        raise UnsupportedNode(f"the Mapping node '{node.name}' with a rotation about X or Y")
+        raise UnsupportedNodeError(f"the Mapping node '{node.name}' with a rotation about X or Y")
     return np.array([[*matrix[0, :2], matrix[0, 3]], [*matrix[1, :2], matrix[1, 3]], [0.0, 0.0, 1.0]])

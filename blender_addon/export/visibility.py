@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from .findings import Findings

@@ -53,6 +53,16 @@ def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> E
     )
 
 
+def world_irradiance(world: World) -> float:
+    """Return about how much light, mean of the channels, a surface gets from the world."""
+    mean = 1.0
+    if world.pixels is not None:
+        height = world.pixels.shape[0]
+        weights = np.sin((np.arange(height) + 0.5) / height * math.pi)
+        mean = float(weights @ world.pixels.mean(axis=(1, 2), dtype=np.float64)) / float(weights.sum())
+    return math.pi * mean * float(world.color.mean())
+
+
 def resample(
     pixels: NDArray[np.float32], lookup: NDArray[np.float64], offset: NDArray[np.float64]
 ) -> NDArray[np.float32]:

@@ -79,6 +79,7 @@ def render_cycles(tmp_path: Path) -> Callable[[], Pixels]:
 def export(tmp_path: Path) -> Callable[..., Any]:
     def run(target: Any, name: str = "job", **options: Any) -> Any:
         import bpy
+
         from blender_addon.export.job import export_job
 
         options = {"reference": None, "fit": {}, **options}

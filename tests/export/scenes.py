@@ -54,7 +54,9 @@ def add_mesh(name: str, vertices: Any, faces: Any, material: Any) -> Any:
 def add_quad(name: str, size: float, height: float, material: Any) -> Any:
     """A horizontal square around the origin."""
     h = size / 2
-    return add_mesh(name, [(-h, -h, height), (h, -h, height), (h, h, height), (-h, h, height)], [(0, 1, 2, 3)], material)
+    return add_mesh(
+        name, [(-h, -h, height), (h, -h, height), (h, h, height), (-h, h, height)], [(0, 1, 2, 3)], material
+    )
 
 
 def add_camera(kind: str = "ORTHO", location: Any = (0, 0, 5), rotation: Any = (0, 0, 0), **settings: Any) -> Any:
@@ -70,7 +72,9 @@ def add_camera(kind: str = "ORTHO", location: Any = (0, 0, 5), rotation: Any = (
     return item
 
 
-def add_light(kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), scale: Any = (1, 1, 1), **settings: Any) -> Any:
+def add_light(
+    kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), scale: Any = (1, 1, 1), **settings: Any
+) -> Any:
     """Add a light; without rotation it shines down."""
     data = bpy.data.lights.new("Light", kind)
     for name, value in settings.items():

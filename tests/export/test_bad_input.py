@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 import pytest
+
 from blender_addon.export.job import ExportError, check_export, export_job
 
 from .scenes import add_camera, add_mesh, add_quad, diffuse_material, new_material, world_color
@@ -71,6 +72,10 @@ def no_faces(scene: Any, target: Any) -> None:
     target.data.clear_geometry()
 
 
+def override(scene: Any, target: Any) -> None:
+    bpy.context.view_layer.material_override = diffuse_material("Clay", (1, 1, 1))
+
+
 CASES: dict[Callable[[Any, Any], None], str] = {
     no_camera: "The scene has no camera: add one and make it the active camera.",
     panorama: "Camera 'Camera' is of type Pano: make it Perspective or Orthographic.",
@@ -85,6 +90,7 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     covered: "The camera does not see 'Target': it is hidden behind 'Lid'.",
     hidden: "Object 'Target' is hidden in the render: show it.",
     dark: "The scene has no light: add a light or give the world a colour.",
+    override: "View layer 'ViewLayer' replaces materials or the world by 'Clay': remove the override.",
     no_faces: "No face of 'Target' uses its active material slot 1: choose another.",
 }
 
@@ -105,9 +111,7 @@ def test_refused_with_one_sentence(spoil: Any, scene: Any, tmp_path: Path) -> No
 def test_object_that_is_no_mesh(scene: Any) -> None:
     item = bpy.data.objects.new("Handle", None)
     bpy.context.collection.objects.link(item)
-    assert check_export(bpy.context, item)[0] == [
-        "The object to fit is 'Handle' (Empty): select an object with faces."
-    ]
+    assert check_export(bpy.context, item)[0] == ["The object to fit is 'Handle' (Empty): select an object with faces."]
     assert check_export(bpy.context, None)[0] == ["The object to fit is nothing: select an object with faces."]
 
 

@@ -8,12 +8,13 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+
 from blender_addon.export.camera_model import PixelFilter, sensor_element
 from blender_addon.export.findings import Findings
 from blender_addon.export.read_camera import read_camera
 from blender_addon.export.xml_scene import scene_text
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
 
 from .scenes import add_camera, add_mesh, add_quad, emission_material, new_material
 
@@ -31,9 +32,7 @@ def test_points_lie_on_the_rays_of_their_pixels(
     scene.render.resolution_x, scene.render.resolution_y = SIZES[size]
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect
     settings = {"lens": 35.0, "sensor_width": 30.0, "sensor_height": 20.0, "ortho_scale": 3.0}
-    item = add_camera(
-        kind, (3, -2, 2), (1.0, 0.2, 0.9), sensor_fit=fit, shift_x=0.13, shift_y=-0.21, **settings
-    )
+    item = add_camera(kind, (3, -2, 2), (1.0, 0.2, 0.9), sensor_fit=fit, shift_x=0.13, shift_y=-0.21, **settings)
     item.scale = (2.0, 0.5, 3.0)  # to be ignored
     bpy.context.view_layer.update()
     camera = read_camera(scene, bpy.context.evaluated_depsgraph_get(), Findings())

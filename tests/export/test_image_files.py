@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from blender_addon.export.exr_file import write_exr
 from blender_addon.export.ply_file import TriangleMesh, write_ply
 from blender_addon.export.png_file import write_png

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from blender_addon.export.findings import ExportError
 from blender_addon.export.job_folder import new_job_folder
 
@@ -32,9 +33,13 @@ def test_appears_whole(tmp_path: Path) -> None:
 
 
 def test_failure_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match="stop"), new_job_folder(tmp_path / "job") as partial:
-        fill(partial)
-        raise RuntimeError("stop")
+    def stop() -> None:
+        with new_job_folder(tmp_path / "new" / "er" / "job") as partial:
+            fill(partial)
+            raise RuntimeError("stop")
+
+    with pytest.raises(RuntimeError, match="stop"):
+        stop()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -66,9 +71,9 @@ def test_foreign_folder_is_refused(names: list[str], tmp_path: Path) -> None:
     folder.mkdir()
     for name in names:
         (folder / name).write_text(OURS if len(names) == 2 else "{}")
-    with pytest.raises(ExportError, match="holds other files than a job; choose an empty or a new folder"):
-        with new_job_folder(folder):
-            pytest.fail("must not start")
+    sentence = "holds other files than a job; choose an empty or a new folder"
+    with pytest.raises(ExportError, match=sentence), new_job_folder(folder):
+        pytest.fail("must not start")
     assert sorted(path.name for path in folder.iterdir()) == sorted(names)
 
 

@@ -6,10 +6,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
 
-from .scenes import add_camera, add_light, add_quad, diffuse_material, new_material
+from blender_addon.export.job import ExportError, check_export
+
+from .scenes import add_camera, add_light, add_quad, diffuse_material, new_material, world_color
 
 TILTED = {"location": (0.7, -0.4, 2.5), "rotation": (0.3, 0.2, 0.5)}
 SHARP = {"use_soft_falloff": False}
@@ -39,6 +42,14 @@ CASES = {
         {"energy": 100, "shadow_soft_size": 0.0, "spot_size": 0.8, "spot_blend": 0.5, "scale": (0.5, 1.5, 1)},
     ),
     "spot not normalised": ("SPOT", {"energy": 10, "shadow_soft_size": 0.0, "normalize": False, "spot_size": 2.0}),
+    "spot with radius not normalised": (
+        "SPOT",
+        {"energy": 10, "shadow_soft_size": 0.2, "normalize": False, "spot_size": 2.0, "spot_blend": 0.2},
+    ),
+    "spot with sharp radius": (
+        "SPOT",
+        {"energy": 100, "shadow_soft_size": 0.2, "spot_size": 2.0, "spot_blend": 0.0, **SHARP},
+    ),
     "spot with radius": ("SPOT", {"energy": 100, "shadow_soft_size": 0.2, "spot_size": 2.0, "spot_blend": 0.2}),
     "square": ("AREA", {"energy": 100, "shape": "SQUARE", "size": 1.0}),
     "rectangle": ("AREA", {"energy": 100, "shape": "RECTANGLE", "size": 0.5, "size_y": 2.0, **TILTED}),
@@ -66,6 +77,37 @@ def tiles(pixels: np.ndarray) -> np.ndarray:
     return means[keep]
 
 
+def test_light_nodes(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
+    """One Emission node with plain values multiplies the light; anything else is refused."""
+    target = floor()
+    light = add_light("POINT", energy=100, shadow_soft_size=0.0).data
+    light.use_nodes = True
+    emission = light.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    emission.inputs["Color"].default_value = (0.5, 0.8, 0.2, 1.0)
+    emission.inputs["Strength"].default_value = 2.5
+    expected, found = tiles(render_cycles()), tiles(render_mitsuba(export(target)))
+    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.005)
+    texture = light.node_tree.nodes.new("ShaderNodeTexNoise")
+    light.node_tree.links.new(texture.outputs[0], emission.inputs["Strength"])
+    with pytest.raises(ExportError, match="Light 'Light' has shader nodes other than one Emission with plain values"):
+        export(target, "other")
+
+
+def test_portal_and_negative_light(scene: Any) -> None:
+    target = floor()
+    world_color(scene, 1.0)
+    portal = add_light("AREA", energy=100).data
+    portal.cycles.is_portal = True
+    errors, notes = check_export(bpy.context, target)
+    assert errors == []
+    assert notes == ["Light 'Light' is a portal, which gives no light of its own; it is left out."]
+    portal.cycles.is_portal = False
+    portal.energy = -1.0
+    assert check_export(bpy.context, target)[0] == [
+        "Light 'Light' takes light away (negative power or colour): make it positive."
+    ]
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_level_on_floor(case: str, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
     kind, settings = CASES[case]
@@ -76,7 +118,6 @@ def test_level_on_floor(case: str, scene: Any, export: Any, render_cycles: Any, 
     expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 256))
     scale = expected.max()
     assert scale > 0.0
-    print(case, found.sum() / expected.sum() - 1, abs(found - expected).max() / scale, report.notes)
     # the level: 1 %, left for the noise of 60 tiles of 16 pixels with 256 samples in both renderers
     assert found.sum() == pytest.approx(expected.sum(), rel=0.01)
     # the shape: 3 % of the brightest tile, each tile has a sixtieth of the samples

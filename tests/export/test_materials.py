@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+
 from blender_addon.export.job import check_export
 
 from .scenes import add_camera, add_light, add_quad, diffuse_material, emission_material, new_material, world_color
@@ -39,7 +40,9 @@ def read_exr(path: Any) -> np.ndarray:
 
 def test_every_socket_is_in_the_request(scene: Any, export: Any) -> None:
     world_color(scene, 1.0)
-    material = new_material("Glaze", Base_Color=(0.1, 0.2, 0.3), Roughness=0.25, Coat_Weight=0.5, Thin_Film_Thickness=300.0)
+    material = new_material(
+        "Glaze", Base_Color=(0.1, 0.2, 0.3), Roughness=0.25, Coat_Weight=0.5, Thin_Film_Thickness=300.0
+    )
     principled(material).distribution = "GGX"
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(add_quad("Target", 1.0, 0.0, material), fit={"preset": "paper", "parameters": "reduced"})
@@ -106,7 +109,9 @@ def test_rows_of_a_picture_are_top_first(scene: Any, export: Any) -> None:
     pixels = np.zeros((2, 4, 4), np.float32)
     pixels[1, 2] = (3.0, 2.0, 1.0, 1.0)  # Blender's second row is the upper one
     image.pixels.foreach_set(pixels.ravel())
-    material.node_tree.links.new(image_node(material, image).outputs["Color"], principled(material).inputs["Base Color"])
+    material.node_tree.links.new(
+        image_node(material, image).outputs["Color"], principled(material).inputs["Base Color"]
+    )
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(add_quad("Target", 1.0, 0.0, material))
     path = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]["texture"]
@@ -134,8 +139,8 @@ def test_unknown_node_on_context_is_noted_on_target_refused(scene: Any) -> None:
         material.node_tree.links.new(noise.outputs[0], principled(material).inputs["Roughness"])
     errors, notes = check_export(bpy.context, quad)
     assert errors == [
-        "Roughness of material 'Target' is linked to the node 'Noise Texture' (Noise Texture), which is not supported: "
-        "unlink it or use an image texture."
+        "Roughness of material 'Target' is linked to the node 'Noise Texture' (Noise Texture), which cannot be "
+        "exported: unlink it or use an image texture."
     ]
     principled(target).inputs["Roughness"].links[0].is_muted = True
     errors, notes = check_export(bpy.context, quad)
@@ -162,8 +167,8 @@ def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycle
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(target)
     assert [note for note in report.notes if "toon" in note] == [
-        "Material 'toon' of 'Quad 3' starts with the node 'Toon BSDF' (Toon BSDF), which is not exported; it is shown as "
-        "grey."
+        "Material 'toon' of 'Quad 3' starts with the node 'Toon BSDF' (Toon BSDF), which is not exported; it is shown "
+        "as grey."
     ]
     expected, found = render_cycles(), render_mitsuba(report, 256)
     for index in range(3):
@@ -228,3 +233,31 @@ def test_working_space_is_converted(scene: Any, export: Any) -> None:
     matrix = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]])
     found = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]["value"]
     np.testing.assert_allclose(found, matrix @ (0.2, 0.4, 0.3), atol=1e-3)
+
+
+def test_picture_files_of_a_saved_blend(scene: Any, export: Any, tmp_path: Any) -> None:
+    """Files that Blender has not loaded yet are loaded; missing ones are refused on the target."""
+    from blender_addon.export.png_file import write_png
+
+    write_png(tmp_path / "grey.png", np.full((4, 4, 3), 188, np.uint8))
+    world_color(scene, 1.0)
+    material = new_material("Target")
+    image = bpy.data.images.load(str(tmp_path / "grey.png"))
+    material.node_tree.links.new(
+        image_node(material, image).outputs["Color"], principled(material).inputs["Base Color"]
+    )
+    add_camera("ORTHO", ortho_scale=2.0)
+    add_quad("Target", 1.0, 0.0, material)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    target = bpy.data.objects["Target"]
+    report = export(target)
+    value = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]["value"]
+    np.testing.assert_allclose(value, 0.5028865, atol=1e-5)  # sRGB 188
+    (tmp_path / "grey.png").unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    errors, _ = check_export(bpy.context, bpy.data.objects["Target"])
+    assert errors == [
+        "Base Color of material 'Target' is linked to the image 'grey.png' that has no pixels (is its file missing?), "
+        "which cannot be exported: unlink it or use an image texture."
+    ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from blender_addon.export.principled_mapping import (
     _ggx_albedos,
     effective_ior,
@@ -57,12 +58,12 @@ def test_partial_values_drive_only_their_sockets() -> None:
 def test_everything_stays_in_range() -> None:
     generator = np.random.default_rng(5)
     for _ in range(200):
-        values = {
-            "base_color": generator.random(3), "metallic": generator.random(), "roughness": 0.04 + 0.96 * generator.random(),
-            "eta": 1.01 + 1.5 * generator.random(), "spec_trans": generator.random(), "clearcoat": generator.random(),
-            "clearcoat_gloss": generator.random(), "sheen": generator.random(), "spec_tint": generator.random(),
-            "sheen_tint": generator.random(), "anisotropic": generator.random(),
-        }  # fmt: skip
+        values: dict = {name: generator.random() for name in (
+            "metallic", "spec_trans", "clearcoat", "clearcoat_gloss", "sheen", "spec_tint", "sheen_tint", "anisotropic"
+        )}  # fmt: skip
+        values["base_color"] = generator.random(3)
+        values["roughness"] = 0.04 + 0.96 * generator.random()
+        values["eta"] = 1.01 + 1.5 * generator.random()
         for name, value in mitsuba_to_sockets(values, DEFAULTS).items():
             numbers = np.asarray(value)
             assert np.isfinite(numbers).all(), name

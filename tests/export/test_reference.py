@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+
 from blender_addon.export.exr_file import write_exr
 from blender_addon.export.job import ExportError
 from blender_addon.export.png_file import write_png
@@ -105,10 +106,10 @@ def test_pixel_aspect_stretches_the_reference(target: Any, export: Any, tmp_path
 
 
 def test_wrong_references(target: Any, export: Any, tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="none.exr does not exist: choose another file"):
+    with pytest.raises(ExportError, match=r"none\.exr does not exist: choose another file"):
         export(target, reference=tmp_path / "none.exr")
     (tmp_path / "ref.txt").write_text("")
-    with pytest.raises(ExportError, match="ref.txt is no picture we read: use EXR"):
+    with pytest.raises(ExportError, match=r"ref\.txt is no picture we read: use EXR"):
         export(target, reference=tmp_path / "ref.txt")
     with pytest.raises(ExportError, match="'Small' is 3x3, but the scene renders 6x4: set the output resolution"):
         export(target, reference=bpy.data.images.new("Small", 3, 3))
@@ -116,5 +117,5 @@ def test_wrong_references(target: Any, export: Any, tmp_path: Path) -> None:
     empty.source = "FILE"
     empty.filepath = str(tmp_path / "gone.png")
     empty.reload()
-    with pytest.raises(ExportError, match="'Empty' has no pixels; is its file missing"):
+    with pytest.raises(ExportError, match=r"'Empty' has no pixels .is its file missing"):
         export(target, reference=empty)

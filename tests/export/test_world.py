@@ -13,7 +13,8 @@ from mathutils import Vector
 from .scenes import add_camera, add_quad, new_material
 
 DIRECTIONS = [
-    (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0.1, 0.05, 1), (0.05, -0.1, -1), (3, 2, 1), (-1, 2, -2), (-2, -3, 1), (1, -1, 3)
+    (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0.1, 0.05, 1), (0.05, -0.1, -1),
+    (3, 2, 1), (-1, 2, -2), (-2, -3, 1), (1, -1, 3)
 ]  # fmt: skip
 MAPPINGS = {
     "none": None,
@@ -96,9 +97,7 @@ def test_environment_lights_a_floor(scene: Any, export: Any, render_cycles: Any,
 
 
 @pytest.mark.parametrize("exposure", [1.0, 2.5])
-def test_constant_world(
-    exposure: float, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
-) -> None:
+def test_constant_world(exposure: float, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
     from .test_light_levels import floor, tiles
 
     _, background = world_nodes(scene)
@@ -128,5 +127,5 @@ def test_unsupported_world_is_refused(scene: Any, export: Any) -> None:
     tree, background = world_nodes(scene)
     tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
     add_camera("ORTHO", ortho_scale=2.0)
-    with pytest.raises(ExportError, match="World 'World' uses the node 'Sky Texture'.*Environment Texture"):
+    with pytest.raises(ExportError, match=r"World 'World' uses the node 'Sky Texture'.*Environment Texture"):
         export(add_quad("Target", 1.0, 0.0, new_material("Target")))
