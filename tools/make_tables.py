@@ -160,7 +160,7 @@ def nodes_of(name: str, table: Array) -> Array:
 def sheen_questions(mu: Array, roughness: Array) -> tuple[Array, Array, dict[str, Array]]:
     """Views and lights (5 x mu x roughness, 3) and sockets of a white sheen over a black, mirrorless base."""
     m, r = (g.ravel() for g in np.meshgrid(mu, roughness, indexing="ij"))
-    view: Array = np.stack([np.sqrt(1 - m**2), 0 * m, m], axis=1)
+    view = np.stack([np.sqrt(1 - m**2), 0 * m, m], axis=1).astype(np.float64)
     lights = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0.36, 0.48, 0.8)]
     light: Array = np.concatenate([np.tile(np.array(direction, np.float64), (len(m), 1)) for direction in lights])
     count = len(light)

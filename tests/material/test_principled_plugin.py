@@ -116,7 +116,7 @@ def test_emission_is_dimmed_by_what_lies_above() -> None:
 
 @pytest.mark.parametrize("name", ["roughness", "metallic", "coat_weight", "base_color"])
 def test_picture_derivative_is_the_finite_difference(name: str) -> None:
-    start = {"roughness": 0.42, "metallic": 0.3, "coat_weight": 0.4, "base_color": COLOUR}
+    start = {"roughness": 0.45, "metallic": 0.3, "coat_weight": 0.4, "base_color": COLOUR}
     scene = picture_of({"type": "blender_principled", **start, "free": name}, depth=2, world=0.0)
     params, key = mi.traverse(scene), f"target_bsdf.{name}"
     value = type(params[key])(params[key])
@@ -124,9 +124,9 @@ def test_picture_derivative_is_the_finite_difference(name: str) -> None:
     def mean(change: float) -> float:
         params[key] = value + change
         params.update()
-        return float(np.array(mi.render(scene, spp=64, seed=2)).mean())
+        return float(np.array(mi.render(scene, spp=64, seed=2)).astype(np.float64).mean())
 
-    step = 0.005  # no node of a table lies within it
+    step = 0.001  # no node of a table lies within it: slopes change by 4 % from one cell to the next
     difference = (mean(step) - mean(-step)) / (2 * step)
     params[key] = type(value)(value)
     dr.enable_grad(params[key])
