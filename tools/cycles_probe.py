@@ -57,12 +57,14 @@ def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (s
         )
         missing = [name for name in files[1::2] if not Path(name).is_file()]
         if missing:
-            raise RuntimeError(f"Cycles gave no answer (exit {run.returncode}): {run.stderr[-2000:]}{run.stdout[-2000:]}")
+            raise RuntimeError(
+                f"Cycles gave no answer (exit {run.returncode}): {run.stderr[-2000:]}{run.stdout[-2000:]}"
+            )
         return [np.load(name) for name in files[1::2]]
 
 
 def facet_frames(view: Array, light: Array) -> tuple[Array, Array]:
-    """World frames (cases, 3, 3), columns tangent, bitangent, normal, that put `view` on +Z and `light` in the XZ plane.
+    """World frames (cases, 3, 3), columns tangent, bitangent, normal: `view` on +Z, `light` in the XZ plane.
 
     The second result is the angle between the two directions in radians, (cases,).
     """

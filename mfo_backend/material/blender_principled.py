@@ -3,7 +3,8 @@
 
 Directions are unit vectors in the frame tangent, bitangent, normal and point away from the surface: `wi` towards the
 camera, `wo` towards the light. Values are f_r |cos(wo)| in linear Rec.709, without the 1 / n^2 of radiance in glass
-(Cycles leaves it out). Subsurface scattering is replaced by a diffuse lobe. The code is generic over the Dr.Jit float type.
+(Cycles leaves it out). Subsurface scattering is replaced by a diffuse lobe. The code is generic over the Dr.Jit float
+type.
 """
 
 from __future__ import annotations
@@ -41,9 +42,7 @@ def blender_principled(
     return evaluate(layers, layers.to_frame(wo))
 
 
-def emitted(
-    parameters: Mapping[str, Any], wi: Any, lobes: Lobes = ALL_LOBES, model: CyclesModel = BLENDER_5_0
-) -> Any:
+def emitted(parameters: Mapping[str, Any], wi: Any, lobes: Lobes = ALL_LOBES, model: CyclesModel = BLENDER_5_0) -> Any:
     """Radiance emitted towards `wi`, RGB, dimmed by alpha, sheen and coat above the emitting layer."""
     return layer_stack(parameters, wi, lobes, model).emission
 
@@ -107,4 +106,6 @@ def refracted(layers: Layers, wo: Any) -> Any:
     c = dr.abs(dr.dot(wi, h))
     g2 = dr.rcp(1 + smith_lambda(wi, alpha, alpha) + smith_lambda(wo, alpha, alpha))
     lobe = density(h, alpha, alpha) * g2 * c * jacobian / dr.maximum(wi.z, 1e-7)
-    return dr.select((wo.z < 0) & (wi.z > 0), layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe, 0)
+    return dr.select(
+        (wo.z < 0) & (wi.z > 0), layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe, 0
+    )

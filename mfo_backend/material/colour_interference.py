@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colour of an interference order: the Fourier transform of the observer's sensitivity at an optical path difference."""
+"""Colour of an interference order: the Fourier transform of the observer's sensitivity at a path difference."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def fourier_table(sensitivity: NDArray[np.float64], wavelength_nm: NDArray[np.fl
 @cache
 def _packed(float_type: type) -> Any:
     """The table as rows of eight numbers: RGB real, 0, RGB imaginary, 0."""
-    with (resources.files(__package__) / "tables" / "thin_film.npz").open("rb") as file:
+    with (resources.files(str(__package__)) / "tables" / "thin_film.npz").open("rb") as file:
         rows = np.load(file, allow_pickle=False)["response"]
     zeros = np.zeros((len(rows), 1))
     values = float_type(np.concatenate([rows[:, :3], zeros, rows[:, 3:], zeros], axis=1).astype(rows.dtype).ravel())

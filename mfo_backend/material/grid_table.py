@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -43,7 +42,9 @@ class GridTable:
     def buffer(self, float_type: type) -> Any:
         """The corners as an evaluated array of `float_type`, made once."""
         if float_type not in self._buffers:
-            values = float_type(self.corners.astype(np.float64 if dr.type_v(float_type) == dr.VarType.Float64 else "f4").ravel())
+            values = float_type(
+                self.corners.astype(np.float64 if dr.type_v(float_type) == dr.VarType.Float64 else "f4").ravel()
+            )
             dr.make_opaque(values)
             self._buffers[float_type] = values
         return self._buffers[float_type]
@@ -79,8 +80,6 @@ class GridTable:
 @cache
 def cycles_table(*names: str, plane: int | None = None) -> GridTable:
     """Tables measured in Cycles (`tools/make_tables.py`): `names` of equal shape, or one `plane` of a stack of them."""
-    archive = resources.files(__package__) / "tables" / "cycles_albedo.npz"
+    archive = resources.files(str(__package__)) / "tables" / "cycles_albedo.npz"
     with archive.open("rb") as file, np.load(file, allow_pickle=False) as data:
         return GridTable(*(data[name] if plane is None else data[name][plane] for name in names))
-
-

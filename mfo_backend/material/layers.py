@@ -37,8 +37,8 @@ from .thin_film import ThinFilm
 class Layers:
     """Weights (RGB, compensation included) and shapes of the lobes; None where a lobe is left out.
 
-    `wi`, in the frame of the anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a direction
-    of the surface's own frame into it.
+    `wi`, in the frame of the anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a
+    direction of the surface's own frame into it.
     """
 
     wi: Any
@@ -69,7 +69,7 @@ class Layers:
     subsurface: Any = None
 
     def to_frame(self, direction: Any) -> Any:
-        """`direction` of the surface's frame in the frame of the lobes: the view's side up, tangent along the first axis."""
+        """`direction` of the surface's frame in that of the lobes: the view's side up, tangent along the first axis."""
         z = dr.mulsign(direction.z, self.flip)
         x = self.cos_rotation * direction.x + self.sin_rotation * direction.y
         y = self.cos_rotation * direction.y - self.sin_rotation * direction.x

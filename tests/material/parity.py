@@ -161,8 +161,8 @@ INTRODUCTION = """# Blender's Principled BSDF here and in Cycles
 
 `python tests/material/parity.py` writes this file; `tests/material/test_cycles_parity.py` holds the 5.0.1 rows.
 Each row: {materials} random materials with four direction pairs each, one noise-free Cycles pixel per case
-(`tools/cycles_probe.py`), our function in single precision on the CPU. The error of a case is the largest difference of a
-colour component over the largest component.
+(`tools/cycles_probe.py`), our function in single precision on the CPU. The error of a case is the largest difference of
+a colour component over the largest component.
 
 | materials | Blender | median | 99 % below | worst | share below 2e-5 |
 |---|---|---|---|---|---|

@@ -19,7 +19,9 @@ MATERIALS = 200
 def answers() -> dict[str, tuple[parity.Cases, np.ndarray]]:
     cases = {group.name: parity.random_cases(group, MATERIALS, seed) for seed, group in enumerate(parity.GROUPS)}
     batches = [{**cases[group.name].batch, "distribution": group.distribution} for group in parity.GROUPS]
-    return {group.name: (cases[group.name], a) for group, a in zip(parity.GROUPS, parity.ask_cycles(batches), strict=True)}
+    return {
+        group.name: (cases[group.name], a) for group, a in zip(parity.GROUPS, parity.ask_cycles(batches), strict=True)
+    }
 
 
 @needs_bpy

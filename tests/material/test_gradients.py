@@ -94,7 +94,7 @@ def test_derivative_is_the_finite_difference(name: str) -> None:
 
 @pytest.mark.parametrize("double", [True, False], ids=["double", "single"])
 def test_derivatives_are_finite_on_the_bounds(double: bool) -> None:
-    # Every parameter at a bound, at Blender's default or a hair inside; roughness 0.05 and views at 0.2 degrees included
+    # Every parameter at a bound, at Blender's default or a hair inside: roughness 0.05, views 0.2 degrees off the plane
     view, light, values = scene(4)
     rng = np.random.default_rng(5)
     for p in BLENDER_PRINCIPLED:
