@@ -115,7 +115,8 @@ class MFO_OT_fit(bpy.types.Operator):
                 f"The backend could not be started with {python} in {folder} ({error.strerror or error})."
             ) from error
         timer = not self._blocks() and not bpy.app.background
-        running_job.start(process, material, folder / report.request["reference"]["path"], report.notes, timer=timer)
+        reference_copy = folder / report.request["reference"]["path"]
+        running_job.start(process, material, reference_copy, report.notes, is_new=is_new, timer=timer)
 
     def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, object]:
         model = self.model or settings.model

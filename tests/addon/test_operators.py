@@ -181,6 +181,7 @@ def test_failures_of_the_backend_reach_the_script(
         fit(scene)
     assert runtime(scene).state == "FAILED"
     assert not runtime(scene).has_result
+    assert Path(scene.job).exists() == (end == "crash")  # bad input leaves nothing, a crash leaves its log
 
 
 def step_until(scene: SimpleNamespace, done) -> None:
