@@ -14,6 +14,7 @@ from . import previews
 from .backend_python import is_chosen
 from .operators.pictures import job_folder_of
 from .preferences import ADDON_ID, preference
+from .properties import chosen_of
 
 
 class _Panel:
@@ -47,10 +48,11 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
         column.prop(settings, "preset")
         column.prop(settings, "parameter_set")
         if settings.parameter_set == "chosen":
-            column.column(align=True).prop(settings, "parameters", text="Values")
+            column.column(align=True).prop(settings, chosen_of(settings.model), text="Values")
         header, body = column.panel("mfo_advanced", default_closed=True)
         header.label(text="Advanced")
         if body:
+            body.prop(settings, "model")
             body.prop(settings, "range")
             body.prop(settings, "max_iterations")
 

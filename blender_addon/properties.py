@@ -33,6 +33,28 @@ _PARAMETERS = (
     ("flatness", "Flatness", "Approximation of subsurface scattering"),
     ("spec_trans", "Transmission", "Weight of refraction"),
 )
+# sockets of Blender's Principled BSDF that can be fitted
+_SOCKETS = (
+    *(
+        "Base Color",
+        "Metallic",
+        "Roughness",
+        "IOR",
+        "Alpha",
+        "Diffuse Roughness",
+        "Specular IOR Level",
+        "Specular Tint",
+    ),
+    *("Anisotropic", "Anisotropic Rotation", "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR"),
+    *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
+    *("Thin Film IOR", "Emission Color", "Emission Strength"),
+)
+SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
+SOCKETS_START = {"base_color", "roughness", "metallic", "ior"}
+MODEL_ITEMS = (
+    ("mitsuba_principled", "Mitsuba", "Mitsuba's Principled, mapped to Blender's sockets when applied"),
+    ("blender_principled", "Blender", "The Principled BSDF as Cycles evaluates it"),
+)
 PARAMETER_ITEMS = tuple((name, label, text, 1 << i) for i, (name, label, text) in enumerate(_PARAMETERS))
 REDUCED = {"base_color", "roughness", "metallic", "specular"}
 PRESET_ITEMS = (
@@ -80,6 +102,14 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         options={"ENUM_FLAG"},
         default=REDUCED,
     )
+    sockets: EnumProperty(
+        name="Chosen Sockets",
+        description="Sockets that may change",
+        items=SOCKET_ITEMS,
+        options={"ENUM_FLAG"},
+        default=SOCKETS_START,
+    )
+    model: EnumProperty(name="Model", description="Material model to fit", items=MODEL_ITEMS)
     range: EnumProperty(
         name="Range",
         description="Compare scene-linear values (HDR) or the picture as displayed (LDR)",
@@ -148,6 +178,11 @@ CLASSES = (
     MFO_PG_socket_value,
     MFO_PG_material,
 )
+
+
+def chosen_of(model: str) -> str:
+    """Name of the setting that lists the chosen parameters of a model."""
+    return "sockets" if model == "blender_principled" else "parameters"
 
 
 def attach() -> None:

@@ -8,9 +8,10 @@ object between two steps, because undo and file load replace them.
 from __future__ import annotations
 
 import atexit
+import shutil
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -34,7 +35,7 @@ class RunningJob:
     material_name: str
     material_uid: int
     notes: Sequence[str]
-    progress: Event = field(default_factory=dict)
+    is_new: bool
 
 
 current: RunningJob | None = None
@@ -43,12 +44,18 @@ material_uid = 0  # of the material `result` belongs to, 0 when it came from ano
 
 
 def start(
-    process: JobProcess, material: bpy.types.Material, reference: Path, notes: Sequence[str], *, timer: bool
+    process: JobProcess,
+    material: bpy.types.Material,
+    reference: Path,
+    notes: Sequence[str],
+    *,
+    is_new: bool,
+    timer: bool,
 ) -> None:
-    """Take over a started process; with `timer` it is looked after while Blender runs."""
+    """Take over a started process; `is_new`: its folder was made for it; `timer`: look after it while Blender runs."""
     global current, result
     result = None
-    current = RunningJob(process, material.name, material.session_uid, tuple(notes))
+    current = RunningJob(process, material.name, material.session_uid, tuple(notes), is_new)
     atexit.register(close)
     runtime = _runtime()
     _clear(runtime)
@@ -158,7 +165,6 @@ def _handle(job: RunningJob, event: Event) -> None:
     runtime = _runtime()
     try:
         if event["event"] == "progress":
-            job.progress = event
             runtime.fraction = float(event["fraction"])
             if not job.process.cancelling:
                 runtime.progress_text = progress_text(event)
@@ -196,6 +202,9 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
             runtime.state = "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
+    if outcome.status == "bad_input" and job.is_new and not runtime.has_result:
+        shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
+        runtime.job_folder = ""
     redraw()
 
 

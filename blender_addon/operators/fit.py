@@ -15,6 +15,7 @@ from ..backend_python import BackendPythonError, backend_python
 from ..export.job import ExportError, check_export, export_job
 from ..job_process import JobProcess
 from ..preferences import new_job_folder, preference
+from ..properties import chosen_of
 from ..write_back import WriteBackError, principled_node
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
@@ -42,6 +43,7 @@ class MFO_OT_fit(bpy.types.Operator):
         description='"all", "reduced" or names with commas; empty: the scene\'s setting',
         options=_SCRIPT,
     )
+    model: StringProperty(name="Model", description="Material model; empty: the scene's setting", options=_SCRIPT)
     job_folder: StringProperty(name="Job Folder", description="Folder for the job; empty: a new one", options=_SCRIPT)
     range: StringProperty(
         name="Range", description='"hdr", "ldr" or "auto"; empty: the scene\'s setting', options=_SCRIPT
@@ -113,12 +115,14 @@ class MFO_OT_fit(bpy.types.Operator):
                 f"The backend could not be started with {python} in {folder} ({error.strerror or error})."
             ) from error
         timer = not self._blocks() and not bpy.app.background
-        running_job.start(process, material, folder / report.request["reference"]["path"], report.notes, timer=timer)
+        reference_copy = folder / report.request["reference"]["path"]
+        running_job.start(process, material, reference_copy, report.notes, is_new=is_new, timer=timer)
 
     def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, object]:
+        model = self.model or settings.model
         parameters: object = self.parameters or settings.parameter_set
         if parameters == "chosen":
-            parameters = ",".join(p.identifier for p in _chosen_items(settings))
+            parameters = ",".join(_chosen(settings, model))
             if not parameters:
                 raise FitError("No parameter is chosen: choose at least one, or All.")
         if parameters not in ("all", "reduced"):
@@ -126,6 +130,7 @@ class MFO_OT_fit(bpy.types.Operator):
             if not parameters:
                 raise FitError(f"parameters is {self.parameters!r}: give 'all', 'reduced' or names with commas.")
         fit = {
+            "model": model,
             "preset": self.preset or settings.preset,
             "parameters": parameters,
             "max_iterations": self.max_iterations or settings.max_iterations,
@@ -229,9 +234,11 @@ def _reference(settings: bpy.types.PropertyGroup, given: str) -> Path | bpy.type
     return Path(bpy.path.abspath(path))
 
 
-def _chosen_items(settings: bpy.types.PropertyGroup) -> list[bpy.types.EnumPropertyItem]:
-    items = settings.bl_rna.properties["parameters"].enum_items
-    return [item for item in items if item.identifier in settings.parameters]
+def _chosen(settings: bpy.types.PropertyGroup, model: str) -> list[str]:
+    """The chosen parameters of a model in the order of its list; the property itself is a set."""
+    name = chosen_of(model)
+    items = settings.bl_rna.properties[name].enum_items
+    return [item.identifier for item in items if item.identifier in getattr(settings, name)]
 
 
 def _error_summary() -> str:

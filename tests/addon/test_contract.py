@@ -31,6 +31,13 @@ def test_parameters_are_those_of_the_model(addon: object) -> None:
     assert set(parameters.REDUCED) == properties.REDUCED
 
 
+def test_sockets_are_those_of_the_model(addon: object) -> None:
+    from blender_addon import properties
+
+    parameters = pytest.importorskip("mfo_backend.material.principled_parameters")
+    assert [(item[0], item[1]) for item in properties.SOCKET_ITEMS] == list(parameters.SOCKET_OF_PARAMETER.items())
+
+
 def test_schema_versions_agree(addon: object) -> None:
     from blender_addon.export import job as export
 

@@ -127,6 +127,10 @@ def test_request_follows_operator_and_settings(scene: SimpleNamespace) -> None:
     assert {k: asked[k] for k in ("preset", "parameters", "max_iterations")} == {
         "preset": "paper", "parameters": ["base_color", "roughness"], "max_iterations": 7,
     }  # fmt: skip
+    settings.model, settings.sockets = "blender_principled", {"ior", "metallic"}
+    fit(scene, job_folder=scene.job + "1")
+    asked = json.loads(Path(scene.job + "1", "request.json").read_text("utf-8"))["fit"]
+    assert (asked["model"], asked["parameters"]) == ("blender_principled", ["metallic", "ior"])
     other = scene.job + "2"
     fit(scene, parameters="metallic, eta", max_iterations=9, range="ldr", job_folder=other)
     asked = json.loads(Path(other, "request.json").read_text("utf-8"))["fit"]
@@ -177,6 +181,7 @@ def test_failures_of_the_backend_reach_the_script(
         fit(scene)
     assert runtime(scene).state == "FAILED"
     assert not runtime(scene).has_result
+    assert Path(scene.job).exists() == (end == "crash")  # bad input leaves nothing, a crash leaves its log
 
 
 def step_until(scene: SimpleNamespace, done) -> None:
