@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from .clamp import saturate
 
 
+_TABLES: list[GridTable] = []
+
+
 class GridTable:
     """Values on a regular grid whose first and last nodes lie on 0 and 1 of each axis.
 
@@ -38,6 +41,7 @@ class GridTable:
         # (tables * cells, corners): the last axis of the grid varies fastest among the corners
         self.corners = np.moveaxis(np.asarray(corners, np.float64), 0, -1).reshape(-1, 2**self.dimensions)
         self._buffers: dict[type, Any] = {}
+        _TABLES.append(self)
 
     def buffer(self, float_type: type) -> Any:
         """The corners as an evaluated array of `float_type`, made once."""
@@ -75,6 +79,11 @@ class GridTable:
         buffer, parts = self.buffer(float_type), count // width
         packets = [dr.gather(packet, buffer, index * parts + part) for part in range(parts)]
         return [value for values in packets for value in values]
+
+
+def loaded_buffers() -> list[Any]:
+    """Buffers of all tables read so far: what a frozen launch has to name as its state."""
+    return [buffer for table in _TABLES for buffer in table._buffers.values()]
 
 
 @cache

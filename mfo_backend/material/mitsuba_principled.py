@@ -8,14 +8,14 @@ side; no transmission. Unlike the plugin no lobe is masked by "parameter > 0", s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from ..types.errors import BadInputError
-from ..types.parameter import Value
+from ..types.parameter import ParameterTable, Value
 from .mitsuba_parameters import MITSUBA_PRINCIPLED
 
 Scalar = Any  # mi.Float or a Python float; a float of exactly 0 leaves its lobe out of the kernel
@@ -47,12 +47,13 @@ def _smith_ggx(v: Any, alpha_x: Any, alpha_y: Any) -> Any:
 class MitsubaPrincipled:
     """The model `mitsuba_principled`: its parameter table and its evaluation."""
 
-    name = "mitsuba_principled"
-    table = MITSUBA_PRINCIPLED
+    name: str = "mitsuba_principled"
+    table: ParameterTable = MITSUBA_PRINCIPLED
     # what a global start scans instead of solving for: the first is the lobe width, the others are optional
-    scanned = ("roughness", "clearcoat_gloss")
+    scanned: tuple[str, ...] = ("roughness", "clearcoat_gloss")
+    two_sided: bool = False  # the plugin needs the wrapper `twosided`
 
-    def values(self, given: Mapping[str, Value]) -> dict[str, Value]:
+    def values(self, given: Mapping[str, Value], free: Collection[str]) -> dict[str, Value]:
         """All values `evaluate` needs besides the free ones, from those of a material; missing ones are the plugin's
         defaults.
 
@@ -61,12 +62,22 @@ class MitsubaPrincipled:
         BadInputError
             If the material transmits light.
         """
-        if given.get("spec_trans", 0.0) != 0.0:
+        if "spec_trans" in free or given.get("spec_trans", 0.0) != 0.0:
             raise BadInputError(
                 "Material with 'spec_trans': recorded paths hold reflected light only, use the preset 'paper'."
             )
-        unused = {"spec_trans", "specular" if "eta" in given else "eta"}
+        unused = {"spec_trans", "specular" if "eta" in {*given, *free} else "eta", *free}
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
+
+    def bind(
+        self, fixed: Mapping[str, Value], free: Collection[str]
+    ) -> Callable[[Mapping[str, Scalar], Any, Any], Any]:
+        """`evaluate`, which leaves out by itself what is exactly 0."""
+        return self.evaluate
+
+    def buffers(self) -> list[Any]:
+        """It reads no tables."""
+        return []
 
     def evaluate(self, parameters: Mapping[str, Scalar], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
         """Value of the BSDF times the cosine of `wo`, linear Rec.709; zero unless both directions are in front.

@@ -30,7 +30,8 @@ class RecordSettings:
     directional lights take one sample for each of them; the other lights one light sample and one sample of the
     proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
-    both axes is recorded, which bounds the memory of large pictures.
+    both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
+    wrapper.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -39,6 +40,7 @@ class RecordSettings:
     proposal: DefensiveProposal = field(default_factory=DefensiveProposal)
     hide_emitters: bool = False
     stride: int = 1
+    two_sided: bool = False
 
 
 @dataclass
@@ -81,7 +83,7 @@ def record_paths(
         ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        if shape.bsdf().class_name() == "TwoSided":
+        if settings.two_sided or shape.bsdf().class_name() == "TwoSided":
             si = _face_camera(si)
         dr.eval(si, position, filter_weight)
         lanes = _delta_lights(scene, si, position, filter_weight)
@@ -95,11 +97,13 @@ def record_paths(
         return merged
 
 
-def indirect_share(scene: mi.Scene, shape: mi.Shape, depth: int) -> float:
+def indirect_share(scene: mi.Scene, shape: mi.Shape, depth: int, two_sided: bool) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
     with dr.suspend_grad():
-        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2), allow_dark=True)
-        everything = record_paths(scene, shape, RecordSettings(grid=1, depth=depth), allow_dark=True)
+        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2, two_sided=two_sided), allow_dark=True)
+        everything = record_paths(
+            scene, shape, RecordSettings(grid=1, depth=depth, two_sided=two_sided), allow_dark=True
+        )
         sums = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) for p in (direct, everything)]
     return (sums[1] - sums[0]) / max(sums[0], 1e-30)
 

@@ -10,31 +10,16 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.recorded_models import RecordedModel
 from ..types.parameter import ParameterTable, Value
 from .recorded_paths import LaneGroups, RecordedPaths
-
-
-class MaterialModel(Protocol):
-    """A reflecting material as a plain Dr.Jit function of its values and two directions."""
-
-    name: str
-    table: ParameterTable
-    scanned: tuple[str, ...]  # values a global start scans: the main lobe's width first
-
-    def values(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """All values `evaluate` needs besides the free ones, from those of a material."""
-        ...
-
-    def evaluate(self, parameters: Mapping[str, Any], wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Color3f:
-        """BSDF times cosine."""
-        ...
 
 
 @contextmanager
@@ -70,7 +55,7 @@ class RecordedJacobian:
     output is an argument because a frozen function would keep the size it had at the recording.
     """
 
-    def __init__(self, model: MaterialModel, free: ParameterTable, fixed: Mapping[str, Value]) -> None:
+    def __init__(self, model: RecordedModel, free: ParameterTable, fixed: Mapping[str, Value]) -> None:
         self.model = model
         self.table = free
         values = {name: value for name, value in fixed.items() if name not in free.names}
@@ -79,9 +64,11 @@ class RecordedJacobian:
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
         self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
         dr.eval(self._constants)
+        self._evaluate = model.bind(values, free.names)
+        self._warm_up()
         self.evaluations = 0
         # a recording is made anew when the relation of the array sizes changes; that is rare and no cause for a warning
-        self._launch = dr.freeze(self._kernel, auto_opaque=False, warn_after=1000)
+        self._launch = dr.freeze(self._kernel, auto_opaque=False, warn_after=1000, state_fn=lambda *_: model.buffers())
 
     def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
         """Mean radiance of the groups without the constant part, then its derivatives: (g, 3, 1 + K)."""
@@ -123,7 +110,7 @@ class RecordedJacobian:
         """The weighted BSDF value and its derivative by each free value."""
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         dr.enable_grad(*values)
-        result = self.model.evaluate(self._parameters(values, constants), wi, wo) * weight
+        result = self._evaluate(self._parameters(values, constants), wi, wo) * weight
         columns = [dr.detach(result)]
         for value in values:
             dr.set_grad(value, 1.0)
@@ -132,6 +119,13 @@ class RecordedJacobian:
             columns.append(mi.Color3f(dr.grad(result)))
             dr.clear_grad(result)
         return columns
+
+    def _warm_up(self) -> None:
+        """Let the model load its tables: a frozen launch cannot."""
+        theta = mi.Float(self.table.pack({}).astype(np.float32))
+        values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
+        up = mi.Vector3f(0.0, 0.0, 1.0)
+        dr.eval(self._evaluate(self._parameters(values, self._constants), up, up))
 
     def _parameters(self, values: list[mi.Float], constants: mi.Float) -> dict[str, Any]:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)

@@ -16,16 +16,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..material.mitsuba_principled import MitsubaPrincipled
+from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import BadInputError
 from ..types.parameter import Value
 from .mitsuba_renderer import MitsubaRenderer
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
-from .recorded_jacobian import MaterialModel, RecordedJacobian
+from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths
-
-MODELS: dict[str, Callable[[], MaterialModel]] = {"mitsuba_principled": MitsubaPrincipled}
 
 # Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
 # noise of 64 samples a pixel.
@@ -53,14 +51,14 @@ class RecordedScene:
     """
 
     def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
-        if renderer.model not in MODELS:
+        if renderer.shape.is_emitter():
             raise BadInputError(
-                f"Material model {renderer.model!r} has no recorded-path version: use the preset 'paper'."
+                "The target emits light: recorded paths hold reflected light only, use the preset 'paper'."
             )
         self.renderer = renderer
         self._covered = covered
-        self.model = MODELS[renderer.model]()
-        self._fixed = self.model.values(_values_of(renderer, self.model))
+        self.model = recorded_model(renderer.model, renderer.shape.bsdf())
+        self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
         self._integrator = renderer.scene.integrator()
         self.needs = self._probe()
@@ -73,7 +71,7 @@ class RecordedScene:
         depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
-        share = indirect_share(scene, self.renderer.shape, depth)
+        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided)
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, 2, (note,))
@@ -94,7 +92,7 @@ class RecordedScene:
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
-        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride)
+        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, self.model.two_sided)
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
@@ -120,7 +118,7 @@ class RecordedScene:
         return table.unpack(vector)[name] if name in table.names else self._fixed[name]
 
 
-def _values_of(renderer: MitsubaRenderer, model: MaterialModel) -> dict[str, Value]:
+def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value]:
     """The values of the target's material in the scene.
 
     Raises

@@ -91,7 +91,7 @@ def test_another_fixed_value_needs_no_other_kernel(recording):
 
     scene, paths = recording
     table, groups = scene.renderer.table.select(["base_color", "roughness"]), paths.pixel_groups()
-    fixed = scene.model.values({"metallic": 0.25, "specular": 0.5})
+    fixed = scene.model.values({"metallic": 0.25, "specular": 0.5}, table.names)
     x = table.pack({"base_color": (0.5, 0.4, 0.3), "roughness": 0.3})
     before = RecordedJacobian(scene.model, table, fixed)(x, paths, groups)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
