@@ -106,6 +106,10 @@ def target(scene: Any) -> Any:
     collection = bpy.data.collections.new("Closed")
     scene.collection.children.link(collection)
     collection.hide_viewport = True
+    excluded = bpy.data.collections.new("Excluded")
+    scene.collection.children.link(excluded)
+    excluded.objects.link(bpy.data.objects.new("Nowhere", bpy.data.meshes.new("Nowhere")))
+    bpy.context.view_layer.layer_collection.children["Excluded"].exclude = True
     bpy.ops.curve.primitive_bezier_circle_add(location=(0, 0, -3))
     curve = bpy.context.object.data
     curve.bevel_depth, curve.render_resolution_u = 0.1, 3
