@@ -47,17 +47,19 @@ _SOCKETS = (
     ),
     *("Anisotropic", "Anisotropic Rotation", "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR"),
     *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
-    *("Thin Film IOR", "Emission Color", "Emission Strength"),
+    "Thin Film IOR",
 )
 SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
-SOCKETS_START = {"base_color", "roughness", "metallic", "ior"}
+SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}
 MODEL_ITEMS = (
-    ("mitsuba_principled", "Mitsuba", "Mitsuba's Principled, mapped to Blender's sockets when applied"),
     ("blender_principled", "Blender", "The Principled BSDF as Cycles evaluates it"),
+    ("mitsuba_principled", "Mitsuba", "Mitsuba's Principled, mapped to Blender's sockets when applied"),
 )
 PARAMETER_ITEMS = tuple((name, label, text, 1 << i) for i, (name, label, text) in enumerate(_PARAMETERS))
 REDUCED = {"base_color", "roughness", "metallic", "specular"}
 PRESET_ITEMS = (
+    ("balanced", "Balanced", "Least squares on recorded light paths, then on perceptual differences; no start needed"),
+    ("fast", "Fast", "Least squares on recorded light paths only"),
     ("paper", "Paper", "Adam on the mean squared error until it stops improving, then a new optimisation on FLIP"),
 )
 

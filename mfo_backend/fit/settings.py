@@ -52,7 +52,7 @@ class FitSettings:
     """
 
     model: str = "auto"
-    preset: str = "paper"
+    preset: str = "balanced"
     parameters: str | tuple[str, ...] = "all"
     losses: tuple[str, ...] = ("mse", "flip")
     range: str = "auto"

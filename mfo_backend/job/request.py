@@ -174,8 +174,8 @@ def _material(bsdf_id: str, data: Any) -> Material:
         socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture"))
         value = socket.raw("value", None)
         numbers = value if isinstance(value, list) else [value]
-        if value is not None and not (numbers and all(map(is_number, numbers))):
-            raise socket.wrong("value", "a number, a list of numbers or null")
+        if not (value is None or isinstance(value, bool) or (numbers and all(map(is_number, numbers)))):
+            raise socket.wrong("value", "a number, a list of numbers, true, false or null")
         texture = socket.text("texture") if socket.raw("texture", None) is not None else None
         sockets[name] = Socket(value, socket.boolean("linked", False), texture)
     return Material(
