@@ -29,7 +29,7 @@ _NEEDS = {
     "anisotropic_rotation": "anisotropic",
 }
 # Emission belongs to an emitter beside the BSDF, so that no renderer differentiates it here
-_FIXED = ("emission_color", "emission_strength")
+FIXED = ("emission_color", "emission_strength")
 
 
 def select_blender_parameters(
@@ -51,7 +51,7 @@ def select_blender_parameters(
     BadInputError
         For unknown, linked or ineffective names, and when nothing is left to fit.
     """
-    names = ", ".join(name for name in BLENDER_PRINCIPLED.names if name not in _FIXED)
+    names = ", ".join(name for name in BLENDER_PRINCIPLED.names if name not in FIXED)
     if isinstance(selection, str):
         if selection not in ("all", "reduced"):
             raise BadInputError(f'Unknown parameter set {selection!r}: give "all", "reduced" or names of {names}.')
@@ -61,7 +61,7 @@ def select_blender_parameters(
         return BLENDER_PRINCIPLED.select(name for name in wanted if name not in linked)
     table = BLENDER_PRINCIPLED.select(selection)
     for name in table.names:
-        if name in _FIXED:
+        if name in FIXED:
             raise BadInputError(f"Parameter {name!r} cannot be fitted: emission is a light; choose among {names}.")
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")

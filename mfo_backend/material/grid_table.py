@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from .clamp import saturate
 
-
 _TABLES: list[GridTable] = []
 
 

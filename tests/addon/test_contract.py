@@ -25,17 +25,20 @@ def test_good_outcomes_are_those_with_exit_code_0(addon: object) -> None:
 
 def test_parameters_are_those_of_the_model(addon: object) -> None:
     from blender_addon import properties
+    from mfo_backend.material import mitsuba_parameters as parameters
 
-    parameters = pytest.importorskip("mfo_backend.material.mitsuba_parameters")
     assert {item[0] for item in properties.PARAMETER_ITEMS} == set(parameters.MITSUBA_PRINCIPLED.names)
     assert set(parameters.REDUCED) == properties.REDUCED
 
 
 def test_sockets_are_those_of_the_model(addon: object) -> None:
     from blender_addon import properties
+    from mfo_backend.material.blender_selection import FIXED, REDUCED
+    from mfo_backend.material.principled_parameters import SOCKET_OF_PARAMETER
 
-    parameters = pytest.importorskip("mfo_backend.material.principled_parameters")
-    assert [(item[0], item[1]) for item in properties.SOCKET_ITEMS] == list(parameters.SOCKET_OF_PARAMETER.items())
+    fitted = [(name, socket) for name, socket in SOCKET_OF_PARAMETER.items() if name not in FIXED]
+    assert [(item[0], item[1]) for item in properties.SOCKET_ITEMS] == fitted
+    assert set(REDUCED) == properties.SOCKETS_START
 
 
 def test_schema_versions_agree(addon: object) -> None:

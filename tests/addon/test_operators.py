@@ -121,7 +121,7 @@ def test_apply_leaves_links_alone(scene: SimpleNamespace) -> None:
 def test_request_follows_operator_and_settings(scene: SimpleNamespace) -> None:
     settings = scene.bpy.context.scene.mfo
     settings.parameter_set, settings.parameters = "chosen", {"roughness", "base_color"}
-    settings.max_iterations = 7
+    settings.max_iterations, settings.model, settings.preset = 7, "mitsuba_principled", "paper"
     fit(scene)
     asked = json.loads(Path(scene.job, "request.json").read_text("utf-8"))["fit"]
     assert {k: asked[k] for k in ("preset", "parameters", "max_iterations")} == {
