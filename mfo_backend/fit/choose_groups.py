@@ -47,7 +47,7 @@ GRID_PLAIN, GRID_DETAIL, GRID_HIGHLIGHT = 2, 6, 20
 def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Camera rays along each axis for the pixels (height, width) of a picture, more where it has detail on the target.
 
-    Pixels next to the silhouette stay plain; the fit does not look at them.
+    The finest grid is not for pixels at the silhouette, whose change is that to the background.
     """
     value = luminance(reference)
     lit = value[mask & (value > 0.0)]
@@ -59,6 +59,6 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
             inside &= np.roll(mask, shift, axis)
             change = np.maximum(change, np.abs(level - np.roll(level, shift, axis)))
     grid = np.full(level.shape, GRID_PLAIN)
-    grid[inside & (change > 0.1)] = GRID_DETAIL
+    grid[mask & (change > 0.1)] = GRID_DETAIL
     grid[inside & (change > 0.5)] = GRID_HIGHLIGHT
     return grid

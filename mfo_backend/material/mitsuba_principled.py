@@ -71,7 +71,7 @@ class MitsubaPrincipled:
 
     def bind(
         self, fixed: Mapping[str, Value], free: Collection[str]
-    ) -> Callable[[Mapping[str, Scalar], Any, Any], Any]:
+    ) -> Callable[[Mapping, Any, Any], Any]:
         """`evaluate`, which leaves out by itself what is exactly 0."""
         return self.evaluate
 

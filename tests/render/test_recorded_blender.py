@@ -40,7 +40,7 @@ def test_equals_the_path_traced_picture(tmp_path, lights):
 
 
 def test_a_point_light_fit_reproduces_the_picture(tmp_path):
-    renderer = load(tmp_path, POINT, size=32)
+    renderer = load(tmp_path, POINT, NAMES[:4], size=32)  # the coat's highlight is finer than these pixels
     x = renderer.table.pack(TRUTH)
     reference = renderer.image(x, seed=5, spp=1024)
     outcome = recover_material(
