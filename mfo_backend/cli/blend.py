@@ -87,10 +87,11 @@ def fit_blend(
     BadInputError, SetupError, MfoError
         With the sentence of the export or of the fit. A cancelled fit is a result, with what was found so far.
     """
+    is_new = not job.exists()
     exported = host.call(
         "export", blend, "--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)
     )
-    done = run_folder(job, fit_scene)
+    done = run_folder(job, fit_scene, is_new=is_new)
     if done.result is None:
         raise _ERRORS.get(done.status, MfoError)(done.sentence)
     return BlendFit(job, done.result, tuple(exported.get("notes", ())))

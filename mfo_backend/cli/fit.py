@@ -49,9 +49,10 @@ def work(arguments: argparse.Namespace, fitter: Fitter) -> int:
     if arguments.exposure is not None or arguments.gamma is not None:
         view = DisplayView(arguments.exposure or 0.0, 1.0 if arguments.gamma is None else arguments.gamma)
     folder = arguments.out or _free_folder(arguments.scene)
+    is_new = not folder.exists()
     make_job(arguments.scene, arguments.target, arguments.reference, settings, folder, view=view)
     stream = take_stdout() if arguments.json else None
-    done = run_folder(folder, fitter)
+    done = run_folder(folder, fitter, is_new=is_new)
     if done.result is None:
         report_error(done.status, done.sentence, stream=stream)
         return leave(done.status)

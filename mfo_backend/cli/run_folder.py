@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,11 +26,13 @@ class FolderRun:
     result: Mapping[str, Any] | None
 
 
-def run_folder(folder: Path, fitter: Fitter) -> FolderRun:
-    """Run the job in `folder` with a progress bar on stderr."""
+def run_folder(folder: Path, fitter: Fitter, *, is_new: bool) -> FolderRun:
+    """Run the job in `folder` with a progress bar on stderr; a new folder whose job is refused is removed."""
     events = EventWriter(bar=True)
     with (stop := StopSignal(cancel_file=folder / "cancel")).watching():
         status = run_job(folder, events, stop, fitter=fitter)
     path = folder / "result.json"
+    if is_new and status is Status.BAD_INPUT:
+        shutil.rmtree(folder, ignore_errors=True)
     result = json.loads(path.read_text("utf-8")) if path.is_file() else None
     return FolderRun(status, events.last_sentence, result)
