@@ -85,11 +85,6 @@ def run(arguments: argparse.Namespace) -> int:
         folder / "job",
         fit_from_options(arguments),
     )
-    for stage in fit.result["stages"]:
-        say(
-            f"stage {stage['name']}: {stage['loss_start']:.5f} -> {stage['loss_best']:.5f} in "
-            f"{stage['iterations']} iterations. {stage['sentence']}"
-        )
     apply_result(host, folder / "start.blend", fit.job, folder / "recovered.blend")
     after = render("recovered.blend", "after.exr", _JUDGE_SEED)
     view = DisplayView()
