@@ -68,6 +68,14 @@ def node_tree_of(owner: Any) -> bpy.types.NodeTree | None:
     return tree if owner.use_nodes else None
 
 
+def default_surface_is_principled() -> bool:
+    """Whether Cycles gives faces without material a Principled BSDF, as since Blender 5.0, or a diffuse of 0.8.
+
+    Measured: diffuse in 4.3, Principled in 5.0 and 5.2. Materials got nodes for good in the same release.
+    """
+    return getattr(bpy.types.Material.bl_rna.properties.get("use_nodes"), "is_deprecated", False)
+
+
 def has_compositor(scene: bpy.types.Scene) -> bool:
     """Whether rendered pictures pass through compositing nodes (a node group from Blender 5.0 on)."""
     if not scene.render.use_compositing:

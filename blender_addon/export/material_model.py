@@ -55,5 +55,5 @@ class Material:
 
 
 def grey(name: str) -> Material:
-    """Return the material Blender shows where a slot is empty: diffuse 0.8."""
+    """Return a Lambertian surface of 0.8, which stands in for what is not exported."""
     return Material(name, "diffuse", {"Base Color": Socket((0.8, 0.8, 0.8))})

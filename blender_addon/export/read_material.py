@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..versions import PRINCIPLED, active_output, node_tree_of
+from ..versions import PRINCIPLED, active_output, default_surface_is_principled, node_tree_of
 from .color_space import to_rec709
 from .findings import Findings
 from .material_model import Material, Socket, grey
@@ -13,6 +13,14 @@ from .shader_graph import UnsupportedNodeError, plain_value, read_socket, source
 
 NORMAL_SOCKETS = ("Normal", "Coat Normal", "Tangent")
 SKIPPED_SOCKETS = ("Weight",)
+# what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
+DEFAULT_SOCKETS = {
+    "Base Color": Socket((0.8, 0.8, 0.8)),
+    "Metallic": Socket(0.0),
+    "Roughness": Socket(0.5),
+    "IOR": Socket(1.5),
+    "Specular IOR Level": Socket(0.5),
+}
 # shaders of other objects with a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
 SIMPLE_SHADERS = {
     "ShaderNodeBsdfDiffuse": ("diffuse", {"Base Color": "Color"}, {}),
@@ -55,7 +63,8 @@ def read_target(material: bpy.types.Material | None, owner: str, slot: int, find
 def read_context(material: bpy.types.Material | None, owner: str, findings: Findings) -> Material:
     """Return the material of something that is not fitted; what is unknown becomes grey, with a note."""
     if material is None:
-        return grey(f"{owner} without material")
+        name = f"{owner} without material"
+        return Material(name, "principled", dict(DEFAULT_SOCKETS)) if default_surface_is_principled() else grey(name)
     tree = node_tree_of(material)
     if tree is None:
         color = [float(value) for value in to_rec709(list(material.diffuse_color)[:3])]

@@ -219,6 +219,19 @@ def test_principled_albedo_is_near_that_of_cycles(
     np.testing.assert_allclose(found, expected, rtol=0.025)
 
 
+def test_faces_without_material_look_as_in_cycles(
+    scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    world_color(scene, 0.2)
+    add_light("SUN", rotation=(0.0, -0.7, 0.0), energy=2.0, angle=0.0)
+    add_camera("ORTHO", (3.0, 0.0, 4.0), (0.0, np.arccos(0.8), 0.0), ortho_scale=0.5)
+    add_quad("Floor", 4.0, 0.0, None)
+    target = add_quad("Target", 0.02, 0.01, new_material("Target"))
+    expected, found = render_cycles().mean(axis=(0, 1)), render_mitsuba(export(target)).mean(axis=(0, 1))
+    # near the mirror direction, where a Lambertian surface would be 20 % darker
+    np.testing.assert_allclose(found, expected, rtol=0.08)
+
+
 def test_working_space_is_converted(scene: Any, export: Any) -> None:
     """With a wide working space of Blender 5 the same numbers are another colour."""
     if not hasattr(bpy.data.colorspace, "working_space"):
