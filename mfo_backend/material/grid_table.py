@@ -45,11 +45,7 @@ class GridTable:
     def buffer(self, float_type: type) -> Any:
         """The corners as an evaluated array of `float_type`, made once."""
         if float_type not in self._buffers:
-            values = float_type(
-                self.corners.astype(np.float64 if dr.type_v(float_type) == dr.VarType.Float64 else "f4").ravel()
-            )
-            dr.make_opaque(values)
-            self._buffers[float_type] = values
+            self._buffers[float_type] = own_memory(self.corners.ravel(), float_type)
         return self._buffers[float_type]
 
     def __call__(self, *places: Any, choice: Any = None) -> Any:
@@ -83,6 +79,19 @@ class GridTable:
 def loaded_buffers() -> list[Any]:
     """Buffers of all tables read so far: what a frozen launch has to name as its state."""
     return [buffer for table in _TABLES for buffer in table._buffers.values()]
+
+
+def own_memory(values: NDArray[Any], float_type: type) -> Any:
+    """An evaluated copy of `values` in Dr.Jit's own memory.
+
+    An array made from NumPy's keeps its place in memory, where packets can only be read if it happens to be aligned:
+    kernels then differ from one process to the next.
+    """
+    double = dr.type_v(float_type) == dr.VarType.Float64
+    borrowed = float_type(np.ascontiguousarray(values, np.float64 if double else np.float32))
+    copied = borrowed + dr.opaque(float_type, 0)  # a plain copy or gather would share the memory
+    dr.eval(copied)
+    return copied
 
 
 @cache

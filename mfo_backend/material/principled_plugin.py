@@ -77,6 +77,9 @@ class BlenderPrincipled(mi.BSDF):
         for flag in components[1:]:
             flags |= flag
         self.m_flags = flags
+        # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
+        above = mi.Vector3f(0, 0, 1)
+        evaluate(layer_stack({}, above, self.lobes, self.model), above)
 
     def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Show every value; those of lobes that are left out too, so that a caller can set them."""

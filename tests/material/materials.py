@@ -17,6 +17,12 @@ MATERIALS: dict[str, dict[str, Any]] = {
         "sheen_roughness": 0.4,
         "sheen_tint": (0.2, 0.6, 1.0),
     },
+    "sheen alone": {
+        "base_color": (0.0, 0.0, 0.0),
+        "specular_ior_level": 0.0,
+        "sheen_weight": 1.0,
+        "sheen_roughness": 0.3,
+    },
     "glass": {"base_color": (0.9, 0.8, 0.7), "transmission_weight": 1.0, "roughness": 0.5},
     "film": {"base_color": (0.1, 0.1, 0.1), "roughness": 0.4, "thin_film_thickness": 450.0, "thin_film_ior": 1.38},
     "mixture": {

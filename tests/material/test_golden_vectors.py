@@ -68,7 +68,8 @@ def value(parameters: dict[str, Any], view: Any, light: Any, distribution: str =
     vector = dr.llvm.ad.Array3f
     lobes = needed_lobes(parameters)
     model = cycles_model((5, 0), distribution)
-    return np.array(blender_principled(parameters, vector(*view), vector(*light), lobes, model)).ravel()
+    directions = (vector(*map(float, direction)) for direction in (view, light))
+    return np.array(blender_principled(parameters, *directions, lobes, model)).ravel()
 
 
 @pytest.mark.parametrize(("name", "parameters", "first", "second"), GOLDEN, ids=[row[0] for row in GOLDEN])
