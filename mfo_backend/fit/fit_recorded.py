@@ -81,13 +81,13 @@ def fit_recorded(
     certainty: dict[str, Certainty] = {}
     notes = list(scene.needs.notes)
     if not should_stop():
-        last = fit.last_problem(found, _censored(RelativeResidual if scene.needs.sampled else log_residual, limit))
-        found = fit.refine("refine", last, found).x
-        found, certainty = _keep_unseen(fit, last, found, notes)
+        make = RelativeResidual if scene.needs.sampled else log_residual
+        solution, last = fit.refine(found, _censored(make, limit))
+        found, certainty = _keep_unseen(fit, last, solution.x, notes)
         candidates.append(found)
         for name, response in perceptual.items():
-            stage = fit.problem(fit.paths, last.groups, lambda target, r=response: ResponseResidual(r, target))
-            candidates.append(fit.refine(name, stage, found).x)
+            polished = fit.polish(name, last.groups, lambda target, r=response: ResponseResidual(r, target), found)
+            candidates.append(polished.x)
     else:
         candidates.append(found)
 

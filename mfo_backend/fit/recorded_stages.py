@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..render.recorded_paths import LaneGroups
+from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..types.image import Pixels
@@ -78,27 +78,27 @@ class RecordedFit:
     ) -> None:
         self.scene, self.reference, self.mask = scene, reference, mask
         self.plan, self.seed, self.course = plan, seed, course
+        self.paths: RecordedPaths
         self.table = scene.renderer.table
 
-    def problem(self, paths, groups: LaneGroups, make: MakeResidual) -> Problem:
-        """The residuals of these groups."""
-        return Problem(self.scene.evaluator(paths, groups), make(groups.average(self.reference)), groups)
+    def problem(self, groups: LaneGroups, make: MakeResidual) -> Problem:
+        """The residuals of these groups of the present recording."""
+        return Problem(self.scene.evaluator(self.paths, groups), make(groups.average(self.reference)), groups)
 
     def start_from_nothing(self, make: MakeResidual) -> Solution:
         """Stages `scan` and `start`: the best solution from the scan's nodes, the scene's material and a random one."""
         plan, renderer = self.plan, self.scene.renderer
         sampled = self.scene.needs.sampled
-        # where every light is exact, only the pixel's footprint is sampled
-        grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
-        paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
-        self.paths = paths
-        groups = all_groups(paths, tiles=sampled)
         with self.course.stage("scan") as stage:
-            few = self.problem(paths, fewer_groups(groups, self.reference, plan.scan_lanes), make)
+            # where every light is exact, only the pixel's footprint is sampled
+            grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
+            self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
+            groups = all_groups(self.paths, tiles=sampled)
+            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make)
             nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
             stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
-            more = self.problem(paths, fewer_groups(groups, self.reference, plan.start_lanes), make)
+            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
@@ -138,16 +138,22 @@ class RecordedFit:
         limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
-    def last_problem(self, near: Vector, make: MakeResidual) -> Problem:
-        """All residuals at the solution: a new and finer recording where the light is sampled, all pixels elsewhere."""
-        if self.scene.needs.sampled:
-            self.paths = self.scene.record(near, grid=self.plan.grid_last, seed=self.seed + 1, near=True)
-        return self.problem(self.paths, all_groups(self.paths, tiles=self.scene.needs.sampled), make)
+    def refine(self, start: Vector, make: MakeResidual) -> tuple[Solution, Problem]:
+        """Stage `refine`: all residuals, on a new and finer recording near the solution where the light is sampled."""
+        with self.course.stage("refine") as stage:
+            sampled = self.scene.needs.sampled
+            if sampled:
+                self.paths = self.scene.record(start, grid=self.plan.grid_last, seed=self.seed + 1, near=True)
+            problem = self.problem(all_groups(self.paths, tiles=sampled), make)
+            solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
+            stage.vector = solution.x
+        return solution, problem
 
-    def refine(self, name: str, problem: Problem, start: Vector, evaluations: int = 15) -> Solution:
-        """A stage that goes on from `start` on all residuals."""
+    def polish(self, name: str, groups: LaneGroups, make: MakeResidual, start: Vector) -> Solution:
+        """A stage with another residual on the same recording."""
         with self.course.stage(name) as stage:
-            solution = self._solve(self.course.watch(stage, problem.equations), start, evaluations)
+            problem = self.problem(groups, make)
+            solution = self._solve(self.course.watch(stage, problem.equations), start, 25)
             stage.vector = solution.x
         return solution
 
