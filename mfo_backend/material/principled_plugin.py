@@ -20,6 +20,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ..types.errors import SetupError
 from ..types.parameter import Value
 from .blender_principled import evaluate
 from .cycles_model import cycles_model
@@ -36,6 +37,8 @@ class BlenderPrincipled(mi.BSDF):
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
+        if not mi.is_rgb:
+            raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
         version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")))
         self.reachable_only = not props.get("unreachable_refraction", True)
