@@ -140,7 +140,7 @@ def set_up_llvm() -> None:
     DevError
         If none is found and none may be installed.
     """
-    probe = [venv_program("python"), "-m", "mfo_backend", "doctor", "--require", "renderer"]
+    probe = [venv_program("python"), "-m", "mfo_backend", "doctor"]
     if runs(*probe):
         return
     if can_apt_install():
