@@ -181,6 +181,18 @@ def test_what_was_tried_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         llvm.configure_llvm()
 
 
+def test_a_missing_system_library_is_named_and_not_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stderr = "ImportError: libatomic.so.1: cannot open shared object file: No such file\nNameError: name '_drjit_ext'"
+    monkeypatch.setattr(llvm, "llvm_candidates", lambda: [tmp_path / "libLLVM-19.so"])
+    verdict = llvm.LlvmVerdict("libLLVM-19.so", False, llvm._reason(stderr, 1))
+    monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: verdict)
+    with pytest.raises(SetupError, match=r"needs the system library libatomic\.so\.1.*apt install libatomic1"):
+        llvm.configure_llvm()
+    works = llvm.LlvmVerdict("libLLVM-19.so", True, "")
+    monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: works)
+    assert llvm.configure_llvm() == tmp_path / "libLLVM-19.so"
+
+
 def test_without_mitsuba_llvm_is_not_blamed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(llvm.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(SetupError, match="mitsuba and drjit are not installed in") as caught:
