@@ -28,6 +28,7 @@ from .cache_folder import cache_folder
 from .llvm_candidates import llvm_candidates
 
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
+_LIBRARY_AT_FAULT = ("LLVM ERROR", "too old")
 _NOT_LOADED = r"ImportError: (\S+\.so[.\d]*): cannot open shared object file"
 _PACKAGE_OF = {
     "libatomic.so.1": ("libatomic1", "libatomic")
@@ -53,7 +54,8 @@ def probe_llvm(path: Path, *, timeout: float = PROBE_SECONDS) -> LlvmVerdict:
     verdict = _probe_in_child(path, timeout)
     if verdict is None:  # says nothing about the library, so it is not kept
         return LlvmVerdict(str(path), False, f"gave no answer within {timeout:.0f} seconds")
-    if missing_system_library([verdict]):  # nor does this
+    # any other failure may be the machine's, and be gone after a repair
+    if not verdict.works and not any(mark in verdict.reason for mark in _LIBRARY_AT_FAULT):
         return verdict
     with contextlib.suppress(OSError):
         remembered.parent.mkdir(parents=True, exist_ok=True)
@@ -201,7 +203,7 @@ def _probe_in_child(path: Path, timeout: float) -> LlvmVerdict | None:
 def _reason(stderr: str, returncode: int) -> str:
     """The line of a failed probe's output that says why."""
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
-    for mark in ("ImportError: lib", "LLVM ERROR", "too old", "FMA"):
+    for mark in ("ImportError: lib", *_LIBRARY_AT_FAULT, "FMA"):
         for line in lines:
             if mark in line:
                 return line[line.find("LLVM ERROR") :][:120] if mark == "LLVM ERROR" else line.split(". ")[0][:160]
