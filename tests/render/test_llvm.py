@@ -137,7 +137,7 @@ def test_a_verdict_holds_until_the_file_changes(tmp_path: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"works": true}'])
 def test_a_damaged_verdict_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str) -> None:
-    fresh = llvm.LlvmVerdict(str(tmp_path / "a.so"), False, "fresh")
+    fresh = llvm.LlvmVerdict(str(tmp_path / "a.so"), True, "fresh")
     monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: fresh)
     llvm.probe_llvm(tmp_path / "a.so")
     (kept,) = (cache_folder() / "llvm").iterdir()
