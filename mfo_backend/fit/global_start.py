@@ -19,14 +19,14 @@ Vector = NDArray[np.float64]
 ROUGHNESS_NODES = (0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9)
 SECOND_NODES = (0.3, 0.9)
 # From the middle of the box a mirror-like metal is taken for a black plastic: the diffuse lobe can vanish by a black
-# colour or by full metallic, and the two are different basins. So every roughness starts as a metal once, too.
-METAL = 0.95
+# colour or by full metallic, and the two are different basins. So every roughness is solved as a metal once, too.
+METAL = 0.98
 METAL_SECOND_NODES = (0.6,)
 
 
 @dataclass(frozen=True)
 class ScanNode:
-    """One node of the scan: the values it held, whether it started as a metal, the best vector and its cost."""
+    """One node of the scan: the values it held, whether it was held a metal, the best vector and its cost."""
 
     held: tuple[float, ...]
     metal: bool
@@ -50,12 +50,10 @@ def scan(
     for metal, second in ((False, SECOND_NODES), (True, METAL_SECOND_NODES)):
         if metal and "metallic" not in table.names:
             continue
-        middle = 0.5 * (table.lower + table.upper)
-        if metal:
-            middle[table.slice_of("metallic")] = METAL
+        hold = {"metallic": METAL} if metal else {}
         for values in product(*(ROUGHNESS_NODES if name == scanned[0] else second for name in held)):
-            start, lower, upper = middle.copy(), table.lower, table.upper
-            for name, value in zip(held, values, strict=True):
+            start, lower, upper = 0.5 * (table.lower + table.upper), table.lower, table.upper
+            for name, value in {**hold, **dict(zip(held, values, strict=True))}.items():
                 part = table.slice_of(name)
                 start[part] = lower[part] = upper[part] = value
             limits = SolveLimits(evaluations=evaluations, cost_change=1e-3, damping=1e-3)
@@ -65,7 +63,7 @@ def scan(
 
 
 def different_nodes(nodes: Sequence[ScanNode], count: int) -> list[ScanNode]:
-    """The best `count` nodes that are no neighbours: apart by more than 0.2 in a log value or in their kind of start."""
+    """The best `count` nodes that are no neighbours: apart by more than 0.2 in a log value or in being a metal."""
     chosen: list[ScanNode] = []
     for node in nodes:
         if all(_apart(node, other) for other in chosen):

@@ -35,7 +35,7 @@ class RecordedPlan:
     refine_lanes
         Those the last stage looks at where every light is exact: without noise more of them say nothing new.
     starts
-        Nodes of the scan to start from, besides the material in the scene and a random one.
+        Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     trial_evaluations
         After as many only starts within `keep_factor` of the best cost go on.
     solved_rms
@@ -104,6 +104,8 @@ class RecordedFit:
             more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
+            metals = [node for node in nodes if node.metal]
+            starts += [node.x for node in metals[:2] if not any(node.x is x for x in starts)]
             starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
             best = self._race(watched, starts)
             stage.vector = best.x
