@@ -26,6 +26,9 @@ class FitSettings:
 
     Attributes
     ----------
+    preset
+        ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
+        ``"balanced"``: perceptual least squares from there. The last two use `range`, `seed`, `verify_spp` and `region` only.
     model, parameters
         Material model, and the names to fit, ``"all"`` or ``"reduced"``.
     losses
