@@ -11,6 +11,7 @@ from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.certainty import Level
+from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.event import Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
@@ -120,3 +121,11 @@ def test_cancel_returns_the_best_so_far(tmp_path):
     outcome, _ = fit(renderer, reference, stop=lambda: next(calls) > 20)
     assert outcome.result.status is Status.CANCELLED
     assert np.isfinite(renderer.table.pack(outcome.result.recovered)).all()
+
+
+def test_a_reference_with_holes_is_refused(tmp_path):
+    renderer = load(tmp_path, POINT, size=24)
+    reference = renderer.image(renderer.start, seed=5, spp=4)
+    reference[12, 12] = np.nan
+    with pytest.raises(BadInputError, match="1 pixels with NaN"):
+        fit(renderer, reference)
