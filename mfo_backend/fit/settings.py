@@ -28,7 +28,7 @@ class FitSettings:
     ----------
     preset
         ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
-        ``"balanced"``: perceptual least squares from there. The last two use only `range`, `seed`, `verify_spp`, `region`.
+        ``"balanced"``: perceptual least squares from there. They use only `range`, `seed`, `verify_spp` and `region`.
     model, parameters
         Material model, and the names to fit, ``"all"`` or ``"reduced"``.
     losses
