@@ -1,10 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Blender side: export a job, run the backend beside Blender, write the recovered values onto the material."""
 
+from __future__ import annotations
+
+import bpy
+
+from . import handlers, panel, preferences, previews, properties, running_job
+from .operators import CLASSES as OPERATORS
+
+CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
+
 
 def register() -> None:
     """Add the classes and properties of the extension to Blender."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    properties.attach()
+    previews.register()
+    handlers.register()
 
 
 def unregister() -> None:
-    """Take everything `register` added away again."""
+    """Take everything `register` added away again; a running fit is stopped first."""
+    running_job.close()
+    handlers.unregister()
+    previews.unregister()
+    properties.detach()
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

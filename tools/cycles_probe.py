@@ -46,23 +46,19 @@ def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (s
             settings = json.dumps({"distribution": batch.get("distribution", "MULTI_GGX")})
             np.savez(source, view=batch["view"], light=batch["light"], settings=np.array(settings), **arrays)
             files += [str(source), str(source.with_suffix(".out.npy"))]
-        end = ["--"] if command[-1] == "-P" else []
-        run = subprocess.run(
-            [*command[:-1], command[-1], str(Path(__file__).resolve()), *end, *files]
-            if not end
-            else [*command, str(Path(__file__).resolve()), *end, *files],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        between = ["--"] if command[-1] == "-P" else []
+        arguments = [*command, str(Path(__file__).resolve()), *between, *files]
+        run = subprocess.run(arguments, capture_output=True, text=True, check=False)
         missing = [name for name in files[1::2] if not Path(name).is_file()]
         if missing:
-            raise RuntimeError(f"Cycles gave no answer (exit {run.returncode}): {run.stderr[-2000:]}{run.stdout[-2000:]}")
+            raise RuntimeError(
+                f"Cycles gave no answer (exit {run.returncode}): {run.stderr[-2000:]}{run.stdout[-2000:]}"
+            )
         return [np.load(name) for name in files[1::2]]
 
 
 def facet_frames(view: Array, light: Array) -> tuple[Array, Array]:
-    """World frames (cases, 3, 3), columns tangent, bitangent, normal, that put `view` on +Z and `light` in the XZ plane.
+    """World frames (cases, 3, 3), columns tangent, bitangent, normal: `view` on +Z, `light` in the XZ plane.
 
     The second result is the angle between the two directions in radians, (cases,).
     """

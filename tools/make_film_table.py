@@ -92,14 +92,15 @@ def main() -> None:
     from mfo_backend.material.colour_interference import LONGEST_PATH_NM, fourier_table
 
     wavelength = np.arange(360.0, 831.0, 5.0)
-    table = fourier_table(np.array(mi.cie1931_xyz(mi.Float(wavelength))).T.astype(float), wavelength)
+    curves: Any = mi.cie1931_xyz(mi.Float(wavelength))  # type: ignore[arg-type]
+    table = fourier_table(np.array(curves).T.astype(float), wavelength)
     count = len(table)
     rows, rests = [], []
     for index, (angle, metal) in enumerate((a, m) for a in ANGLES for m in (False, True)):
         films = random_films(index, metal)
         measured = measured_reflectance(films, angle, metal)
         none, slopes, path, partial = coefficients(films, angle, metal)
-        design = sparse.csr_matrix((CASES, 2 * count))
+        design: Any = sparse.csr_matrix((CASES, 2 * count))
         for k, order in enumerate(ORDERS):
             place = np.clip(order * path / LONGEST_PATH_NM, 0, 1) * (count - 1)
             node = np.minimum(place.astype(int), count - 2)
@@ -113,15 +114,19 @@ def main() -> None:
         good = partial & np.all((measured > 1e-4) & (measured < 0.9999), axis=1)
         rows.append(design[good])
         rests.append((measured - model)[good])
-        print(f"{angle:5.0f} {'metal' if metal else 'glass'}: {np.abs(rests[-1]).max():.1e} largest, "
-              f"{np.sqrt(np.mean(rests[-1] ** 2)):.1e} rms")
+        print(
+            f"{angle:5.0f} {'metal' if metal else 'glass'}: {np.abs(rests[-1]).max():.1e} largest, "
+            f"{np.sqrt(np.mean(rests[-1] ** 2)):.1e} rms"
+        )
     design, rest = sparse.vstack(rows), np.concatenate(rests)
     # The ridge keeps entries that no film shows at their computed value
     normal = (design.T @ design).toarray() + 1e-6 * np.eye(2 * count)
     correction = np.linalg.solve(normal, design.T @ rest)
     left = rest - design @ correction
-    print(f"before {np.sqrt(np.mean(rest**2)):.1e} rms, after {np.sqrt(np.mean(left**2)):.1e} rms, "
-          f"{np.abs(left).max():.1e} largest; largest correction {np.abs(correction).max():.1e}")
+    print(
+        f"before {np.sqrt(np.mean(rest**2)):.1e} rms, after {np.sqrt(np.mean(left**2)):.1e} rms, "
+        f"{np.abs(left).max():.1e} largest; largest correction {np.abs(correction).max():.1e}"
+    )
     table += np.concatenate([correction[:count], correction[count:]], axis=1)
     np.savez_compressed(TARGET, response=table.astype(np.float32))
 

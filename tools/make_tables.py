@@ -48,7 +48,9 @@ def index_of_refraction(z: Array) -> Array:
     return np.minimum((1 + z**2) / np.maximum(1 - z**2, 1e-12), LARGEST_IOR)
 
 
-def questions(axes: tuple[Array, ...], sockets: Callable[..., dict[str, Array]]) -> tuple[dict[str, Array], Array, Array]:
+def questions(
+    axes: tuple[Array, ...], sockets: Callable[..., dict[str, Array]]
+) -> tuple[dict[str, Array], Array, Array]:
     """Sockets, view and light of the grid of `axes`, the second axis being mu."""
     grid = [g.ravel() for g in np.meshgrid(*axes, indexing="ij")]
     view, light = mirror_pairs(grid[1])
@@ -138,7 +140,8 @@ def albedo_and_average(value: dict[tuple[str, str], Array], name: str, mean_fres
     """E and Eavg from a white and a grey lobe.
 
     With F = 1 the compensated lobe is the single-scattering one over E. With a mean Fresnel f below 1 the factor
-    1 + m (1 - E) / E gives m = f Eavg / (1 - f (1 - Eavg)), solved for Eavg; views with most multiple scattering count most.
+    1 + m (1 - E) / E gives m = f Eavg / (1 - f (1 - Eavg)), solved for Eavg; views with most multiple scattering count
+    most.
     """
     albedo = value[f"{name} white", "GGX"] / value[f"{name} white", "MULTI_GGX"]
     factor = value[f"{name} grey", "MULTI_GGX"] / value[f"{name} grey", "GGX"]
@@ -157,11 +160,11 @@ def nodes_of(name: str, table: Array) -> Array:
 def sheen_questions(mu: Array, roughness: Array) -> tuple[Array, Array, dict[str, Array]]:
     """Views and lights (5 x mu x roughness, 3) and sockets of a white sheen over a black, mirrorless base."""
     m, r = (g.ravel() for g in np.meshgrid(mu, roughness, indexing="ij"))
-    view = np.stack([np.sqrt(1 - m**2), 0 * m, m], axis=1)
+    view = np.stack([np.sqrt(1 - m**2), 0 * m, m], axis=1).astype(np.float64)
     lights = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0.36, 0.48, 0.8)]
-    light = np.concatenate([np.tile(direction, (len(m), 1)) for direction in lights])
+    light: Array = np.concatenate([np.tile(np.array(direction, np.float64), (len(m), 1)) for direction in lights])
     count = len(light)
-    sockets = {
+    sockets: dict[str, Array] = {
         "Base Color": np.zeros((count, 3)),
         "Specular IOR Level": np.zeros(count),
         "Sheen Weight": np.ones(count),

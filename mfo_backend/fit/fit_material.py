@@ -11,7 +11,7 @@ import numpy as np
 
 from ..metrics.loss import Loss
 from ..metrics.tone_mapping import DisplayView
-from ..render.renderer import Renderer
+from ..render.renderer import Interrupted, Renderer
 from ..types.event import Listener, Started
 from ..types.image import Image, Pixels
 from ..types.result import FitResult
@@ -100,9 +100,11 @@ def _verify(
     for candidate in candidates:
         if should_stop():
             return None
-        verified.append(
-            Candidate(candidate.vector, renderer.image(candidate.vector, seed=seed, spp=settings.verify_spp))
-        )
+        try:
+            image = renderer.image(candidate.vector, seed=seed, spp=settings.verify_spp)
+        except Interrupted:
+            return None
+        verified.append(Candidate(candidate.vector, image))
     return tuple(verified)
 
 

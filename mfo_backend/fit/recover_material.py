@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..metrics.tone_mapping import DisplayView
-from ..render.mitsuba_renderer import MitsubaRenderer
+from ..render.renderer import Renderer
 from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
@@ -15,7 +15,7 @@ from .settings import FitSettings
 
 
 def recover_material(
-    renderer: MitsubaRenderer,
+    renderer: Renderer,
     reference: Image,
     settings: FitSettings,
     *,

@@ -30,7 +30,8 @@ class FitSettings:
         ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
         ``"balanced"``: perceptual least squares from there. They use only `range`, `seed`, `verify_spp` and `region`.
     model, parameters
-        Material model, and the names to fit, ``"all"`` or ``"reduced"``.
+        Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
+        holds Blender's socket values, else Mitsuba's.
     losses
         Stages in order, ``"mse"`` or ``"flip"``. The paper's method is the pair; one alone is its comparison.
     range
@@ -53,8 +54,8 @@ class FitSettings:
         Pixels the losses look at: those that see the target, or all.
     """
 
-    model: str = "mitsuba_principled"
-    preset: str = "paper"
+    model: str = "auto"
+    preset: str = "balanced"
     parameters: str | tuple[str, ...] = "all"
     losses: tuple[str, ...] = ("mse", "flip")
     range: str = "auto"

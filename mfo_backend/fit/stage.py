@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..render.renderer import Renderer
+from ..render.renderer import Interrupted, Renderer
 from ..solve.adam import Adam
 from ..solve.stopping import Stopping, StoppingRules
 from ..types.image import Pixels
@@ -71,7 +71,11 @@ def run_stage(
         if should_stop():
             status = Status.CANCELLED
             break
-        image, pullback = renderer.image_and_pullback(vector, seed=seed, spp=spp)
+        try:
+            image, pullback = renderer.image_and_pullback(vector, seed=seed, spp=spp)
+        except Interrupted:
+            status = Status.CANCELLED
+            break
         loss, pixel_gradient = value_and_gradient(image)
         if stopping.iterations == 0:
             loss_start = loss
@@ -92,7 +96,11 @@ def run_stage(
             continue
         if status is not None:
             break
-        gradient = pullback(pixel_gradient) if math.isfinite(loss) else np.full_like(vector, math.nan)
+        try:
+            gradient = pullback(pixel_gradient) if math.isfinite(loss) else np.full_like(vector, math.nan)
+        except Interrupted:
+            status = Status.CANCELLED
+            break
         if np.isfinite(gradient).all():
             strikes = 0
             vector = adam.step(vector, gradient)

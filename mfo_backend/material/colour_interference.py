@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colour of an interference order: the Fourier transform of the observer's sensitivity at an optical path difference."""
+"""Colour of an interference order: the Fourier transform of the observer's sensitivity at a path difference."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clamp import saturate
+from .grid_table import own_memory
 
 # Linear Rec.709 from CIE XYZ, white D65 (IEC 61966-2-1), and that white
 XYZ_TO_RGB = np.array(
@@ -52,12 +53,10 @@ def fourier_table(sensitivity: NDArray[np.float64], wavelength_nm: NDArray[np.fl
 @cache
 def _packed(float_type: type) -> Any:
     """The table as rows of eight numbers: RGB real, 0, RGB imaginary, 0."""
-    with (resources.files(__package__) / "tables" / "thin_film.npz").open("rb") as file:
+    with (resources.files(str(__package__)) / "tables" / "thin_film.npz").open("rb") as file:
         rows = np.load(file, allow_pickle=False)["response"]
     zeros = np.zeros((len(rows), 1))
-    values = float_type(np.concatenate([rows[:, :3], zeros, rows[:, 3:], zeros], axis=1).astype(rows.dtype).ravel())
-    dr.make_opaque(values)
-    return values
+    return own_memory(np.concatenate([rows[:, :3], zeros, rows[:, 3:], zeros], axis=1).ravel(), float_type)
 
 
 def fourier_response(path_nm: Any, colour: type) -> tuple[Any, Any]:

@@ -18,7 +18,7 @@ from .grid_table import cycles_table
 
 @dataclass(frozen=True)
 class Compensation:
-    """The two factors of a compensated lobe; the lobe is scaled by their product, its layer's albedo by `weight` alone."""
+    """The two factors of a compensated lobe: their product scales the lobe, `weight` alone the albedo of its layer."""
 
     lobe: Any  # 1 / E
     weight: Any  # E + Fms (1 - E)

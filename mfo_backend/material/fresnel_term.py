@@ -22,8 +22,13 @@ class MetalTerm:
     film: ThinFilm | None = None
 
     def __call__(self, c: Any) -> Any:
+        """Reflectance for the cosine `c` of view and half vector, RGB."""
         plain = f82(c, self.f0, self.slope)
-        return plain if self.film is None else dr.select(self.film.present, self.film.on_metal(c, self.f0, self.slope), plain)
+        return (
+            plain
+            if self.film is None
+            else dr.select(self.film.present, self.film.on_metal(c, self.f0, self.slope), plain)
+        )
 
 
 @dataclass(frozen=True)
@@ -35,11 +40,14 @@ class DielectricTerm:
     film: ThinFilm | None = None
 
     def __call__(self, c: Any) -> Any:
+        """Reflectance for the cosine `c` of view and half vector, RGB."""
         plain = self.f0 + (1 - self.f0) * schlick_blend(c, self.n)
         if self.film is None:
             return plain
         bare = normal_incidence(self.n)
         coated = self.film.on_dielectric(c, self.n, type(self.f0))
         # The tint acts on the part of the coated reflectance that stems from normal incidence
-        tinted = coated * (1 + (self.f0 / dr.maximum(bare, 1e-5) - 1) * saturate((coated - 1) / dr.minimum(bare - 1, -1e-5)))
+        tinted = coated * (
+            1 + (self.f0 / dr.maximum(bare, 1e-5) - 1) * saturate((coated - 1) / dr.minimum(bare - 1, -1e-5))
+        )
         return dr.select(self.film.present, dr.select(bare > 1e-5, tinted, coated), plain)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -15,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clamp import saturate
-
 
 _TABLES: list[GridTable] = []
 
@@ -47,9 +45,7 @@ class GridTable:
     def buffer(self, float_type: type) -> Any:
         """The corners as an evaluated array of `float_type`, made once."""
         if float_type not in self._buffers:
-            values = float_type(self.corners.astype(np.float64 if dr.type_v(float_type) == dr.VarType.Float64 else "f4").ravel())
-            dr.make_opaque(values)
-            self._buffers[float_type] = values
+            self._buffers[float_type] = own_memory(self.corners.ravel(), float_type)
         return self._buffers[float_type]
 
     def __call__(self, *places: Any, choice: Any = None) -> Any:
@@ -85,11 +81,22 @@ def loaded_buffers() -> list[Any]:
     return [buffer for table in _TABLES for buffer in table._buffers.values()]
 
 
+def own_memory(values: NDArray[Any], float_type: type) -> Any:
+    """An evaluated copy of `values` in Dr.Jit's own memory.
+
+    An array made from NumPy's keeps its place in memory, where packets can only be read if it happens to be aligned:
+    kernels then differ from one process to the next.
+    """
+    double = dr.type_v(float_type) == dr.VarType.Float64
+    borrowed = float_type(np.ascontiguousarray(values, np.float64 if double else np.float32))
+    copied = borrowed + dr.opaque(float_type, 0)  # a plain copy or gather would share the memory
+    dr.eval(copied)
+    return copied
+
+
 @cache
 def cycles_table(*names: str, plane: int | None = None) -> GridTable:
     """Tables measured in Cycles (`tools/make_tables.py`): `names` of equal shape, or one `plane` of a stack of them."""
-    archive = resources.files(__package__) / "tables" / "cycles_albedo.npz"
+    archive = resources.files(str(__package__)) / "tables" / "cycles_albedo.npz"
     with archive.open("rb") as file, np.load(file, allow_pickle=False) as data:
         return GridTable(*(data[name] if plane is None else data[name][plane] for name in names))
-
-

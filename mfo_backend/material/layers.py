@@ -37,8 +37,8 @@ from .thin_film import ThinFilm
 class Layers:
     """Weights (RGB, compensation included) and shapes of the lobes; None where a lobe is left out.
 
-    `wi`, in the frame of the anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a direction
-    of the surface's own frame into it.
+    `wi`, in the frame of the anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a
+    direction of the surface's own frame into it.
     """
 
     wi: Any
@@ -69,7 +69,7 @@ class Layers:
     subsurface: Any = None
 
     def to_frame(self, direction: Any) -> Any:
-        """`direction` of the surface's frame in the frame of the lobes: the view's side up, tangent along the first axis."""
+        """`direction` of the surface's frame in that of the lobes: the view's side up, tangent along the first axis."""
         z = dr.mulsign(direction.z, self.flip)
         x = self.cos_rotation * direction.x + self.sin_rotation * direction.y
         y = self.cos_rotation * direction.y - self.sin_rotation * direction.x
@@ -222,8 +222,10 @@ def _add_plastic(
     if film is not None:
         albedo = dr.select(film.present, fresnel(mu), albedo)
     present = (n != 1) | (film.present if film is not None else False)
-    # A channel that the coat's tint has made black takes no part in the achromatic attenuation
-    hidden = dr.select(w > 0, dr.select(present, gain.weight * albedo, 0), 0)
+    # A channel that the coat's tint has made black takes no part in the achromatic attenuation; when all are black, as
+    # under a fully metallic surface, the derivative still has to see the attenuation
+    counts = (w > 0) | (largest(w) <= 0)
+    hidden = dr.select(counts & present, gain.weight * albedo, 0)
     stack |= {"specular": dr.select(present, w * gain.scale, 0), "specular_fresnel": fresnel}
     w = w * saturate(1 - largest(hidden))
     colour = at_least(p["base_color"], 0)

@@ -41,9 +41,9 @@ def lobe_choice(layers: Layers, with_transparency: bool) -> LobeChoice:
         strength["sheen"] = mean(layers.sheen)
     if layers.coat is not None:
         strength["coat"] = mean(layers.coat) * dielectric(mu, layers.coat_ior)
-    if layers.metal is not None:
+    if layers.metal is not None and layers.metal_fresnel is not None:
         strength["base"] = mean(layers.metal * layers.metal_fresnel(mu))
-    if layers.specular is not None:
+    if layers.specular is not None and layers.specular_fresnel is not None:
         strength["base"] = strength.get("base", 0) + mean(layers.specular * layers.specular_fresnel(mu))
     if layers.glass is not None:
         strength["glass"] = mean(layers.glass)

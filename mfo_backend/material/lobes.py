@@ -12,7 +12,7 @@ from .principled_parameters import BLENDER_PRINCIPLED
 
 @dataclass(frozen=True)
 class Lobes:
-    """The parts of the model that are evaluated. A part that is False is left out as if its weight were fixed at zero."""
+    """The parts of the model that are evaluated; a part that is False counts as absent."""
 
     dielectric: bool = True  # specular reflection and diffuse
     metal: bool = True

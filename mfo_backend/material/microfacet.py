@@ -26,7 +26,7 @@ def smith_lambda(w: Any, ax: Any, ay: Any) -> Any:
 
 
 def reflection(wi: Any, wo: Any, h: Any, ax: Any, ay: Any) -> Any:
-    """D G2 / (4 mu): f_r |cos| of a perfectly reflecting single-scattering lobe. Both directions are above the surface."""
+    """D G2 / (4 mu): f_r |cos| of a white single-scattering lobe, both directions above the surface."""
     g2 = dr.rcp(1 + smith_lambda(wi, ax, ay) + smith_lambda(wo, ax, ay))
     return density(h, ax, ay) * g2 / (4 * dr.maximum(wi.z, 1e-7))
 

@@ -2,10 +2,11 @@
 """The Mitsuba plugin `blender_principled`. Choose the variant, an RGB one with derivatives, before importing this.
 
 Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a nested texture read at the surface point,
-further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will change
-after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later brings
-the lobe back and compiles anew. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
-`<id>.<name>.data`.
+further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will
+change after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later
+brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
+no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `mi.traverse` shows
+`<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`.
 
 A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
 on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
@@ -19,6 +20,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ..types.errors import SetupError
 from ..types.parameter import Value
 from .blender_principled import evaluate
 from .cycles_model import cycles_model
@@ -35,14 +37,17 @@ class BlenderPrincipled(mi.BSDF):
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
+        if not mi.is_rgb:
+            raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
         version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
-        self.model = cycles_model(version, props.get("distribution", "MULTI_GGX"))
+        self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")))
+        self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
         self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
         fixed: dict[str, Value | None] = {}
         for item in BLENDER_PRINCIPLED:
-            value = props.get(item.name, item.default)
+            value: Any = props.get(item.name, item.default)
             if isinstance(value, mi.Texture):
                 fixed[item.name] = None
             elif item.size == 3:
@@ -77,13 +82,16 @@ class BlenderPrincipled(mi.BSDF):
         for flag in components[1:]:
             flags |= flag
         self.m_flags = flags
+        # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
+        above = mi.Vector3f(0, 0, 1)
+        evaluate(layer_stack({}, above, self.lobes, self.model), above)
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Show every value; those of lobes that are left out too, so that a caller can set them."""
         for item in BLENDER_PRINCIPLED:
             callback.put(item.name, getattr(self, item.name), mi.ParamFlags.Differentiable)
 
-    def parameters_changed(self, keys: list[str] | None = None) -> None:
+    def parameters_changed(self, keys: Any = ()) -> None:
         """Trace the lobes of the changed values from now on, whatever they are."""
         changed = {key.split(".")[0] for key in keys or ()} & set(BLENDER_PRINCIPLED.names)
         if changed - self.free:
@@ -92,7 +100,7 @@ class BlenderPrincipled(mi.BSDF):
         for name in changed:
             dr.make_opaque(getattr(self, name))
 
-    def values_at(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> dict[str, Any]:
+    def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
         """Parameter values at a surface point, by name."""
         values: dict[str, Any] = {}
         for item in BLENDER_PRINCIPLED:
@@ -102,46 +110,52 @@ class BlenderPrincipled(mi.BSDF):
             values[item.name] = value
         return values
 
-    def _layers(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Layers:
+    def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> Layers:
         return layer_stack(self.values_at(si, active), si.wi, self.lobes, self.model)
 
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)
 
-    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool = True) -> Any:
+    def _value(self, layers: Layers, local: Any) -> Any:
+        return mi.Color3f(evaluate(layers, local, reachable_only=self.reachable_only))
+
+    def _density(self, layers: Layers, choice: LobeChoice, local: Any) -> Any:
+        return pdf(layers, choice, local, reachable_only=self.reachable_only)
+
+    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
         layers = self._layers(si, active)
-        return dr.select(active, mi.Color3f(evaluate(layers, layers.to_frame(wo))), 0)
+        return dr.select(active, self._value(layers, layers.to_frame(wo)), 0)
 
-    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool = True) -> Any:
+    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""
         layers = self._layers(si, active)
-        return dr.select(active, pdf(layers, self._choice(ctx, layers), layers.to_frame(wo)), 0)
+        return dr.select(active, self._density(layers, self._choice(ctx, layers), layers.to_frame(wo)), 0)
 
     def eval_pdf(
-        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool = True
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
     ) -> tuple[Any, Any]:
         """`eval` and `pdf`, the layers evaluated once."""
         layers = self._layers(si, active)
         local = layers.to_frame(wo)
-        density = pdf(layers, self._choice(ctx, layers), local)
-        return dr.select(active, mi.Color3f(evaluate(layers, local)), 0), dr.select(active, density, 0)
+        density = self._density(layers, self._choice(ctx, layers), local)
+        return dr.select(active, self._value(layers, local), 0), dr.select(active, density, 0)
 
     def sample(
         self,
         ctx: mi.BSDFContext,
         si: mi.SurfaceInteraction3f,
-        sample1: mi.Float,
+        sample1: Any,
         sample2: mi.Point2f,
-        active: mi.Bool = True,
+        active: Any = True,
     ) -> tuple[mi.BSDFSample3f, Any]:
         """A direction of any lobe and value over density; straight through with probability 1 - alpha."""
         layers = self._layers(si, active)
         choice = self._choice(ctx, layers)
         local, lobe, valid = sample(layers, choice, sample1, sample2)
         valid &= active
-        density = pdf(layers, choice, local)
-        weight = mi.Color3f(evaluate(layers, local)) / dr.maximum(density, 1e-30)
+        density = self._density(layers, choice, local)
+        weight = self._value(layers, local) / dr.maximum(density, 1e-30)
         weight = dr.select(density > 0, weight, 0)
         glass = lobe == NAMES.index("glass")
         diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
@@ -160,12 +174,12 @@ class BlenderPrincipled(mi.BSDF):
         bs.sampled_component = mi.UInt32(0)
         return bs, dr.select(valid, weight, 0)
 
-    def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+    def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
         """Share of light that passes unchanged, 1 - alpha."""
         alpha = self.values_at(si, active)["alpha"]
         return dr.select(active, mi.Color3f(1 - alpha), 0) if self.lobes.alpha else mi.Color3f(0)
 
-    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
         """Base colour."""
         return mi.Color3f(self.values_at(si, active)["base_color"])
 

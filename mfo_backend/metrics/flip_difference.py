@@ -69,7 +69,7 @@ class FlipDifference:
         Where a pixel's difference is zero, the error's minimum and cusp, its contribution is 0.
         """
         hyab = np.maximum(self._hyab, _HYAB_SLOPE_FLOOR)
-        colour_error = np.maximum(self._colour_error, _redistribute(_HYAB_SLOPE_FLOOR))
+        colour_error = np.maximum(self._colour_error, float(_redistribute(_HYAB_SLOPE_FLOOR)))
         error = weight * self.error
         slope = np.where(self._colour_error < _PT, _QC * _LOWER_SLOPE, _QC * _UPPER_SLOPE).astype(hyab.dtype)
         g_hyab = slope * np.power(hyab, _QC - 1)

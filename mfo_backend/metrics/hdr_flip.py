@@ -23,6 +23,11 @@ from .tone_curve import ToneCurve
 Array = NDArray[np.floating]
 
 
+# Up to this many pixels times exposures everything the gradient needs is kept, some 100 bytes for each; beyond, the
+# exposures that win somewhere are computed again
+_KEPT = 2**23
+
+
 class HdrFlip:
     """HDR-FLIP against one reference whose features are computed once.
 
@@ -75,25 +80,31 @@ class HdrFlip:
         planes = planes_of(test.astype(self.dtype, copy=False))
         error = np.zeros(planes.shape[1:], self.dtype)
         winner = np.full(error.shape, -1, np.int16)
-        comparisons = {}
+        keep = error.size * self.exposures.count <= _KEPT
+        comparisons: dict[int, FlipComparison] = {}
         for index, comparison in self._compare(planes):
             larger = comparison.error > error
             if larger.any():
                 np.copyto(error, comparison.error, where=larger)
                 winner[larger] = index
-                comparisons[index] = comparison
+                if keep:
+                    comparisons[index] = comparison
 
         gradient = np.zeros_like(planes)
-        for index, comparison in comparisons.items():
+        for index, ev in enumerate(self.exposures.values):
             won = winner == index
             if won.any():
+                comparison = comparisons.pop(index, None) or self._compare_at(index, planes)
                 shown = comparison.pullback((won * weight).astype(self.dtype, copy=False))
-                gradient += self._curve.pullback(planes, self.exposures.values[index], shown)
+                gradient += self._curve.pullback(planes, ev, shown)
         return error, pixels_of(gradient)
 
     def _compare(self, planes: Array) -> Iterator[tuple[int, FlipComparison]]:
-        for index, (ev, reference) in enumerate(zip(self.exposures.values, self._references, strict=True)):
-            yield index, reference.compare(self._curve.apply(planes, ev))
+        for index in range(self.exposures.count):
+            yield index, self._compare_at(index, planes)
+
+    def _compare_at(self, index: int, planes: Array) -> FlipComparison:
+        return self._references[index].compare(self._curve.apply(planes, self.exposures.values[index]))
 
 
 def hdr_flip_map(

@@ -50,9 +50,9 @@ class SquaredLoss:
         """The differences of the responses, scaled so that their squares sum to the loss: (height * width * 3,)."""
         check_image(image, self._target.shape)
         difference = self._response.apply(image) - self._target
-        return (difference / np.sqrt(difference.size)).ravel()
+        return (difference / difference.size**0.5).ravel()
 
     def residual_jacobian(self, image: Array, tangents: Array) -> Array:
         """Derivative of `residual` along image derivatives (count, height, width, 3): (height * width * 3, count)."""
-        pushed = self._response.push(image, tangents) / np.sqrt(self._target.size)
+        pushed = self._response.push(image, tangents) / self._target.size**0.5
         return pushed.reshape(len(tangents), -1).T

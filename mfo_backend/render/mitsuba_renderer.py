@@ -123,9 +123,11 @@ def load_mitsuba_renderer(
     scene_xml: Path, shape_id: str, *, model: str, parameters: str | Sequence[str], materials: Materials
 ) -> MitsubaRenderer:
     """See `renderer.load_renderer`."""
-    prepare = material_model(model)
     document = read_scene(scene_xml)
     target = find_target(document, shape_id)
+    if model == "auto":
+        model = "blender_principled" if target.bsdf_id in materials else "mitsuba_principled"
+    prepare = material_model(model)
     prepare_for_fit(document)
     material = prepare(document, target, parameters, materials)
     load_variant()

@@ -17,6 +17,10 @@ Vector = NDArray[np.float64]
 Pullback = Callable[[Pixels], Vector]
 
 
+class Interrupted(Exception):  # noqa: N818  # a request, not an error
+    """A renderer gave up its picture because the job was asked to stop."""
+
+
 class Renderer(Protocol):
     """Pictures of one scene as a function of the parameters being fitted."""
 

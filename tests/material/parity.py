@@ -47,6 +47,8 @@ PLASTIC = {**BASE, "ior": (1.05, 2.5), "specular_ior_level": (0.0, 1.0), "specul
 COAT = {"coat_weight": (0.0, 1.0), "coat_roughness": (0.15, 1.0), "coat_ior": (1.05, 2.5), "coat_tint": (0.05, 1.0)}
 SHEEN = {"sheen_weight": (0.0, 1.0), "sheen_roughness": (0.1, 1.0), "sheen_tint": (0.0, 1.0)}
 TURN = {"anisotropic": (0.0, 1.0), "anisotropic_rotation": (0.0, 1.0)}
+# Below these reflectances the metal's extinction is the small difference of large numbers in Cycles' single precision
+SHINY = {"base_color": (0.05, 1.0), "roughness": (0.15, 1.0), "metallic": (0.0, 1.0), "specular_tint": (0.2, 1.0)}
 METAL = {"metallic": (0.0, 1.0), "specular_tint": (0.0, 1.0)}
 FILM = {"thin_film_thickness": (0.0, 1200.0), "thin_film_ior": (1.05, 2.2)}
 
@@ -69,7 +71,7 @@ GROUPS = (
     ),
     Group("half glass", {**PLASTIC, **COAT, "transmission_weight": (0.0, 1.0), "metallic": (0.0, 1.0)}, {}, worst=5e-4),
     Group("film on plastic", {**PLASTIC, **FILM}, {}, worst=5e-4),
-    Group("film on metal", {**BASE, **METAL, **FILM}, {}, since=(5, 0), worst=5e-4),
+    Group("film on metal", {**SHINY, **FILM}, {}, since=(5, 0), worst=5e-4),
     Group("film on glass", {**BASE, **FILM, "ior": (1.05, 2.5)}, {"transmission_weight": 1.0}, worst=5e-4),
     Group(
         "film on glass, refracted",
@@ -155,14 +157,22 @@ def relative_difference(ours: Array, theirs: Array) -> Array:
     return np.abs(ours - theirs).max(axis=1) / scale
 
 
+def at_total_reflection(cases: Cases) -> NDArray[np.bool_]:
+    """Cases at the onset of total reflection, where 1 - F is the root of a difference that single precision loses."""
+    index = np.where(cases.view[:, 2] < 0, 1 / cases.values["ior"], cases.values["ior"])
+    half = cases.view + index[:, None] * cases.light
+    cosine = np.sum(half * cases.view, axis=1) / np.linalg.norm(half, axis=1)
+    return np.abs(index**2 - 1 + cosine**2) < 5e-3
+
+
 TABLE = ROOT / "docs" / "material_parity.md"
 TABLE_VERSION = "5.0.1"
 INTRODUCTION = """# Blender's Principled BSDF here and in Cycles
 
 `python tests/material/parity.py` writes this file; `tests/material/test_cycles_parity.py` holds the 5.0.1 rows.
 Each row: {materials} random materials with four direction pairs each, one noise-free Cycles pixel per case
-(`tools/cycles_probe.py`), our function in single precision on the CPU. The error of a case is the largest difference of a
-colour component over the largest component.
+(`tools/cycles_probe.py`), our function in single precision on the CPU. The error of a case is the largest difference of
+a colour component over the largest component.
 
 | materials | Blender | median | 99 % below | worst | share below 2e-5 |
 |---|---|---|---|---|---|
@@ -195,6 +205,13 @@ def main(others: Sequence[str]) -> None:
 
 
 NOTES = """
+What is left:
+
+- Roughness below 0.3: Cycles computes the isotropic distribution from 1 - (N.H)^2 in single precision; the anisotropic
+  form, without that difference, agrees to 2e-6 on the same materials.
+- Light through glass at the onset of total reflection, where 1 - F goes as the root of a difference.
+- Film on metal with reflectances below 0.05: the extinction is the small difference of large numbers.
+- Sheen near the normal, where its albedo, a table of five decimals, is a few hundred times the last decimal.
 """
 
 if __name__ == "__main__":

@@ -19,7 +19,9 @@ MATERIALS = 200
 def answers() -> dict[str, tuple[parity.Cases, np.ndarray]]:
     cases = {group.name: parity.random_cases(group, MATERIALS, seed) for seed, group in enumerate(parity.GROUPS)}
     batches = [{**cases[group.name].batch, "distribution": group.distribution} for group in parity.GROUPS]
-    return {group.name: (cases[group.name], a) for group, a in zip(parity.GROUPS, parity.ask_cycles(batches), strict=True)}
+    return {
+        group.name: (cases[group.name], a) for group, a in zip(parity.GROUPS, parity.ask_cycles(batches), strict=True)
+    }
 
 
 @needs_bpy
@@ -27,8 +29,10 @@ def answers() -> dict[str, tuple[parity.Cases, np.ndarray]]:
 def test_value_is_that_of_cycles(group: parity.Group) -> None:
     cases, theirs = answers()[group.name]
     error = parity.relative_difference(parity.evaluate_cases(cases, group, (5, 0)), theirs)
-    # Single precision on both sides; the tables are measured to 1e-6 to 1e-5
+    # Single precision on both sides; docs/material_parity.md explains the few that are worse than the rest
     assert np.quantile(error, 0.99) < group.most, np.sort(error)[-20:]
+    if group.refracted:
+        error = error[~parity.at_total_reflection(cases)]
     assert error.max() < group.worst, np.sort(error)[-5:]
 
 

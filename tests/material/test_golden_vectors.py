@@ -38,7 +38,12 @@ GOLDEN: list[tuple[str, dict[str, Any], tuple[float, float, float], tuple[float,
         (0.130527, 0.0414699, 0.0122938),
     ),
     ("brushed", BRUSHED, (0.982086, 0.381399, 0.146875), (0.0570864, 0.0215262, 0.00740405)),
-    ("coat", {"coat_weight": 1.0, "coat_roughness": 0.3}, (0.358997, 0.246803, 0.201926), (0.116088, 0.0463449, 0.0184477)),
+    (
+        "coat",
+        {"coat_weight": 1.0, "coat_roughness": 0.3},
+        (0.358997, 0.246803, 0.201926),
+        (0.116088, 0.0463449, 0.0184477),
+    ),
     ("tinted coat", COAT, (0.243771, 0.178178, 0.141622), (0.0878363, 0.0426386, 0.0176971)),
     (
         "sheen",
@@ -63,7 +68,8 @@ def value(parameters: dict[str, Any], view: Any, light: Any, distribution: str =
     vector = dr.llvm.ad.Array3f
     lobes = needed_lobes(parameters)
     model = cycles_model((5, 0), distribution)
-    return np.array(blender_principled(parameters, vector(*view), vector(*light), lobes, model)).ravel()
+    directions = (vector(*map(float, direction)) for direction in (view, light))
+    return np.array(blender_principled(parameters, *directions, lobes, model)).ravel()
 
 
 @pytest.mark.parametrize(("name", "parameters", "first", "second"), GOLDEN, ids=[row[0] for row in GOLDEN])

@@ -58,12 +58,12 @@ def test_samples_follow_the_density(name: str, view: tuple[float, float, float])
         sample_func=draw_one,
         pdf_func=lambda direction: pdf(layers, choice, direction, reachable_only=True),
         sample_dim=3,
-        sample_count=100_000,
+        sample_count=300_000,
         res=41,
-        ires=8,
+        ires=16,  # with 8 the narrow coat at a flat view is integrated 1 % wrong
     )
-    # One of 27 tests failing by chance one run in a hundred; the numbers are fixed
-    assert test.run(0.01, test_count=27, quiet=True), test.messages
+    # One of 30 tests failing by chance one run in a hundred; the numbers are fixed
+    assert test.run(0.01, test_count=30, quiet=True), test.messages
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=["steep", "flat", "behind"])

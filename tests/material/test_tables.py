@@ -11,7 +11,7 @@ import pytest
 from mfo_backend.material.colour_interference import XYZ_TO_RGB, fourier_table
 
 SAMPLES = 1 << 14
-# Cycles' own entries are Monte Carlo estimates; 6e-4 was the largest deviation seen with many samples, ours adds as much
+# Cycles' own entries are Monte Carlo estimates; 6e-4 was the largest deviation with many samples, ours adds as much
 TOLERANCE = 2.5e-3
 
 

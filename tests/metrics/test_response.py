@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mfo_backend.metrics import itp
 from mfo_backend.metrics.itp import Itp, de_itp_map
 from mfo_backend.metrics.loss import LOSS_NAMES, make_loss
 from mfo_backend.metrics.pu21 import Pu21, pu21
@@ -46,6 +47,13 @@ def test_itp_check_values():
     np.testing.assert_allclose(Itp(1.0).apply(np.full((1, 3), 1e4)) / 720, [[1, 0, 0]], atol=2e-4)
     # BT.2408: 100 cd/m^2 is 50.8 % of PQ
     assert Itp(1.0).apply(np.full((1, 3), 100.0))[0, 0] / 720 == pytest.approx(0.508, abs=5e-4)
+
+
+def test_itp_of_a_colour():
+    """ICtCp of this BT.2020 colour is the example of colour-science's RGB_to_ICtCp; BT.2124 halves Ct."""
+    cone = np.array([[0.45620519, 0.03081071, 0.04091952]]) @ itp._BT2020_TO_LMS.T / 1e4
+    expected = np.array([0.07351364, 0.00475253, 0.09351596])
+    np.testing.assert_allclose(itp._pq(cone)[0] @ itp._PQ_TO_JND.T / 720, expected * [1, 0.5, 1], atol=1e-8)
 
 
 def test_itp_sees_hue_and_is_symmetric():

@@ -107,9 +107,14 @@ def test_png_is_display_values(tmp_path):
     np.testing.assert_allclose(image.pixels, levels / np.float32(255), rtol=0, atol=6e-8)  # one rounding to float32
 
 
+def _levels(path):
+    with PillowImage.open(path) as picture:
+        return np.asarray(picture)
+
+
 def test_write_png_clips_and_takes_grey(tmp_path):
     write_png(tmp_path / "a.png", np.array([[-1.0, 2.0, np.nan]]))
-    np.testing.assert_array_equal(np.asarray(PillowImage.open(tmp_path / "a.png")), [[0, 255, 0]])
+    np.testing.assert_array_equal(_levels(tmp_path / "a.png"), [[0, 255, 0]])
 
 
 @pytest.mark.parametrize(("suffix", "tolerance"), [("png", 0), ("tif", 0), ("jpg", 0.03)])  # JPEG is lossy

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pixels of Blender images as linear Rec.709, without changing the image."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .color_space import srgb_to_linear, to_rec709
+
+LINEAR_NAMES = ("Linear Rec.709", "Linear", "scene_linear")
+SRGB_NAMES = ("sRGB",)
+
+
+class UnreadableImageError(Exception):
+    """The pixels cannot be had; the message is the end of a sentence that starts with the image's name."""
+
+
+def is_data(image: bpy.types.Image) -> bool:
+    """Whether the numbers of `image` are no colours (Non-Color, Raw)."""
+    return image.colorspace_settings.is_data or image.colorspace_settings.name in ("Non-Color", "Raw")
+
+
+def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
+    """Return float32 (height, width, 4), first row at the top: linear Rec.709, or the raw numbers of a data image.
+
+    Raises
+    ------
+    UnreadableImageError
+        If the file is missing, the image is a movie or tiled, or its colour space is not one we decode.
+    """
+    if image.source in ("MOVIE", "SEQUENCE", "TILED"):
+        raise UnreadableImageError(f"is a {image.source.lower()}; only single pictures are supported")
+    width, height = image.size
+    if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)):
+        raise UnreadableImageError("has no pixels (is its file missing?)")
+    channels = image.channels
+    raw = np.empty(width * height * channels, dtype=np.float32)
+    image.pixels.foreach_get(raw)
+    raw = raw.reshape(height, width, channels)[::-1]
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    if channels < 3:
+        pixels[:, :, :3] = raw[:, :, :1]
+    else:
+        pixels[:, :, :channels] = raw
+    if is_data(image):
+        return pixels
+    if image.is_float:  # Blender converts float files to its working space when it loads them
+        pixels[:, :, :3] = to_rec709(pixels[:, :, :3])
+        return pixels
+    space = image.colorspace_settings.name
+    if space in SRGB_NAMES:
+        pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
+    elif space not in LINEAR_NAMES:
+        raise UnreadableImageError(f"has the colour space {space}; set it to sRGB, Linear Rec.709 or Non-Color")
+    return pixels

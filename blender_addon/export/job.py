@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export: an object, its active material slot and the scene camera become a job folder for the backend."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import tomllib
+
+from .findings import ExportError, Findings
+from .job_folder import GENERATOR, new_job_folder
+from .material_model import Material
+from .read_scene import read_scene
+from .reference import Reference, read_reference
+from .scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
+from .scene_file import SceneFiles, scene_files
+
+SCHEMA_VERSION = 1
+
+__all__ = ["ExportError", "ExportReport", "check_export", "export_job"]
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """What was written: the folder, the content of request.json, a sentence for each thing left out or approximated."""
+
+    folder: Path
+    request: dict[str, Any]
+    notes: tuple[str, ...]
+
+
+def export_job(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    folder: Path,
+    *,
+    reference: Path | bpy.types.Image | None,
+    fit: dict[str, Any],
+) -> ExportReport:
+    """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
+
+    Raises
+    ------
+    ExportError
+        If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
+    """
+    findings = Findings()
+    data = read_scene(context, obj, findings)
+    findings.raise_first()
+    assert data is not None
+    picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height))
+    files = scene_files(data, findings)
+    request = _request(context, obj, data, files, picture, fit, findings)
+    with new_job_folder(Path(folder)) as partial:
+        files.write(partial)
+        if picture is not None:
+            picture.write(partial)
+        (partial / "request.json").write_text(
+            json.dumps(request, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
+    return ExportReport(Path(folder), request, tuple(findings.notes))
+
+
+def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:
+    """Return the errors and the notes an export would give, without writing anything."""
+    findings = Findings()
+    data = read_scene(context, obj, findings)
+    if data is not None:
+        scene_files(data, findings)
+    return findings.errors, findings.notes
+
+
+def _request(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    data: SceneData,
+    files: SceneFiles,
+    picture: Reference | None,
+    fit: dict[str, Any],
+    findings: Findings,
+) -> dict[str, Any]:
+    view = context.scene.view_settings
+    request: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},
+        "scene": "scene.xml",
+        "target": {
+            "shape_id": TARGET_SHAPE,
+            "bsdf_id": TARGET_BSDF,
+            "object": obj.name,
+            "material": data.materials[TARGET_BSDF].name,
+            "slot": obj.active_material_index,
+        },
+        "image": {
+            "width": data.camera.width,
+            "height": data.camera.height,
+            "film_transparent": data.settings.film_transparent,
+        },
+    }
+    if picture is not None:
+        request["reference"] = {"path": picture.name, "encoding": picture.encoding}
+    request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
+    request["materials"] = {
+        identifier: _material(material, files)
+        for identifier, material in data.materials.items()
+        if material.model == "principled"
+    }
+    request["fit"] = dict(fit)
+    request["notes"] = list(findings.notes)
+    return request
+
+
+def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
+    sockets: dict[str, Any] = {}
+    for name, socket in material.sockets.items():
+        value = socket.value
+        plain = list(value) if isinstance(value, (list, tuple)) else value
+        sockets[name] = {"value": plain, "linked": socket.linked}
+        if socket.texture is not None:
+            sockets[name]["texture"] = files.texture(socket.texture)
+    return {
+        "name": material.name,
+        "distribution": material.distribution,
+        "subsurface_method": material.subsurface_method,
+        "sockets": sockets,
+    }
+
+
+def _version() -> str:
+    manifest = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
+    return tomllib.loads(manifest.read_text("utf-8"))["version"]

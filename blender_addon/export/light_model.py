@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's lights as numbers and the radiometry Cycles gives them. Knows nothing of bpy.
+
+Formulas: measured on renders of Cycles 5.0; P is power (sun: strength) times 2^exposure, c the colour.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Light:
+    """A Blender light. `world` is its 4x4 matrix, `color` linear Rec.709, angles in radians, lengths in metres."""
+
+    kind: str  # POINT, SPOT, SUN or AREA
+    name: str
+    world: NDArray[np.float64]
+    color: Vector
+    power: float  # watts, for a sun watts per square metre; exposure included
+    normalize: bool = True
+    radius: float = 0.0
+    soft_falloff: bool = True
+    spot_size: float = math.pi / 4
+    spot_blend: float = 0.15
+    sun_angle: float = 0.0
+    shape: str = "SQUARE"  # SQUARE, RECTANGLE, DISK or ELLIPSE
+    size_x: float = 1.0
+    size_y: float = 1.0
+    spread: float = math.pi
+
+    @property
+    def position(self) -> Vector:
+        """Where the light is."""
+        return self.world[:3, 3]
+
+    @property
+    def is_round(self) -> bool:
+        """Whether an area light is a disk or an ellipse."""
+        return self.shape in ("DISK", "ELLIPSE")
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Width and height of an area light in its own space."""
+        return self.size_x, self.size_y if self.shape in ("RECTANGLE", "ELLIPSE") else self.size_x
+
+
+def point_intensity(light: Light) -> Vector:
+    """Radiant intensity in W/sr of a point or spot light without extent: P c / (4 pi), unnormalised P c / pi."""
+    return light.color * light.power / (4.0 * math.pi if light.normalize else math.pi)
+
+
+def sphere_radiance(light: Light) -> Vector:
+    """Radiance of a point light with a radius: P c / (4 pi^2 r^2); not normalised: P c / pi."""
+    area = 4.0 * math.pi * light.radius**2 if light.normalize else 1.0
+    return light.color * light.power / (math.pi * area)
+
+
+def area_of(light: Light) -> float:
+    """Area in square metres of an area light, its object's scale included."""
+    width, height = light.sizes
+    axes = np.cross(light.world[:3, 0] * width, light.world[:3, 1] * height)
+    return float(np.linalg.norm(axes)) * (math.pi / 4.0 if light.is_round else 1.0)
+
+
+def area_radiance(light: Light) -> Vector:
+    """Radiance of an area light: P c / (pi A); not normalised: P c / pi."""
+    return light.color * light.power / (math.pi * (area_of(light) if light.normalize else 1.0))
+
+
+def sun_irradiance(light: Light) -> Vector:
+    """Irradiance on a plane that faces the sun: P c; a disk that is not normalised has radiance P c."""
+    solid = math.pi * math.sin(light.sun_angle / 2.0) ** 2
+    return light.color * light.power * (1.0 if light.normalize or solid == 0.0 else solid)
+
+
+def spot_falloff(cos_angle: NDArray[np.float64], spot_size: float, spot_blend: float) -> NDArray[np.float64]:
+    """Return Cycles' cone factor in [0, 1]: smoothstep of the cosine from the rim inwards (kernel/light/spot.h)."""
+    rim = math.cos(spot_size / 2.0)
+    t = np.clip((cos_angle - rim) / max((1.0 - rim) * spot_blend, 1e-9), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def spread_falloff(tangent: NDArray[np.float64], spread: float) -> NDArray[np.float64]:
+    """Return the factor an area light's spread puts on its radiance at `tangent` = tan of the angle to its axis.
+
+    Constant total power (kernel/light/area.h): (T - tan) / (T - half), T the tangent of half the spread.
+    """
+    half = max(spread, 1e-3) / 2.0
+    limit = math.tan(half)
+    return np.clip(limit - tangent, 0.0, None) / (limit - half)
+
+
+def irradiance_at(light: Light, point: Vector) -> float:
+    """Return about how much light, mean of the channels, arrives at `point` on a surface that faces it."""
+    if light.kind == "SUN":
+        return float(sun_irradiance(light).mean())
+    square = max(float(np.sum((light.position - point) ** 2)), 1e-6)
+    if light.kind == "AREA":
+        return float(area_radiance(light).mean()) * area_of(light) / (square + area_of(light))
+    if light.kind == "POINT" and light.radius > 0.0:
+        return float(sphere_radiance(light).mean()) * math.pi * light.radius**2 / max(square, light.radius**2)
+    return float(point_intensity(light).mean()) / square

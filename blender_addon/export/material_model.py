@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A material of the scene as plain numbers and pictures. Knows nothing of bpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A picture on a socket: `pixels` float32 (height, width, 1 or 3), linear Rec.709 or raw, first row at the top.
+
+    `uv_matrix` (3, 3) moves Blender's UV before the look-up; `wrap` and `filter_type` are Mitsuba's words.
+    """
+
+    pixels: NDArray[np.float32]
+    uv_matrix: NDArray[np.float64]
+    wrap: str = "repeat"
+    filter_type: str = "bilinear"
+
+
+@dataclass(frozen=True)
+class Socket:
+    """A socket's value (float, bool or three linear Rec.709 numbers), whether it is linked, and to which picture."""
+
+    value: Any
+    linked: bool = False
+    texture: Texture | None = None
+
+
+@dataclass
+class Material:
+    """What a surface is made of. `model` is principled, diffuse, emission or null (nothing there)."""
+
+    name: str
+    model: str
+    sockets: dict[str, Socket] = field(default_factory=dict)
+    distribution: str = "MULTI_GGX"
+    subsurface_method: str = "RANDOM_WALK"
+
+    def value(self, name: str, default: Any) -> Any:
+        """Value of socket `name`, or `default` if this Blender's Principled has no such socket."""
+        socket = self.sockets.get(name)
+        return default if socket is None else socket.value
+
+    @property
+    def emission(self) -> NDArray[np.float64]:
+        """Emitted radiance, linear Rec.709; coat and sheen above it are not counted."""
+        color = np.asarray(self.value("Emission Color", (1.0, 1.0, 1.0)), dtype=np.float64)
+        return color * float(self.value("Emission Strength", 0.0))
+
+
+def grey(name: str) -> Material:
+    """Return a Lambertian surface of 0.8, which stands in for what is not exported."""
+    return Material(name, "diffuse", {"Base Color": Socket((0.8, 0.8, 0.8))})

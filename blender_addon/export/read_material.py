@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender materials as the numbers of `material_model`."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..versions import PRINCIPLED, active_output, default_surface_is_principled, node_tree_of
+from .color_space import to_rec709
+from .findings import Findings
+from .material_model import Material, Socket, grey
+from .shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
+
+NORMAL_SOCKETS = ("Normal", "Coat Normal", "Tangent")
+SKIPPED_SOCKETS = ("Weight",)
+# what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
+DEFAULT_SOCKETS = {
+    "Base Color": Socket((0.8, 0.8, 0.8)),
+    "Metallic": Socket(0.0),
+    "Roughness": Socket(0.5),
+    "IOR": Socket(1.5),
+    "Specular IOR Level": Socket(0.5),
+}
+# shaders of other objects with a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
+SIMPLE_SHADERS = {
+    "ShaderNodeBsdfDiffuse": ("diffuse", {"Base Color": "Color"}, {}),
+    "ShaderNodeEmission": ("emission", {"Emission Color": "Color", "Emission Strength": "Strength"}, {}),
+    "ShaderNodeBsdfGlossy": ("principled", {"Base Color": "Color", "Roughness": "Roughness"}, {"Metallic": 1.0}),
+    "ShaderNodeBsdfAnisotropic": ("principled", {"Base Color": "Color", "Roughness": "Roughness"}, {"Metallic": 1.0}),
+    "ShaderNodeBsdfMetallic": ("principled", {"Base Color": "Base Color", "Roughness": "Roughness"}, {"Metallic": 1.0}),
+    "ShaderNodeBsdfGlass": (
+        "principled",
+        {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"},
+        {"Transmission Weight": 1.0},
+    ),
+    "ShaderNodeBsdfTransparent": ("null", {}, {}),
+}
+
+
+def principled_node(material: bpy.types.Material | None) -> bpy.types.Node | None:
+    """Return the Principled node linked to the output that Cycles uses, or None."""
+    if material is None:
+        return None
+    node = surface_of(node_tree_of(material))
+    return node if node is not None and node.bl_idname == PRINCIPLED else None
+
+
+def read_target(material: bpy.types.Material | None, owner: str, slot: int, findings: Findings) -> Material | None:
+    """Return the material to fit, or None with an error in `findings`."""
+    if material is None:
+        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.")
+        return None
+    node = principled_node(material)
+    if node is None:
+        findings.error(
+            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly."
+        )
+        return None
+    _note_volume(material, findings)
+    return _read_principled(material, node, True, findings)
+
+
+def read_context(material: bpy.types.Material | None, owner: str, findings: Findings) -> Material:
+    """Return the material of something that is not fitted; what is unknown becomes grey, with a note."""
+    if material is None:
+        name = f"{owner} without material"
+        return Material(name, "principled", dict(DEFAULT_SOCKETS)) if default_surface_is_principled() else grey(name)
+    tree = node_tree_of(material)
+    if tree is None:
+        color = [float(value) for value in to_rec709(list(material.diffuse_color)[:3])]
+        return Material(material.name, "diffuse", {"Base Color": Socket(color)})
+    _note_volume(material, findings)
+    node = surface_of(tree)
+    if node is None:
+        return Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
+    if node.bl_idname == PRINCIPLED:
+        return _read_principled(material, node, False, findings)
+    if node.bl_idname not in SIMPLE_SHADERS:
+        findings.note(
+            f"Material '{material.name}' of '{owner}' starts with the node '{node.name}' ({node.bl_label}), which is "
+            "not exported; it is shown as grey."
+        )
+        return grey(material.name)
+    model, renamed, constants = SIMPLE_SHADERS[node.bl_idname]
+    sockets = {name: Socket(value) for name, value in constants.items()}
+    for name, theirs in renamed.items():
+        sockets[name] = _read(node.inputs[theirs], material.name, False, findings)
+    if model == "principled" or (model == "diffuse" and node.inputs["Roughness"].default_value > 0.0):
+        findings.note(f"Material '{material.name}': {node.bl_label} is approximated by its closest simple equivalent.")
+    return Material(material.name, model, sockets)
+
+
+def _read_principled(
+    material: bpy.types.Material, node: bpy.types.Node, is_target: bool, findings: Findings
+) -> Material:
+    sockets: dict[str, Socket] = {}
+    for socket in node.inputs:
+        if socket.name in SKIPPED_SOCKETS:
+            continue
+        if socket.name in NORMAL_SOCKETS:
+            linked = source_of(socket) is not None
+            sockets[socket.name] = Socket(plain_value(socket), linked)
+            if linked:
+                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+            continue
+        sockets[socket.name] = _read(socket, material.name, is_target, findings)
+    return Material(
+        material.name, "principled", sockets, node.distribution, getattr(node, "subsurface_method", "RANDOM_WALK")
+    )
+
+
+def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings: Findings) -> Socket:
+    try:
+        return read_socket(socket)
+    except UnsupportedNodeError as problem:
+        if is_target:
+            findings.error(
+                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported: unlink it "
+                "or use an image texture."
+            )
+        else:
+            findings.note(
+                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported; the "
+                "socket's own value is used."
+            )
+        return Socket(plain_value(socket), True)
+
+
+def _note_volume(material: bpy.types.Material, findings: Findings) -> None:
+    output = active_output(node_tree_of(material))
+    if output is None:
+        return
+    if source_of(output.inputs["Volume"]) is not None:
+        findings.note(f"Material '{material.name}': its volume is left out.")
+    if source_of(output.inputs["Displacement"]) is not None:
+        findings.note(f"Material '{material.name}': its displacement is left out.")

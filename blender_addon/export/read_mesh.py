@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated geometry of a Blender object, all modifiers applied."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..versions import corner_normals
+from .mesh_arrays import CornerMesh
+
+
+def read_mesh(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> CornerMesh | None:
+    """Return the triangles of an evaluated object in its own space, or None if it has no faces."""
+    try:
+        mesh = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    except RuntimeError:  # this type has no geometry that converts
+        return None
+    try:
+        return _corner_mesh(mesh) if mesh is not None and len(mesh.polygons) else None
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    corners = np.empty(count * 3, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners)
+    slots = np.empty(count, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("material_index", slots)
+    vertex_of_corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", vertex_of_corner)
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    uvs = np.zeros(len(mesh.loops) * 2, dtype=np.float32)
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if layer is not None:
+        layer.uv.foreach_get("vector", uvs)
+    faces_at_edge = np.bincount(_edge_of_corner(mesh), minlength=len(mesh.edges))
+    return CornerMesh(
+        positions=positions.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3),
+        normals=corner_normals(mesh)[corners].reshape(-1, 3, 3),
+        uvs=uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2),
+        slots=slots,
+        is_closed=bool((faces_at_edge == 2).all()),
+    )
+
+
+def _edge_of_corner(mesh: bpy.types.Mesh) -> np.ndarray:
+    edges = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("edge_index", edges)
+    return edges

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From bpy to `SceneData`: the target object, everything else the render shows, lights, world, camera."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..versions import cycles_settings, has_compositor, overrides_of
+from .findings import Findings
+from .material_model import Material
+from .mesh_arrays import CornerMesh, joined, world_mesh
+from .ply_file import TriangleMesh
+from .read_camera import read_camera, read_pixel_filter
+from .read_light import read_light
+from .read_material import read_context, read_target
+from .read_mesh import read_mesh
+from .read_world import read_world
+from .render_state import render_state, rendered_objects
+from .scene_data import TARGET_BSDF, TARGET_SHAPE, RenderSettings, SceneData, Shape
+from .visibility import check_visible
+
+MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
+SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
+DEFAULT_SPP = 64
+
+
+def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
+    """Return the scene as the render would see it, or None with errors in `findings`."""
+    scene, view_layer = context.scene, context.view_layer
+    if target is None or target.type not in MESH_TYPES:
+        what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
+        findings.error(f"The object to fit is {what}: select an object with faces.")
+        return None
+    if overrides_of(view_layer):
+        findings.error(
+            f"View layer '{view_layer.name}' replaces materials or the world by '{overrides_of(view_layer)[0]}': "
+            "remove the override."
+        )
+        return None
+    if has_compositor(scene):
+        findings.note("Compositing nodes are left out: a reference that went through them holds more than the render.")
+    with render_state(view_layer, scene):
+        depsgraph = context.evaluated_depsgraph_get()
+        camera = read_camera(scene, depsgraph, findings)
+        settings = _read_settings(scene, findings)
+        slot = target.active_material_index
+        slots = target.material_slots
+        material = read_target(slots[slot].material if slot < len(slots) else None, target.name, slot, findings)
+        if camera is None or material is None:
+            return None
+        data = SceneData(camera, settings, read_world(scene, settings.exposure, findings))
+        _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run()
+        if data.target is None:
+            if target.name_full not in rendered_objects(view_layer):
+                findings.error(f"Object '{target.name}' is hidden in the render: show it.")
+            else:
+                findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
+            return None
+        if not data.world.is_lit and not data.lights and not data.emitting:
+            findings.error("The scene has no light: add a light or give the world a colour.")
+        check_visible(data, target, scene, depsgraph, findings)
+    return data
+
+
+def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
+    cycles = cycles_settings(scene)
+    pixel_filter = read_pixel_filter(scene)
+    if scene.render.engine not in ("CYCLES", "BLENDER_EEVEE", "BLENDER_EEVEE_NEXT"):
+        findings.note(f"The render engine is {scene.render.engine}; the scene is exported as Cycles would see it.")
+    if cycles is None:
+        findings.note("Cycles is switched off in the preferences; its default settings are used.")
+        return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
+    if cycles.sample_clamp_direct > 0.0:
+        findings.note("Cycles clamps direct light; the fit does not.")
+    # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
+    bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces))
+    return RenderSettings(pixel_filter, bounces + 2, scene.render.film_transparent, cycles.film_exposure, DEFAULT_SPP)
+
+
+class _Walk:
+    """One pass over everything the depsgraph shows."""
+
+    def __init__(
+        self,
+        data: SceneData,
+        target: bpy.types.Object,
+        slot: int,
+        material: Material,
+        depsgraph: bpy.types.Depsgraph,
+        rendered: set[str],
+        findings: Findings,
+    ) -> None:
+        self.data, self.target, self.slot = data, target, slot
+        self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
+        self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
+        self.target_pieces: list[tuple[TriangleMesh, bool]] = []
+        data.materials[TARGET_BSDF] = material
+        self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
+
+    def run(self) -> None:
+        for instance in self.depsgraph.object_instances:
+            item = instance.object
+            if not self._is_rendered(instance, item):
+                continue
+            matrix = np.array(instance.matrix_world, dtype=np.float64)
+            if item.type == "LIGHT":
+                light = read_light(item, matrix, self.data.settings.exposure, self.findings)
+                if light is not None:
+                    self.data.lights.append(light)
+            elif item.type == "MESH":
+                # the faces of curves, texts and geometry nodes come as instances whose parent is the object itself
+                own = not instance.is_instance or instance.parent == item.original.evaluated_get(self.depsgraph)
+                self._add_mesh(item, matrix, own and item.original == self.target)
+            elif item.type not in (*MESH_TYPES, *SILENT_TYPES):
+                self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
+        if self.target_pieces:
+            meshes, closed = zip(*self.target_pieces, strict=True)
+            self.data.shapes.insert(0, Shape(TARGET_SHAPE, joined(meshes), TARGET_BSDF, all(closed)))
+
+    def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
+        if instance.is_instance:
+            parent = instance.parent
+            return parent is not None and parent.original.name_full in self.rendered and not item.hide_render
+        if item.original.name_full not in self.rendered:
+            return False
+        return not item.is_instancer or item.show_instancer_for_render
+
+    def _add_mesh(self, item: bpy.types.Object, matrix: NDArray[np.float64], is_target: bool) -> None:
+        key = (item.name_full, item.data.as_pointer())
+        if key not in self.meshes:
+            self.meshes[key] = read_mesh(item, self.depsgraph)
+        mesh = self.meshes[key]
+        if mesh is None:
+            return
+        self._note_visibility(item)
+        last = max(len(item.material_slots) - 1, 0)
+        slots = np.clip(mesh.slots, 0, last)
+        for slot in np.unique(slots):
+            piece = world_mesh(mesh, slots == slot, matrix)
+            if is_target and slot == self.slot:
+                self.target_pieces.append((piece, mesh.is_closed))
+                continue
+            name = f"shape_{len(self.data.shapes) + 1:04d}"
+            self.data.shapes.append(Shape(name, piece, self._bsdf(item, int(slot)), mesh.is_closed))
+
+    def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
+        slots = item.material_slots
+        material = slots[slot].material if slot < len(slots) else None
+        key = "" if material is None else material.original.name_full
+        if key not in self.bsdfs:
+            self.bsdfs[key] = f"material_{len(self.bsdfs):04d}"
+            original = None if material is None else material.original
+            self.data.materials[self.bsdfs[key]] = read_context(original, item.name, self.findings)
+        return self.bsdfs[key]
+
+    def _note_visibility(self, item: bpy.types.Object) -> None:
+        for system in item.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                self.findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
+        off = [
+            label
+            for name, label in (
+                ("visible_camera", "camera"),
+                ("visible_diffuse", "diffuse"),
+                ("visible_glossy", "glossy"),
+                ("visible_transmission", "transmission"),
+                ("visible_shadow", "shadow"),
+            )
+            if not getattr(item, name)
+        ]
+        if off:
+            self.findings.note(f"Object '{item.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
+        if item.is_holdout or item.is_shadow_catcher:
+            self.findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")

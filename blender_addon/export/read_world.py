@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's world as the numbers of `world_model`."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..versions import active_output, node_tree_of
+from .color_space import to_rec709
+from .findings import Findings
+from .image_pixels import UnreadableImageError, read_pixels
+from .shader_graph import UnsupportedNodeError, mapping_matrix, read_socket, source_of, surface_of
+from .world_model import World, resample
+
+BLACK = World(np.zeros(3))
+
+
+def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> World:
+    """Return the world's radiance times `exposure`; black, with an error in `findings`, if it cannot be exported."""
+    world = scene.world
+    if world is None:
+        return BLACK
+    tree = node_tree_of(world)
+    if tree is None:
+        return World(to_rec709(list(world.color)) * exposure)
+    output = active_output(tree)
+    if output is not None and source_of(output.inputs["Volume"]) is not None:
+        findings.note(f"World '{world.name}': its volume is left out.")
+    node = surface_of(tree)
+    if node is None:
+        return BLACK
+    try:
+        return _background(node, exposure)
+    except UnsupportedNodeError as problem:
+        findings.error(
+            f"World '{world.name}' uses {problem}, which cannot be exported: link one Background with a colour or an "
+            "Environment Texture."
+        )
+        return BLACK
+
+
+def _background(node: bpy.types.Node, exposure: float) -> World:
+    if node.bl_idname not in ("ShaderNodeBackground", "ShaderNodeEmission"):
+        raise UnsupportedNodeError(f"the node '{node.name}' ({node.bl_label})")
+    strength = read_socket(node.inputs["Strength"])
+    if strength.texture is not None:
+        raise UnsupportedNodeError("a picture on Strength")
+    scale = max(float(strength.value), 0.0) * exposure
+    source = source_of(node.inputs["Color"])
+    if source is not None and source.node.bl_idname == "ShaderNodeTexEnvironment":
+        pixels, lookup = _environment(source.node)
+        return World(np.full(3, scale), pixels, lookup)
+    color = read_socket(node.inputs["Color"])
+    if color.texture is not None:
+        raise UnsupportedNodeError("an Image Texture instead of an Environment Texture")
+    return World(np.asarray(color.value, dtype=np.float64).clip(0.0) * scale)
+
+
+def _environment(node: bpy.types.Node) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
+    if node.image is None:
+        raise UnsupportedNodeError(f"the node '{node.name}' without an image")
+    if node.projection != "EQUIRECTANGULAR":
+        raise UnsupportedNodeError(f"the node '{node.name}' with mirror ball projection")
+    mapping = node.texture_mapping
+    if any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0):
+        raise UnsupportedNodeError(f"the texture mapping inside the node '{node.name}'")
+    try:
+        pixels = np.ascontiguousarray(read_pixels(node.image)[:, :, :3])
+    except UnreadableImageError as problem:
+        raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
+    source = source_of(node.inputs["Vector"])
+    matrix = np.eye(4)
+    if source is not None and source.node.bl_idname == "ShaderNodeMapping":
+        matrix = mapping_matrix(source.node)
+        vector = source.node.inputs["Vector"]
+        source = source_of(vector)
+        if source is None:
+            raise UnsupportedNodeError(f"the Mapping node '{vector.node.name}' without a texture coordinate")
+    if source is not None and (source.node.bl_idname, source.name) not in (
+        ("ShaderNodeTexCoord", "Generated"),
+        ("ShaderNodeNewGeometry", "Position"),
+    ):
+        raise UnsupportedNodeError(f"the coordinate '{source.name}' of the node '{source.node.name}'")
+    lookup, offset = matrix[:3, :3], matrix[:3, 3]
+    if np.allclose(lookup @ lookup.T, np.eye(3), atol=1e-6) and np.linalg.det(lookup) > 0.0 and not offset.any():
+        return pixels, lookup
+    return resample(pixels, lookup, offset), None

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene's data as scene.xml, with the meshes and pictures it refers to. Knows nothing of bpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera_model import sensor_element
+from .exr_file import write_exr
+from .findings import Findings
+from .light_elements import Surroundings, has_surface, light_elements
+from .light_model import irradiance_at
+from .material_elements import bsdf_element, emission_element
+from .material_model import Texture
+from .mesh_arrays import turned
+from .ply_file import TriangleMesh, write_ply
+from .scene_data import TARGET_BSDF, SceneData, Shape
+from .world_model import world_element, world_irradiance
+from .xml_scene import Element, add, boolean, integer, plugin, reference, scalar, scene_text, string
+
+# the back of an open emitter lies this part of the scene's radius behind its front
+BACK_OFFSET = 1e-5
+# a weak emitter may still matter elsewhere: it is sampled at least this often, relative to the strongest
+LEAST_WEIGHT = 0.1
+
+
+@dataclass
+class SceneFiles:
+    """The text of scene.xml and the files beside it, by their path in the job folder."""
+
+    text: str = ""
+    meshes: dict[str, TriangleMesh] = field(default_factory=dict)
+    pictures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    _names: dict[tuple[tuple[int, ...], bytes], str] = field(default_factory=dict)
+
+    def picture(self, pixels: NDArray[np.float32]) -> str:
+        """Keep `pixels` and return their path; equal pictures are kept once."""
+        key = (pixels.shape, pixels.tobytes())
+        if key not in self._names:
+            self._names[key] = f"textures/tex_{len(self._names) + 1:04d}.exr"
+            self.pictures[self._names[key]] = pixels
+        return self._names[key]
+
+    def texture(self, texture: Texture) -> str:
+        """Keep a socket's picture and return its path."""
+        return self.picture(texture.pixels)
+
+    def write(self, folder: Path) -> None:
+        """Write everything below `folder`.
+
+        Raises
+        ------
+        OSError
+            If something cannot be written.
+        """
+        for name in ("meshes", "textures"):
+            (folder / name).mkdir(exist_ok=True)
+        (folder / "scene.xml").write_text(self.text, encoding="utf-8")
+        for path, mesh in self.meshes.items():
+            write_ply(folder / path, mesh)
+        for path, pixels in self.pictures.items():
+            write_exr(folder / path, pixels)
+
+
+def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
+    """Return scene.xml and its files; what had to be approximated goes into `findings`."""
+    files = SceneFiles()
+    center, radius = scene.bounds()
+    target = scene.target
+    middle = center if target is None else target.mesh.positions.mean(axis=0).astype(np.float64)
+    around = Surroundings(center, radius, middle)
+    children: list[Element] = [
+        add(
+            plugin("integrator", "path"),
+            integer("max_depth", scene.settings.max_depth),
+            boolean("hide_emitters", _hide_emitters(scene, findings)),
+        ),
+        sensor_element(scene.camera, scene.settings.pixel_filter, scene.settings.spp),
+    ]
+    emitters: list[tuple[Element, float]] = []
+    world = world_element(scene.world, files.picture)
+    if world is not None:
+        emitters.append((world, world_irradiance(scene.world)))
+    for index, light in enumerate(scene.lights):
+        elements = light_elements(light, f"light_{index + 1:04d}", around, files.picture, findings)
+        emitters += [(element, irradiance_at(light, middle) / len(elements)) for element in elements]
+    _weigh(emitters)
+    children += [element for element, _ in emitters]
+    for identifier, material in scene.materials.items():
+        is_target = identifier == TARGET_BSDF
+        children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
+    for shape in scene.shapes:
+        children += _shape_elements(shape, scene, radius * BACK_OFFSET, files)
+    files.text = scene_text(children)
+    return files
+
+
+def _weigh(emitters: list[tuple[Element, float]]) -> None:
+    """Let Mitsuba sample each emitter in proportion to what it gives the target, not all equally often."""
+    most = max((irradiance for _, irradiance in emitters), default=0.0)
+    for element, irradiance in emitters if len(emitters) > 1 else []:
+        emitter = element.find("emitter") if element.tag == "shape" else element
+        assert emitter is not None
+        add(emitter, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
+
+
+def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneFiles) -> list[Element]:
+    material = scene.materials[shape.bsdf]
+    sides = [(shape.identifier, shape.mesh)]
+    # an area emitter of Mitsuba shines on one side, a surface of Blender on both
+    if not shape.is_closed and material.emission.max(initial=0.0) > 0.0:
+        sides.append((f"{shape.identifier}_back", turned(shape.mesh, offset)))
+    elements = []
+    for identifier, mesh in sides:
+        path = f"meshes/{identifier}.ply"
+        files.meshes[path] = mesh
+        element = add(plugin("shape", "ply", identifier), string("filename", path), reference(shape.bsdf))
+        emitter = emission_element(material, scene.settings.exposure, files.texture)
+        elements.append(element if emitter is None else add(element, emitter))
+    return elements
+
+
+def _hide_emitters(scene: SceneData, findings: Findings) -> bool:
+    """Whether camera rays may pass through lights and miss the world; both or none, as Mitsuba has one switch."""
+    surfaces = [light for light in scene.lights if has_surface(light)]
+    world_is_seen = scene.world.is_lit and not scene.settings.film_transparent
+    if not world_is_seen and not scene.emitting:
+        return bool(surfaces) or scene.world.is_lit
+    if scene.settings.film_transparent and scene.world.is_lit:
+        findings.note("The film is transparent, but glowing objects are in view: the world shows behind them.")
+    for light in surfaces:
+        if light.kind == "SUN":
+            continue
+        reach = light.radius if light.kind == "POINT" else 0.5 * float(np.hypot(*light.sizes))
+        place, depth = scene.camera.project(light.position[None, :])
+        x, y = place[0]
+        pixels = reach * scene.camera.fitted_pixels / max(float(depth[0]), 1e-6)
+        inside = -pixels < x < scene.camera.width + pixels and -pixels < y < scene.camera.height + pixels
+        if inside and depth[0] > 0.0:
+            findings.note(f"Light '{light.name}' is in view: Mitsuba shows its surface, Cycles does not.")
+    surfaces = [light for light in surfaces if light.kind != "SUN"]
+    if surfaces and (scene.world.is_lit or len(scene.lights) > 1):
+        names = ", ".join(f"'{light.name}'" for light in surfaces)
+        findings.note(f"Lights with a size ({names}) block light that comes from behind them; in Cycles they do not.")
+    return False

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's part of `mfo blend`: export a job, apply a result, render with Cycles.
+
+Run by the bpy module or by a Blender program::
+
+    python -m blender_addon.headless export FILE --object NAME --reference REF --job DIR [--fit JSON]
+    blender -b --factory-startup --python blender_addon/headless.py -- apply FILE --job DIR --save-as OUT
+
+The answer is one JSON object with `status` and `sentence` on a line of its own, the last on stdout that starts with {;
+Blender prints other lines around it. Exit codes: 0 for the status "ok", 2 for bad input, 1 for anything else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+EXIT_CODES = {"ok": 0, "bad_input": 2}
+
+
+class HeadlessError(Exception):
+    """The command cannot be done; the message is one sentence for the user."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise HeadlessError(f"{self.prog}: {message}.")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Do one command; prints the JSON line and returns the exit code."""
+    try:
+        chosen = _parser().parse_args(arguments)
+        answer = {"status": "ok", "sentence": "Done."} | chosen.run(chosen)
+    except HeadlessError as error:
+        answer = {"status": "bad_input", "sentence": str(error)}
+    except Exception as error:  # the caller reads one line, never a traceback
+        answer = {"status": "failed", "sentence": f"Blender failed with {type(error).__name__}: {error}"}
+    sys.stderr.flush()
+    print("\n" + json.dumps(answer), flush=True)
+    return EXIT_CODES.get(answer["status"], 1)
+
+
+def export(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Write the job folder of an object's active material."""
+    bpy = _open(chosen.file)
+    from .export.job import ExportError, export_job
+
+    obj = bpy.context.scene.objects.get(chosen.object)
+    if obj is None:
+        names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
+        raise HeadlessError(
+            f"{chosen.file} has no object {chosen.object!r} in its scene; its mesh objects are: {names}."
+        )
+    try:
+        fit = json.loads(chosen.fit)
+    except ValueError as error:
+        raise HeadlessError(f"--fit is not JSON ({error}).") from error
+    if not isinstance(fit, dict):
+        raise HeadlessError("--fit is not a JSON object.")
+    try:
+        report = export_job(
+            bpy.context, obj, Path(chosen.job).absolute(), reference=chosen.reference.absolute(), fit=fit
+        )
+    except ExportError as error:
+        raise HeadlessError(str(error)) from error
+    return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
+
+
+def apply(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Put the values of a finished job on its material and save the file under another name."""
+    bpy = _open(chosen.file)
+    from .job_result import JobResultError, read_job_result
+    from .write_back import WriteBackError, apply_values, result_to_sockets
+
+    try:
+        result = read_job_result(Path(chosen.job).absolute())
+        name = chosen.material or result.material_name
+        material = bpy.data.materials.get(name)
+        if material is None:
+            raise HeadlessError(f"{chosen.file} has no material {name!r}: give the one to change with --material.")
+        values = result_to_sockets(result)
+        notes = apply_values(material, values, result.folder)
+    except (JobResultError, WriteBackError) as error:
+        raise HeadlessError(str(error)) from error
+    _save(bpy, chosen.save_as)
+    return {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
+
+
+def render(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Render the scene with Cycles into a scene-linear EXR at the scene's resolution."""
+    bpy = _open(chosen.file)
+    scene = bpy.context.scene
+    if scene.camera is None:
+        raise HeadlessError(f"The scene of {chosen.file} has no camera: add one.")
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.seed = chosen.samples, chosen.seed
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # Blender 5.0
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
+    scene.render.filepath = str(chosen.out.absolute())
+    scene.render.use_file_extension = False
+    bpy.ops.render.render(write_still=True)
+    if not chosen.out.is_file():
+        raise HeadlessError(f"Blender could not write {chosen.out}: choose another folder or free some space.")
+    return {"picture": str(chosen.out)}
+
+
+def demo_scene(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Build the scene of `mfo demo` in a folder; returns the object's name and the socket values of both materials."""
+    from .demo_scene import OBJECT, build_demo_scene
+
+    materials = build_demo_scene(chosen.file.absolute(), chosen.scene_seed, chosen.size)
+    return {"object": OBJECT, **materials}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="headless", description="Blender's part of `mfo blend`.")
+    commands = parser.add_subparsers(dest="command", required=True, parser_class=_Parser)
+
+    def add(name: str, run: Any) -> argparse.ArgumentParser:
+        command = commands.add_parser(name)
+        command.add_argument("file", type=Path, help="the .blend file")
+        command.set_defaults(run=run)
+        return command
+
+    command = add("export", export)
+    command.add_argument("--object", required=True)
+    command.add_argument("--reference", required=True, type=Path)
+    command.add_argument("--job", required=True, type=Path)
+    command.add_argument("--fit", default="{}", help="the `fit` object of request.json")
+    command = add("apply", apply)
+    command.add_argument("--job", required=True, type=Path)
+    command.add_argument("--save-as", required=True, type=Path)
+    command.add_argument("--material", default="")
+    command = add("render", render)
+    command.add_argument("--out", required=True, type=Path)
+    command.add_argument("--samples", type=int, default=64)
+    command.add_argument("--seed", type=int, default=0)
+    command = add("demo-scene", demo_scene)
+    command.add_argument("--scene-seed", type=int, default=0)
+    command.add_argument("--size", type=int, default=256)
+    return parser
+
+
+def _open(path: Path) -> Any:
+    """Open a .blend file without running its scripts; returns the module bpy."""
+    import bpy
+
+    from . import properties
+
+    if not path.is_file():
+        raise HeadlessError(f"{path} does not exist: give a .blend file.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise HeadlessError(f"{path} cannot be opened ({str(error).strip()}): give a .blend file.") from error
+    if not hasattr(bpy.types.Material, "mfo"):  # the originals of an apply are kept in it
+        for cls in properties.CLASSES:
+            bpy.utils.register_class(cls)
+        properties.attach()
+    return bpy
+
+
+def _save(bpy: Any, path: Path) -> None:
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), copy=True, check_existing=False)
+    except RuntimeError as error:
+        raise HeadlessError(f"{path} cannot be written ({str(error).strip()}): choose another place.") from error
+    if not path.is_file():
+        raise HeadlessError(f"{path} cannot be written: choose another place.")
+
+
+def _arguments() -> list[str]:
+    """Those after `--` of a Blender command line, else all."""
+    return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+
+
+if __name__ == "__main__":
+    if not __package__:  # run by a Blender program as a script: come back as a module of the package
+        sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+        from blender_addon import headless
+
+        sys.exit(headless.main(_arguments()))
+    sys.exit(main(_arguments()))

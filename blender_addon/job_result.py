@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""request.json and result.json as the add-on needs them, checked. No bpy here."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+SCHEMA_VERSION = 1
+Value = float | tuple[float, ...]
+
+
+class JobResultError(Exception):
+    """A job folder without a usable result; the message is one sentence for the user."""
+
+
+@dataclass(frozen=True)
+class JobResult:
+    """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result)."""
+
+    folder: Path
+    object_name: str
+    material_name: str
+    sockets_start: Mapping[str, Value]
+    status: str
+    sentence: str
+    partial: bool
+    model: str
+    initial: Mapping[str, Value]
+    recovered: Mapping[str, Value]
+    errors: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...]
+    seconds: float
+
+
+def read_job_result(folder: Path) -> JobResult:
+    """The result in a job folder together with what its request says about the target.
+
+    Raises
+    ------
+    JobResultError
+        If a file is missing, unreadable, of another schema version, or holds something else than numbers.
+    """
+    if not (folder / "result.json").is_file():
+        raise JobResultError(
+            f"There is no result in {folder}: run the fit first, or give the folder of a finished job."
+        )
+    request, result = _read_json(folder / "request.json"), _read_json(folder / "result.json")
+    try:
+        target = request["target"]
+        material = request.get("materials", {}).get(target.get("bsdf_id"), {})
+        sockets = {k: _value(s["value"]) for k, s in material.get("sockets", {}).items() if s.get("value") is not None}
+        return JobResult(
+            folder=folder,
+            object_name=str(target.get("object", "")),
+            material_name=str(target.get("material", "")),
+            sockets_start=sockets,
+            status=str(result["status"]),
+            sentence=str(result.get("sentence", "")),
+            partial=bool(result.get("partial", False)),
+            model=str(result["model"]),
+            initial={str(k): _value(v) for k, v in result.get("initial", {}).items()},
+            recovered={str(k): _value(v) for k, v in result["recovered"].items()},
+            errors={str(k): (float(a), float(b)) for k, (a, b) in result.get("errors", {}).items()},
+            notes=tuple(map(str, result.get("notes", ()))),
+            seconds=float(result.get("seconds", 0.0)),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise JobResultError(
+            f"The files of the job in {folder} are damaged ({type(error).__name__}: {error}): run the fit again."
+        ) from error
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise JobResultError(f"{path} cannot be read ({error}): run the fit again.") from error
+    if not isinstance(data, dict) or data.get("schema_version") != SCHEMA_VERSION:
+        version = data.get("schema_version") if isinstance(data, dict) else None
+        raise JobResultError(
+            f"{path} has schema_version {version!r} and this add-on reads {SCHEMA_VERSION}: run the fit again."
+        )
+    return data
+
+
+def _value(data: Any) -> Value:
+    numbers = tuple(float(v) for v in data) if isinstance(data, list) else float(data)
+    if not all(map(math.isfinite, numbers if isinstance(numbers, tuple) else (numbers,))):
+        raise ValueError(f"{data} is not finite")
+    return numbers

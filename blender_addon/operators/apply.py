@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`mfo.apply` and `mfo.revert`, each one undo step."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import running_job
+from ..job_result import JobResult, JobResultError, read_job_result
+from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values
+
+# what a script gives; buttons start with the defaults every time and the redo panel does not show them
+_SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+
+
+class MFO_OT_apply(bpy.types.Operator):
+    """Put the recovered values on the material; sockets with a link stay as they are"""
+
+    bl_idname = "mfo.apply"
+    bl_label = "Apply Values"
+    bl_options = {"REGISTER", "UNDO"}
+
+    job_folder: StringProperty(
+        name="Job Folder", description="Folder of a finished job; empty: the last fit", options=_SCRIPT
+    )
+    material: StringProperty(
+        name="Material", description="Material to change; empty: the one that was fitted", options=_SCRIPT
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """In windows only with a result; a script may always try with a job folder."""
+        if running_job.current is not None:
+            cls.poll_message_set("A fit is running; wait for it or cancel it")
+            return False
+        if not bpy.app.background and not context.window_manager.mfo_runtime.has_result:
+            cls.poll_message_set("There is no result yet; run a fit")
+            return False
+        fitted = _fitted_material()
+        if fitted is not None and not fitted.is_editable:
+            cls.poll_message_set("The material comes from a library; make it local first")
+            return False
+        return True
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Find result and material, set the sockets, report what was skipped."""
+        try:
+            result = self._result()
+            material = self._material(result)
+            notes = apply_values(material, result_to_sockets(result), result.folder)
+        except (JobResultError, WriteBackError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for note in notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"The recovered values are on {material.name!r}.")
+        return {"FINISHED"}
+
+    def _result(self) -> JobResult:
+        if self.job_folder:
+            return read_job_result(Path(bpy.path.abspath(self.job_folder)))
+        if running_job.result is None:
+            raise JobResultError("There is no result yet: run a fit, or give the folder of a finished job.")
+        return running_job.result
+
+    def _material(self, result: JobResult) -> bpy.types.Material:
+        name = self.material or result.material_name
+        of_this_session = not self.material and not self.job_folder and running_job.material_uid
+        found = _fitted_material() if of_this_session else bpy.data.materials.get(name)
+        if found is None:
+            raise WriteBackError(f"Material {name!r} is not in this file (any more): name the one to change.")
+        return found
+
+
+class MFO_OT_revert(bpy.types.Operator):
+    """Give the active material the values back that it had before Apply"""
+
+    bl_idname = "mfo.revert"
+    bl_label = "Revert Values"
+    bl_options = {"REGISTER", "UNDO"}
+
+    material: StringProperty(
+        name="Material", description="Material to revert; empty: the active object's", options=_SCRIPT
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """In windows only where values were applied."""
+        material = context.object.active_material if context.object else None
+        if not bpy.app.background and (material is None or not material.mfo.originals):
+            cls.poll_message_set("Nothing was applied to the active material")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the kept values."""
+        obj = context.view_layer.objects.active
+        material = bpy.data.materials.get(self.material) if self.material else (obj.active_material if obj else None)
+        try:
+            if material is None:
+                raise WriteBackError("There is no material to revert: select its object or give its name.")
+            if not material.mfo.originals:
+                raise WriteBackError(f"Nothing was applied to material {material.name!r}, so nothing can be reverted.")
+            if not material.is_editable:
+                raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
+            principled_node(material)
+            notes = revert_values(material)
+        except WriteBackError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for note in notes:
+            self.report({"WARNING"}, note)
+        return {"FINISHED"}
+
+
+def _fitted_material() -> bpy.types.Material | None:
+    """The material of the last fit under whatever name it has by now."""
+    uid = running_job.material_uid
+    return next((m for m in bpy.data.materials if m.session_uid == uid), None) if uid else None
+
+
+CLASSES = (MFO_OT_apply, MFO_OT_revert)

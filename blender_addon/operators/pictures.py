@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`mfo.show_pictures` and `mfo.open_report`."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from ..comparison import COMPARISON, comparison_image
+
+
+class _JobOperator:
+    """Finds the job folder: the one given, else that of the last fit, else the one applied to the active material."""
+
+    def folder(self, context: bpy.types.Context) -> str:
+        given = self.job_folder  # type: ignore[attr-defined]  # declared by the operator
+        return bpy.path.abspath(given) if given else job_folder_of(context)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """In windows only where a job is known."""
+        if not bpy.app.background and not job_folder_of(context):
+            cls.poll_message_set("There is no result yet; run a fit")  # type: ignore[attr-defined]
+            return False
+        return True
+
+
+class MFO_OT_show_pictures(_JobOperator, bpy.types.Operator):
+    """Show reference, result and difference side by side in an open Image Editor"""
+
+    bl_idname = "mfo.show_pictures"
+    bl_label = "Compare Pictures"
+    bl_options = {"REGISTER", "UNDO"}
+
+    job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", options={"HIDDEN", "SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Load the pictures, build the strip, show it."""
+        try:
+            image = comparison_image(Path(self.folder(context)) / "pictures")
+        except OSError as error:
+            self.report({"ERROR"}, f"The pictures of the fit cannot be read ({error}): run the fit again.")
+            return {"CANCELLED"}
+        shown = False
+        for window in context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "IMAGE_EDITOR":
+                    area.spaces.active.image = image
+                    area.tag_redraw()
+                    shown = True
+        if not shown:
+            self.report({"INFO"}, f"Open an Image Editor to see the image {COMPARISON!r}.")
+        return {"FINISHED"}
+
+
+class MFO_OT_open_report(_JobOperator, bpy.types.Operator):
+    """Open the report of the fit in the web browser"""
+
+    bl_idname = "mfo.open_report"
+    bl_label = "Open Report"
+    bl_options = {"REGISTER"}
+
+    job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", options={"HIDDEN", "SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Hand index.html to the system."""
+        report = Path(self.folder(context)) / "index.html"
+        if not report.is_file():
+            self.report({"ERROR"}, f"There is no report in {report.parent}: run the fit again.")
+            return {"CANCELLED"}
+        bpy.ops.wm.url_open(url=report.absolute().as_uri())
+        return {"FINISHED"}
+
+
+def job_folder_of(context: bpy.types.Context) -> str:
+    """Folder of the last result, else of what was applied to the active material, else empty."""
+    runtime = context.window_manager.mfo_runtime
+    if runtime.has_result:
+        return runtime.job_folder
+    material = context.object.active_material if context.object else None
+    return material.mfo.job_folder if material else ""
+
+
+CLASSES = (MFO_OT_show_pictures, MFO_OT_open_report)

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add-on preferences: the Python of the backend and where job folders go."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+import os
+import re
+import tempfile
+from datetime import datetime
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from .backend_python import VARIABLE
+
+# bl_ext.<repository>.material_fit_mfo as an extension, blender_addon when imported by itself
+ADDON_ID = (__package__ or "").removesuffix(".blender_addon")
+
+
+class MFO_AP_preferences(bpy.types.AddonPreferences):
+    """Preferences of the extension."""
+
+    bl_idname = ADDON_ID
+
+    backend_python: StringProperty(
+        name="Backend Python",
+        description="Python with Mitsuba, for example .venv/bin/python of the environment made for Material Fit",
+        subtype="FILE_PATH",
+    )
+    job_root: StringProperty(
+        name="Job Folders",
+        description="Folder that gets one folder per fit; empty: the user folder of this extension",
+        subtype="DIR_PATH",
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Two paths, and a line where the variable wins over the first."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "backend_python")
+        if os.environ.get(VARIABLE):
+            layout.label(text=f"{VARIABLE} is set and used instead: {os.environ[VARIABLE]}", icon="INFO")
+        layout.prop(self, "job_root")
+
+
+def preference(context: bpy.types.Context, name: str) -> str:
+    """A preference's value, empty where the package runs without being enabled as an add-on."""
+    addon = context.preferences.addons.get(ADDON_ID)
+    return getattr(addon.preferences, name, "") if addon else ""
+
+
+def new_job_folder(context: bpy.types.Context, label: str) -> Path:
+    """Path of a job folder that does not exist yet, named after the time and `label`."""
+    root = bpy.path.abspath(preference(context, "job_root")) or _default_root()
+    plain = re.sub(r"[^\w-]+", "_", label)[:40].strip("_")
+    stem = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{plain}"
+    folder, n = Path(root) / stem, 1
+    while folder.exists():
+        n += 1
+        folder = Path(root) / f"{stem}_{n}"
+    return folder
+
+
+def _default_root() -> str:
+    try:
+        return bpy.utils.extension_path_user(ADDON_ID, path="jobs", create=True)
+    except ValueError:  # not installed as an extension
+        return str(Path(tempfile.gettempdir()) / "material_fit_jobs")
+
+
+CLASSES = (MFO_AP_preferences,)

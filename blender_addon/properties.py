@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user sets (Scene.mfo, saved), what the panel shows (WindowManager.mfo_runtime, forgotten) and the values a
+material had before (Material.mfo, saved)."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+# name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance
+_PARAMETERS = (
+    ("base_color", "Base Color", "Colour of the diffuse or metallic surface"),
+    ("roughness", "Roughness", "Width of the highlight"),
+    ("metallic", "Metallic", "Blend from dielectric to metal"),
+    ("specular", "Specular", "Reflectance of the dielectric, as a level"),
+    ("eta", "IOR", "Reflectance of the dielectric, as an index of refraction; not together with Specular"),
+    ("spec_tint", "Specular Tint", "How much the highlight takes the base colour"),
+    ("anisotropic", "Anisotropic", "Stretch of the highlight"),
+    ("sheen", "Sheen", "Soft reflection at grazing angles"),
+    ("sheen_tint", "Sheen Tint", "How much the sheen takes the base colour"),
+    ("clearcoat", "Coat", "Weight of the clear coat"),
+    ("clearcoat_gloss", "Coat Gloss", "Sharpness of the clear coat"),
+    ("flatness", "Flatness", "Approximation of subsurface scattering"),
+    ("spec_trans", "Transmission", "Weight of refraction"),
+)
+# sockets of Blender's Principled BSDF that can be fitted
+_SOCKETS = (
+    *(
+        "Base Color",
+        "Metallic",
+        "Roughness",
+        "IOR",
+        "Alpha",
+        "Diffuse Roughness",
+        "Specular IOR Level",
+        "Specular Tint",
+    ),
+    *("Anisotropic", "Anisotropic Rotation", "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR"),
+    *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
+    "Thin Film IOR",
+)
+SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
+SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}
+MODEL_ITEMS = (
+    ("blender_principled", "Blender", "The Principled BSDF as Cycles evaluates it"),
+    ("mitsuba_principled", "Mitsuba", "Mitsuba's Principled, mapped to Blender's sockets when applied"),
+)
+PARAMETER_ITEMS = tuple((name, label, text, 1 << i) for i, (name, label, text) in enumerate(_PARAMETERS))
+REDUCED = {"base_color", "roughness", "metallic", "specular"}
+PRESET_ITEMS = (
+    ("balanced", "Balanced", "Least squares on recorded light paths, then on perceptual differences; no start needed"),
+    ("fast", "Fast", "Least squares on recorded light paths only"),
+    ("paper", "Paper", "Adam on the mean squared error until it stops improving, then a new optimisation on FLIP"),
+)
+
+
+def _has_pixels(_self: object, image: bpy.types.Image) -> bool:
+    return image.source in {"FILE", "GENERATED"} and not image.name.startswith("Material Fit ")
+
+
+class MFO_PG_settings(bpy.types.PropertyGroup):
+    """Settings of the next fit, one set per scene."""
+
+    reference_source: EnumProperty(
+        name="Source",
+        description="Where the reference picture comes from",
+        items=(("FILE", "File", "A picture on disk"), ("IMAGE", "Image", "An image of this .blend file")),
+    )
+    reference_path: StringProperty(
+        name="Reference",
+        description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view",
+        subtype="FILE_PATH",
+    )
+    reference_image: PointerProperty(
+        name="Reference",
+        description="Image of this file to reproduce",
+        type=bpy.types.Image,
+        poll=_has_pixels,
+    )
+    preset: EnumProperty(name="Preset", description="How the values are searched", items=PRESET_ITEMS)
+    parameter_set: EnumProperty(
+        name="Parameters",
+        description="Which values may change; sockets with a link never do",
+        items=(
+            ("all", "All", "Everything the picture can show"),
+            ("reduced", "Reduced", "Base colour, roughness, metallic and specular"),
+            ("chosen", "Chosen", "Choose below"),
+        ),
+    )
+    parameters: EnumProperty(
+        name="Chosen Parameters",
+        description="Values that may change",
+        items=PARAMETER_ITEMS,
+        options={"ENUM_FLAG"},
+        default=REDUCED,
+    )
+    sockets: EnumProperty(
+        name="Chosen Sockets",
+        description="Sockets that may change",
+        items=SOCKET_ITEMS,
+        options={"ENUM_FLAG"},
+        default=SOCKETS_START,
+    )
+    model: EnumProperty(name="Model", description="Material model to fit", items=MODEL_ITEMS)
+    range: EnumProperty(
+        name="Range",
+        description="Compare scene-linear values (HDR) or the picture as displayed (LDR)",
+        items=(
+            ("auto", "Automatic", "HDR for a scene-linear reference, LDR for a display picture"),
+            ("hdr", "HDR", "Compare scene-linear values"),
+            ("ldr", "LDR", "Compare displayed values"),
+        ),
+    )
+    max_iterations: IntProperty(
+        name="Iterations", description="Most iterations of one stage", default=300, min=1, soft_max=1000, max=100_000
+    )
+
+
+class MFO_PG_message(bpy.types.PropertyGroup):
+    """One line of the panel's list; `name` is its text."""
+
+    icon: StringProperty()
+
+
+class MFO_PG_row(bpy.types.PropertyGroup):
+    """One recovered value or error: label in `name`, both numbers (or hex colours) as text."""
+
+    start: StringProperty()
+    result: StringProperty()
+
+
+class MFO_PG_runtime(bpy.types.PropertyGroup):
+    """State of the current fit for the panel; set from `running_job`, reset when a file is loaded."""
+
+    state: EnumProperty(
+        items=tuple((s, s.title(), "") for s in ("IDLE", "RUNNING", "CANCELLING", "DONE", "FAILED")),
+    )
+    material: StringProperty()
+    job_folder: StringProperty(subtype="DIR_PATH")
+    sentence: StringProperty()
+    fraction: FloatProperty(min=0.0, max=1.0)
+    progress_text: StringProperty()
+    detail: StringProperty()
+    has_result: BoolProperty()
+    checked: BoolProperty()  # the messages come from a check, not from the fit
+    messages: CollectionProperty(type=MFO_PG_message)
+    values: CollectionProperty(type=MFO_PG_row)
+    errors: CollectionProperty(type=MFO_PG_row)
+
+
+class MFO_PG_socket_value(bpy.types.PropertyGroup):
+    """The value a socket had before `mfo.apply`: socket name in `name`, `size` numbers of `value`."""
+
+    size: IntProperty(default=1, min=1, max=4)
+    value: FloatVectorProperty(size=4, precision=6)
+
+
+class MFO_PG_material(bpy.types.PropertyGroup):
+    """What was applied to a material and what it was before."""
+
+    job_folder: StringProperty(subtype="DIR_PATH")
+    originals: CollectionProperty(type=MFO_PG_socket_value)
+
+
+CLASSES = (
+    MFO_PG_settings,
+    MFO_PG_message,
+    MFO_PG_row,
+    MFO_PG_runtime,
+    MFO_PG_socket_value,
+    MFO_PG_material,
+)
+
+
+def chosen_of(model: str) -> str:
+    """Name of the setting that lists the chosen parameters of a model."""
+    return "sockets" if model == "blender_principled" else "parameters"
+
+
+def attach() -> None:
+    """Put the groups on Scene, WindowManager and Material."""
+    bpy.types.Scene.mfo = PointerProperty(type=MFO_PG_settings)
+    bpy.types.WindowManager.mfo_runtime = PointerProperty(type=MFO_PG_runtime, options={"SKIP_SAVE"})
+    bpy.types.Material.mfo = PointerProperty(type=MFO_PG_material)
+
+
+def detach() -> None:
+    """Take the groups away again."""
+    del bpy.types.Material.mfo
+    del bpy.types.WindowManager.mfo_runtime
+    del bpy.types.Scene.mfo

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every difference between Blender 4.2 and 5.2 that matters here, found by looking for the feature."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import mathutils  # pyright: ignore[reportMissingImports]
+import numpy as np
+from numpy.typing import NDArray
+
+PRINCIPLED = "ShaderNodeBsdfPrincipled"
+
+
+def working_space_to_rec709() -> NDArray[np.float64] | None:
+    """Return the 3x3 matrix from the scene-linear working space to linear Rec.709, or None where they are the same."""
+    color = mathutils.Color((1.0, 0.0, 0.0))
+    if not hasattr(color, "from_scene_linear_to_rec709_linear"):
+        return None
+    columns = [mathutils.Color(axis).from_scene_linear_to_rec709_linear() for axis in np.eye(3)]
+    matrix = np.array([list(column) for column in columns], dtype=np.float64).T
+    return None if np.allclose(matrix, np.eye(3), atol=1e-5) else matrix
+
+
+def light_strength(light: bpy.types.Light) -> float:
+    """Energy with the exposure of Blender 4.5 and later."""
+    return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+
+
+def light_color(light: bpy.types.Light) -> NDArray[np.float64]:
+    """Colour times the colour temperature of Blender 4.5 and later, in the working space."""
+    color = np.array(light.color, dtype=np.float64)
+    if getattr(light, "use_temperature", False):
+        color = color * np.array(light.temperature_color, dtype=np.float64)
+    return color
+
+
+def light_is_normalized(light: bpy.types.Light) -> bool:
+    """Whether the power is independent of the size (always so before Blender 4.5)."""
+    return getattr(light, "normalize", True)
+
+
+def cycles_settings(owner: Any) -> Any:
+    """Return Cycles' settings of a scene, light, object ..., or None where the Cycles add-on is off."""
+    return getattr(owner, "cycles", None)
+
+
+def active_output(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
+    """Return the output node that Cycles uses."""
+    if tree is None:
+        return None
+    return tree.get_output_node("CYCLES")
+
+
+def node_tree_of(owner: Any) -> bpy.types.NodeTree | None:
+    """Return the shader nodes of a material, world or light; None when it does not use them.
+
+    `use_nodes` is deprecated, always true and a warning to read: for materials and worlds from Blender 5.0 on, for
+    lights from 5.2 on.
+    """
+    tree = getattr(owner, "node_tree", None)
+    if tree is None:
+        return None
+    switch = owner.bl_rna.properties.get("use_nodes")
+    if switch is None or getattr(switch, "is_deprecated", False):
+        return tree
+    return tree if owner.use_nodes else None
+
+
+def nodes_enabled(owner: Any) -> bpy.types.NodeTree:
+    """Return the node tree of a new material or world, made if there is none (5.0: it always has one)."""
+    if owner.node_tree is None:
+        owner.use_nodes = True
+    return owner.node_tree
+
+
+def default_surface_is_principled() -> bool:
+    """Whether Cycles gives faces without material a Principled BSDF, as since Blender 5.0, or a diffuse of 0.8.
+
+    Measured: diffuse in 4.3, Principled in 5.0 and 5.2. Materials got nodes for good in the same release.
+    """
+    return getattr(bpy.types.Material.bl_rna.properties.get("use_nodes"), "is_deprecated", False)
+
+
+def has_compositor(scene: bpy.types.Scene) -> bool:
+    """Whether rendered pictures pass through compositing nodes (a node group from Blender 5.0 on)."""
+    if not scene.render.use_compositing:
+        return False
+    if hasattr(scene, "compositing_node_group"):
+        return scene.compositing_node_group is not None
+    return bool(scene.use_nodes and scene.node_tree is not None)
+
+
+def overrides_of(view_layer: bpy.types.ViewLayer) -> list[str]:
+    """Return the names of the material and (from Blender 4.3 on) world that replace all others in `view_layer`."""
+    owners = (getattr(view_layer, name, None) for name in ("material_override", "world_override"))
+    return [owner.name for owner in owners if owner is not None]
+
+
+def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """Return the shading normal of every face corner, custom normals included, (corners, 3)."""
+    normals = np.empty(len(mesh.loops) * 3, dtype=np.float32)
+    mesh.corner_normals.foreach_get("vector", normals)
+    return normals.reshape(-1, 3)

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfo blend`: fit a material of a .blend file, with a Blender program or the bpy module doing Blender's part."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..fit.settings import FitSettings
+from ..job.fit_scene import fit_scene
+from ..job.protocol_stream import take_stdout
+from ..types.errors import BadInputError, MfoError, SetupError
+from ..types.status import Status
+from .blender_host import BlenderHost, find_blender_host
+from .fit_options import add_fit_options, fit_from_options
+from .result_text import result_text
+from .run import leave
+from .run_folder import run_folder
+
+_ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
+
+
+@dataclass(frozen=True)
+class BlendFit:
+    """A finished job of a .blend file: its folder, result.json and the sentences of the export."""
+
+    job: Path
+    result: Mapping[str, Any]
+    notes: tuple[str, ...]
+
+
+def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
+    """Add `mfo blend`."""
+    parser = subparsers.add_parser(
+        "blend",
+        help="fit a material of a .blend file to a reference picture",
+        description="Fit the active material of an object of a .blend file to a reference picture.",
+    )
+    parser.add_argument("file", type=Path, help="the .blend file; it is not changed unless --apply is given alone")
+    parser.add_argument("--object", required=True, metavar="NAME", help="object whose active material is fitted")
+    parser.add_argument("--reference", required=True, type=Path, help="the picture: EXR, HDR, PNG, JPEG or TIFF")
+    add_fit_options(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="job folder (default: a new temporary one)")
+    parser.add_argument("--apply", action="store_true", help="put the recovered values on the material and save")
+    parser.add_argument("--save-as", type=Path, metavar="BLEND", help="with --apply: save here, not over FILE")
+    parser.add_argument("--blender", metavar="PROGRAM", help="a Blender program (default: MFO_BLENDER, bpy, PATH)")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
+    parser.set_defaults(func=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Export, fit and apply; the exit code is that of the fit."""
+    if arguments.save_as and not arguments.apply:
+        raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
+    options = fit_from_options(arguments)
+    FitSettings.from_request(options)  # a wrong option is known before Blender is started
+    host = find_blender_host(arguments.blender)
+    stream = take_stdout() if arguments.json else None
+    job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
+    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, options)
+    saved, notes = None, fit.notes
+    if arguments.apply:
+        saved = arguments.save_as or arguments.file
+        notes += apply_result(host, arguments.file, fit.job, saved)
+    if stream is not None:
+        answer = {**fit.result, "notes": notes, "folder": str(fit.job), "saved": str(saved) if saved else None}
+        print(json.dumps(answer, ensure_ascii=False), file=stream)
+        stream.close()
+    else:
+        lines = [*(f"note: {note}" for note in notes), result_text(fit.result), f"Report: {fit.job / 'index.html'}"]
+        print("\n".join([*lines, *([f"Saved: {saved}"] if saved else [])]))
+    return leave(Status(fit.result["status"]))
+
+
+def fit_blend(
+    host: BlenderHost, blend: Path, object_name: str, reference: Path, job: Path, fit: Mapping[str, Any]
+) -> BlendFit:
+    """Export a job from a .blend file and run it with a progress bar on stderr.
+
+    Raises
+    ------
+    BadInputError, SetupError, MfoError
+        With the sentence of the export or of the fit. A cancelled fit is a result, with what was found so far.
+    """
+    is_new = not job.exists()
+    exported = host.call(
+        "export", blend, "--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)
+    )
+    done = run_folder(job, fit_scene, is_new=is_new)
+    if done.result is None:
+        raise _ERRORS.get(done.status, MfoError)(done.sentence)
+    return BlendFit(job, done.result, tuple(exported.get("notes", ())))
+
+
+def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path) -> tuple[str, ...]:
+    """Save `blend` with the recovered values on its material; returns what was skipped, in sentences."""
+    applied = host.call("apply", blend, "--job", job, "--save-as", save_as)
+    return tuple(applied.get("notes", ()))

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Blender to work with from outside: a Blender program, or the bpy module in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..types.errors import BadInputError, MfoError, SetupError
+from ..types.status import Status
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "blender_addon" / "headless.py"
+ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
+
+
+@dataclass(frozen=True)
+class BlenderHost:
+    """How to run the add-on's `headless.py`; `command` is everything before its own arguments."""
+
+    name: str
+    command: tuple[str, ...]
+
+    def call(self, *arguments: str | Path) -> Mapping[str, Any]:
+        """Run one command of `headless.py` and return the JSON object it answers.
+
+        Raises
+        ------
+        BadInputError, SetupError, MfoError
+            With the sentence the add-on gave, or the last lines of Blender's output if it ended without one.
+        """
+        environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONSTARTUP")}
+        environment["PYTHONPATH"] = str(ROOT)
+        words = [*self.command, *map(str, arguments)]
+        done = subprocess.run(words, capture_output=True, text=True, env=environment, errors="replace")
+        answer = _last_json_object(done.stdout)
+        if answer is None:
+            tail = " | ".join((done.stderr + done.stdout).strip().splitlines()[-4:])
+            raise MfoError(f"{self.name} ended with code {done.returncode} and no answer: {tail}")
+        if answer["status"] != "ok":
+            raise ERRORS.get(Status(answer["status"]), MfoError)(answer["sentence"])
+        return answer
+
+
+def find_blender_host(program: str | None = None) -> BlenderHost:
+    """The Blender to use: `program`, else MFO_BLENDER, else the bpy module of this Python, else `blender` on the PATH.
+
+    Raises
+    ------
+    SetupError
+        If there is none, or the named program does not exist, or the add-on is not beside the backend.
+    """
+    if not SCRIPT.is_file():
+        raise SetupError(f"The add-on is missing: {SCRIPT} does not exist; use a checkout or the unpacked extension.")
+    program = program or os.environ.get("MFO_BLENDER", "").split(os.pathsep)[0]
+    if not program and importlib.util.find_spec("bpy"):
+        return BlenderHost("The bpy module", (sys.executable, "-m", "blender_addon.headless"))
+    path = shutil.which(program or "blender")
+    if path is None:
+        raise SetupError(
+            f"Blender program {program!r} does not exist; set MFO_BLENDER or --blender to one."
+            if program
+            else "No Blender found: install the bpy module (Python 3.11), or set MFO_BLENDER to a Blender program."
+        )
+    options = ("--background", "--factory-startup", "--python-exit-code", "1", "--python", str(SCRIPT), "--")
+    return BlenderHost(path, (path, *options))
+
+
+def _last_json_object(text: str) -> dict[str, Any] | None:
+    """The last line of `text` that is a JSON object; Blender prints lines of its own around it."""
+    for line in reversed(text.splitlines()):
+        if line.startswith("{"):
+            try:
+                return json.loads(line)
+            except ValueError:
+                continue
+    return None

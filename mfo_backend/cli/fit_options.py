@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command-line options of a fit, shared by every command that runs one."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+_OPTIONS = ("preset", "model", "range", "seed", "max_iterations", "spp", "learning_rate", "keep_optimizer_state")
+
+
+def add_fit_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options; none has a default here, so that what is not given stays with `FitSettings`."""
+    group = parser.add_argument_group("how to fit")
+    group.add_argument("--preset", help="fast, balanced or paper (default: balanced)")
+    group.add_argument("--model", help="blender_principled or mitsuba_principled (default: what the scene holds)")
+    group.add_argument("--parameters", metavar="LIST", help="all, reduced, or names with commas between (default: all)")
+    group.add_argument("--range", help="losses on radiance or display values: hdr, ldr or auto (default: auto)")
+    group.add_argument("--seed", type=int, help="random numbers of the fit (default: 0)")
+    group.add_argument("--max-iterations", type=int, metavar="N", help="of each stage, preset paper (default: 300)")
+    group.add_argument("--spp", type=int, metavar="N", help="samples per pixel and iteration, preset paper")
+    group.add_argument("--learning-rate", type=float, metavar="RATE", help="of Adam, preset paper")
+    group.add_argument(
+        "--keep-optimizer-state",
+        action="store_const",
+        const=True,
+        help="carry Adam's state into the second stage instead of a new optimisation, preset paper",
+    )
+
+
+def fit_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The `fit` object of request.json: the options that were given."""
+    fit = {name: getattr(arguments, name) for name in _OPTIONS if getattr(arguments, name) is not None}
+    if arguments.parameters is not None:
+        names = [name.strip() for name in arguments.parameters.split(",") if name.strip()]
+        fit["parameters"] = names[0] if names in (["all"], ["reduced"]) else names
+    return fit

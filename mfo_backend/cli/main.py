@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The `mfo` command: finds the sub-command, loads its module alone, and turns errors into one line and an exit code."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TextIO
+
+from .. import __version__
+from ..types.errors import MfoError
+from ..types.status import Status
+
+# module of the same name in this folder, and its line in `mfo --help`, which imports none of them
+COMMANDS = {
+    "doctor": "say what works on this machine and how to mend what does not",
+    "demo": "fit a material in a scene that is built on the spot",
+    "fit": "fit a material of a Mitsuba scene to a reference picture",
+    "blend": "fit a material of a .blend file to a reference picture",
+    "compare": "measure the difference between two pictures",
+    "run": "run a job folder (what the Blender add-on starts)",
+}
+_EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    parsed = _parser(words).parse_args(words)
+    stream = sys.stdout if getattr(parsed, "json", False) else None
+    try:
+        return parsed.func(parsed)
+    except MfoError as error:
+        return report_error(error.status, str(error), stream=stream)
+    except KeyboardInterrupt:
+        return report_error(Status.CANCELLED, "Interrupted.", stream=stream)
+    except BrokenPipeError:  # the reader of our output has closed it (`mfo doctor | head -1`)
+        sys.stderr.close()
+        return Status.FAILED.exit_code
+
+
+def report_error(status: Status, sentence: str, *, stream: TextIO | None) -> int:
+    """Write ``mfo: sentence`` to stderr and, for `--json`, one object to `stream`; returns the exit code."""
+    print(f"mfo: {sentence}", file=sys.stderr)
+    if stream is not None:
+        print(json.dumps({"status": status.value, "sentence": sentence}, ensure_ascii=False), file=stream, flush=True)
+    return status.exit_code
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser with the chosen sub-command's arguments; the others are only named."""
+    parser = argparse.ArgumentParser(
+        prog="mfo",
+        description="Recover the Principled BSDF values that reproduce a reference picture.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("--version", action="version", version=f"mfo {__version__}")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    chosen = next((word for word in words if not word.startswith("-")), None)
+    for name, summary in COMMANDS.items():
+        if not Path(__file__).with_name(f"{name}.py").is_file():
+            continue
+        if name == chosen:
+            importlib.import_module(f"{__package__}.{name}").add_parser(subparsers)
+        else:
+            subparsers.add_parser(name, help=summary)
+    return parser

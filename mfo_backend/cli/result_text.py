@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A result as a few lines for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def result_text(result: Mapping[str, Any]) -> str:
+    """Values and image differences before and after, from the content of result.json."""
+    rows = [("", "start", "result", "")]
+    for name, value in result["recovered"].items():
+        level = result.get("certainty", {}).get(name, {}).get("level", "")
+        rows.append((name, _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " ")))
+    rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return "\n".join(lines)
+
+
+def _numbers(value: Any) -> str:
+    if value is None:
+        return "-"
+    return " ".join(f"{part:.4g}" for part in (value if isinstance(value, (list, tuple)) else [value]))

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fit that a job runs: the request's scene in Mitsuba against its reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ..metrics.tone_mapping import DisplayView
+from ..types.event import Listener
+from ..types.image import Image, Pixels
+from ..types.result import FitResult
+from .job_folder import JobFolder
+from .request import Request, request_to_json
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them."""
+
+    result: FitResult
+    start_image: Pixels
+    result_image: Pixels
+    variant: str = ""
+
+
+class Fitter(Protocol):
+    """Fits what a request asks for; tests give one that needs no renderer."""
+
+    def __call__(
+        self,
+        folder: JobFolder,
+        request: Request,
+        reference: Image,
+        view: DisplayView,
+        *,
+        listener: Listener,
+        should_stop: Callable[[], bool],
+    ) -> JobOutcome:
+        """Run the fit; errors are those of `fit_material`."""
+        ...
+
+
+def fit_scene(
+    folder: JobFolder,
+    request: Request,
+    reference: Image,
+    view: DisplayView,
+    *,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> JobOutcome:
+    """Fit the material of the request's target with Mitsuba.
+
+    Raises
+    ------
+    BadInputError
+        If the scene, the target or a parameter cannot be used.
+    SetupError
+        If Mitsuba or LLVM is missing.
+    Interrupted
+        If it was asked to stop before there was anything to keep.
+    """
+    from ..render.llvm import configure_llvm, needs_llvm
+
+    if needs_llvm():
+        configure_llvm()  # before the first import of drjit, so the imports below stay here
+    from ..fit.recover_material import recover_material
+    from ..render.interruptible import InterruptibleRenderer, NativeThread
+    from ..render.renderer import Renderer, load_renderer
+    from ..render.variant import load_variant
+
+    def load() -> tuple[str, Renderer]:
+        variant = load_variant()
+        return variant, load_renderer(
+            folder.root / request.scene,
+            request.target.shape_id,
+            model=request.fit.model,
+            parameters=request.fit.parameters,
+            materials=_materials(folder, request),
+        )
+
+    if request.fit.preset == "paper":
+        thread = NativeThread(should_stop)
+        variant, renderer = thread.call(load)
+        renderer = InterruptibleRenderer(renderer, thread)
+    else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
+        variant, renderer = load()
+    outcome = recover_material(
+        renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
+    )
+    return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
+
+
+def _materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
+    """The request's materials with textures by absolute path and the Blender version they come from."""
+    materials = request_to_json(request)["materials"]
+    for material in materials.values():
+        material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
+        for name, socket in material["sockets"].items():
+            if socket.get("texture"):
+                socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
+    return materials

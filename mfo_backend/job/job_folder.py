@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The names of the files in a job folder, and the rule that its paths may not leave it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from ..types.errors import BadInputError
+
+
+@dataclass(frozen=True)
+class JobFolder:
+    """One job; `root` is an absolute path with symlinks resolved."""
+
+    root: Path
+
+    @classmethod
+    def open(cls, folder: str | os.PathLike[str]) -> JobFolder:
+        """The existing folder as a job.
+
+        Raises
+        ------
+        BadInputError
+            If it does not exist or is not a folder.
+        """
+        path = Path(folder)
+        if not path.is_dir():
+            what = "is not a folder" if path.exists() else "does not exist"
+            raise BadInputError(f"The job folder {path} {what}: give a folder that holds a request.json.")
+        return cls(path.resolve())
+
+    @property
+    def request(self) -> Path:
+        """What to do."""
+        return self.root / "request.json"
+
+    @property
+    def progress(self) -> Path:
+        """One event a line."""
+        return self.root / "progress.jsonl"
+
+    @property
+    def cancel(self) -> Path:
+        """Its existence asks the backend to stop."""
+        return self.root / "cancel"
+
+    @property
+    def result(self) -> Path:
+        """The outcome; complete when it exists."""
+        return self.root / "result.json"
+
+    @property
+    def pictures(self) -> Path:
+        """Folder of the pictures."""
+        return self.root / "pictures"
+
+    @property
+    def report(self) -> Path:
+        """The report for a browser."""
+        return self.root / "index.html"
+
+    def file(self, relative: str, *, what: str) -> Path:
+        """The existing file at a job-relative path; `what` names the place in the request for messages.
+
+        Raises
+        ------
+        BadInputError
+            If the path is absolute, leaves the folder (also by a symlink), or names no file.
+        """
+        parts = PurePosixPath(relative).parts
+        absolute = relative.startswith("/") or re.match(r"[A-Za-z]:", relative) is not None
+        if absolute or "\\" in relative or "\0" in relative:
+            kind = "an absolute path" if absolute else "not a path with forward slashes"
+            raise BadInputError(
+                f"{what} is {relative!r}, {kind}: give it relative to the job folder, like 'scene.xml'."
+            )
+        if ".." in parts or not parts:
+            raise BadInputError(f"{what} is {relative!r}, which leaves the job folder: put the file inside it.")
+        path = self.root.joinpath(*parts)
+        if not path.resolve().is_relative_to(self.root):
+            raise BadInputError(f"{what} is {relative!r}, a link out of the job folder: put the file itself inside it.")
+        if not path.is_file():
+            raise BadInputError(f"{what} is {relative!r}, which is not in the job folder {self.root}: put it there.")
+        return path
+
+    def require_space(self, needed_bytes: int) -> None:
+        """Check that results can be written before the time of a fit is spent.
+
+        Raises
+        ------
+        BadInputError
+            If no file can be created in the folder, or its disk has less than `needed_bytes` left.
+        """
+        try:
+            with tempfile.TemporaryFile(dir=self.root):
+                free = shutil.disk_usage(self.root).free
+        except OSError as error:
+            raise unwritable(self.root, error) from error
+        if free < needed_bytes:
+            raise BadInputError(
+                f"The disk of the job folder {self.root} has {free / 1e6:.1f} MB left and the results need "
+                f"{needed_bytes / 1e6:.1f} MB: free some space or choose another folder."
+            )
+
+
+def unwritable(folder: Path, error: OSError) -> BadInputError:
+    """The sentence for a job folder that refuses a write."""
+    reason = error.strerror or str(error)
+    return BadInputError(
+        f"The job folder {folder} cannot be written ({reason}): free some space, change its permissions or choose "
+        "another folder."
+    )

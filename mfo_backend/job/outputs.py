@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a finished job leaves in its folder: pictures, the report and, last, result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..metrics.flip_error import flip_error
+from ..metrics.tone_mapping import DisplayView
+from ..report.difference_map import magma
+from ..report.html_report import ReportContent, report_html
+from ..report.picture import displayed, displayed_linear, png_bytes
+from ..scene.image_file import write_exr
+from ..types.image import Encoding, Image
+from .atomic_file import write_atomically
+from .fit_scene import JobOutcome
+from .job_folder import JobFolder
+from .progress import PREVIEW_PATH
+from .request import Request
+from .result import result_to_json, versions, write_result
+
+
+def write_outputs(
+    folder: JobFolder,
+    request: Request,
+    reference: Image,
+    view: DisplayView,
+    outcome: JobOutcome,
+    *,
+    notes: Sequence[str],
+) -> None:
+    """Write pictures, report and result.json; the last appears by rename when the others are complete.
+
+    Raises
+    ------
+    OSError, BadInputError
+        If the folder cannot be written or the disk is full.
+    """
+    difference = flip_error(reference, Image(outcome.result_image, Encoding.LINEAR), display=view)
+    pictures = {
+        "reference": png_bytes(displayed(reference, view)),
+        "start": png_bytes(displayed_linear(outcome.start_image, view)),
+        "result": png_bytes(displayed_linear(outcome.result_image, view)),
+        "difference": png_bytes(magma(difference.map)),
+    }
+    folder.pictures.mkdir(exist_ok=True)
+    for name, data in pictures.items():
+        write_atomically(folder.pictures / f"{name}.png", data)
+    write_exr(folder.pictures / "result.exr", outcome.result_image)
+    report = ReportContent(
+        title=_title(request),
+        subtitle=_subtitle(request),
+        result=outcome.result,
+        pictures=pictures,
+        notes=(*notes, *outcome.result.notes),
+        versions=versions(outcome.variant),
+    )
+    write_atomically(folder.report, report_html(report).encode("utf-8"))
+    write_result(folder, result_to_json(outcome.result, notes=notes, variant=outcome.variant))
+    (folder.root / PREVIEW_PATH).unlink(missing_ok=True)  # result.png is what it was on the way to
+
+
+def bytes_needed(request: Request) -> int:
+    """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, and one EXR."""
+    pixels = request.width * request.height
+    return 2**20 + pixels * (4 * 3 * 3 + 12)
+
+
+def _title(request: Request) -> str:
+    target = request.target
+    material = target.material or target.bsdf_id or target.shape_id
+    return f"{material} on {target.object}" if target.object else material
+
+
+def _subtitle(request: Request) -> str:
+    kind = "scene-linear" if request.encoding.value == "linear" else "sRGB display values"
+    return (
+        f"{request.reference}, {request.width} × {request.height} pixels, {kind}; model {request.fit.model}, "
+        f"preset {request.fit.preset}, {request.fit.spp} samples per pixel, seed {request.fit.seed}"
+    )

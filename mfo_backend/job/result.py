@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""result.json: the outcome of a job, written once. Its keys are in `docs/architecture.md`."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from .. import __version__
+from ..types.result import FitResult
+from ..types.status import Status
+from .atomic_file import write_atomically
+from .job_folder import JobFolder
+from .progress import finite
+
+SCHEMA_VERSION = 1
+
+
+def write_result(folder: JobFolder, content: dict[str, Any]) -> None:
+    """Write result.json by rename, so that it is complete when it exists.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written or the disk is full.
+    """
+    text = json.dumps(finite(content), indent=1, ensure_ascii=False, allow_nan=False)
+    write_atomically(folder.result, text.encode("utf-8"))
+
+
+def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str = "") -> dict[str, Any]:
+    """The JSON form of a result; colours are linear Rec.709."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "status": result.status.value,
+        "sentence": result.message,
+        "model": result.model,
+        "partial": result.status is Status.CANCELLED,
+        "initial": result.initial,
+        "recovered": result.recovered,
+        "bounds": result.bounds,
+        "errors": result.errors,
+        "certainty": {n: {"sd": c.sd, "level": c.level.value} for n, c in result.certainty.items()},
+        "stages": [
+            {
+                "name": stage.name,
+                "status": stage.status.value,
+                "sentence": stage.status.sentence,
+                "iterations": stage.iterations,
+                "loss_start": stage.loss_start,
+                "loss_best": stage.loss_best,
+                "seconds": stage.seconds,
+                "values": stage.values,
+                "curve": [[p.iteration, p.loss, p.best, p.seconds, p.passes] for p in stage.curve],
+            }
+            for stage in result.stages
+        ],
+        "seconds": result.seconds,
+        "passes": result.passes,
+        "notes": [*notes, *result.notes],
+        "versions": versions(variant),
+    }
+
+
+def versions(variant: str = "") -> dict[str, str]:
+    """What computed the result: packages, Python, platform and, if known, the Mitsuba variant."""
+    found = {"mfo_backend": __version__}
+    for package in ("mitsuba", "drjit", "numpy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    found |= {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
+    return found | ({"variant": variant} if variant else {})

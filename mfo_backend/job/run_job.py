@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One job from its request to pictures, report and result; every failure is one sentence and a status."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+
+from ..metrics.tone_mapping import DisplayView
+from ..render.renderer import Interrupted
+from ..report.picture import displayed_linear, png_bytes
+from ..scene.image_file import check_reference, read_image
+from ..types.errors import MfoError
+from ..types.event import Event, Progress
+from ..types.image import Encoding, Image
+from ..types.status import Status
+from .fit_scene import Fitter, fit_scene
+from .job_folder import JobFolder, unwritable
+from .outputs import bytes_needed, write_outputs
+from .progress import EventWriter
+from .request import Request, read_request
+from .stop import StopSignal
+
+_CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
+
+
+def run_job(path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter = fit_scene) -> Status:
+    """Run the job in folder `path` and report its events; the last one is always `finished` or `failed`.
+
+    A request that cannot be used leaves the folder as it was. Tracebacks go to stderr only.
+    """
+    try:
+        status, sentence = _run(path, events, stop, fitter)
+    except MfoError as error:
+        return _fail(events, error.status, str(error))
+    except Interrupted:
+        return _fail(events, Status.CANCELLED, _CANCELLED_EARLY)
+    except OSError as error:
+        traceback.print_exc(file=sys.stderr)
+        refused = unwritable(path, error)
+        return _fail(events, refused.status, str(refused))
+    except MemoryError:
+        traceback.print_exc(file=sys.stderr)
+        return _fail(events, Status.FAILED, "The fit ran out of memory: lower the resolution or the samples per pixel.")
+    except Exception as error:
+        traceback.print_exc(file=sys.stderr)
+        what = str(error).strip().split("\n")[0][:200] or "no message"
+        return _fail(
+            events, Status.FAILED, f"The fit failed ({type(error).__name__}: {what}): the log holds the details."
+        )
+    events.finished(status, sentence)
+    return status
+
+
+def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> tuple[Status, str]:
+    stop.loading(lambda: events.failed(Status.CANCELLED, _CANCELLED_EARLY))
+    folder = JobFolder.open(path)
+    request = read_request(folder)
+    reference, notes = read_reference(folder, request)
+    view = view_of(request, reference)
+    folder.require_space(bytes_needed(request))
+    events.attach(folder, lambda pixels: png_bytes(displayed_linear(pixels, view)))
+
+    def listener(event: Event) -> None:
+        if isinstance(event, Progress):
+            stop.loaded()
+        events(event)
+
+    outcome = fitter(folder, request, reference, view, listener=listener, should_stop=stop.requested)
+    stop.loaded()
+    write_outputs(folder, request, reference, view, outcome, notes=(*request.notes, *notes))
+    folder.cancel.unlink(missing_ok=True)  # it has been answered
+    return outcome.result.status, outcome.result.message
+
+
+def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[str, ...]]:
+    """The checked reference with the request's encoding, and notes on what was changed in it.
+
+    Raises
+    ------
+    BadInputError
+        If it cannot be read, has another size than the scene, is all black or holds NaN or infinite pixels.
+    """
+    image = read_image(folder.file(request.reference, what="request.json: reference.path"))
+    return check_reference(Image(image.pixels, request.encoding, image.alpha), request.width, request.height)
+
+
+def view_of(request: Request, reference: Image) -> DisplayView:
+    """The request's view, else Standard as it is, for a linear reference with an exposure that suits it."""
+    if request.view is not None:
+        return request.view
+    return DisplayView() if reference.encoding is Encoding.SRGB else DisplayView.for_scene(reference.pixels)
+
+
+def _fail(events: EventWriter, status: Status, sentence: str) -> Status:
+    events.failed(status, sentence)
+    return status

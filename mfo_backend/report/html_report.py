@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a fit: one HTML file with everything in it, for light and dark, without any address to load from."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+
+from ..types.result import FitResult
+from ..types.status import Status
+from .loss_plot import loss_plot
+from .value_table import value_rows
+
+_CAPTIONS = {
+    "reference": ("Reference", "the picture to match"),
+    "start": ("Start", "before the fit"),
+    "result": ("Result", "with the recovered values"),
+    "difference": ("Difference", "FLIP of reference and result"),
+}
+_ERROR_NAMES = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
+_TONES = {Status.FAILED: "bad", Status.CANCELLED: "warn", Status.MAX_ITERATIONS: "warn"}
+
+
+@dataclass(frozen=True)
+class ReportContent:
+    """What a report shows; `pictures` are PNG files by the names reference, start, result and difference."""
+
+    title: str
+    result: FitResult
+    pictures: Mapping[str, bytes]
+    subtitle: str = ""
+    notes: Sequence[str] = ()
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+def report_html(content: ReportContent) -> str:
+    """The report as the text of one self-contained HTML file."""
+    style = Path(__file__).with_name("report.css").read_text("utf-8")
+    result = content.result
+    sections = [
+        _section("Pictures", f'<div class="pictures">{_pictures(content.pictures)}</div>'),
+        _section("Values", _value_table(result)),
+        _section("Loss over time", _plot(result)),
+        _section("Stages", _stage_table(result)),
+        _section("Image differences", _error_table(result)),
+        _section("Notes", "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in content.notes) + "</ul>")
+        if content.notes
+        else "",
+    ]
+    versions = ", ".join(f"{escape(name)} {escape(value)}" for name, value in content.versions.items())
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
+<title>{escape(content.title)}</title>
+<style>{style}</style>
+</head>
+<body>
+<main>
+<h1>{escape(content.title)}</h1>
+<p class="soft">{escape(content.subtitle)}</p>
+<p class="status {_TONES.get(result.status, "good")}">{escape(result.message)}</p>
+{_figures(result)}
+{"".join(sections)}
+<footer>{versions}</footer>
+</main>
+</body>
+</html>
+"""
+
+
+def _section(title: str, body: str) -> str:
+    return f"<section><h2>{escape(title)}</h2>{body}</section>\n" if body else ""
+
+
+def _figures(result: FitResult) -> str:
+    """The few numbers one looks for first."""
+    figures = []
+    for name in ("flip", "hdr_flip"):
+        if name in result.errors:
+            before, after = result.errors[name]
+            figures.append((f"{before:.3f} → {after:.3f}", f"mean {_ERROR_NAMES[name]}"))
+    iterations = sum(stage.iterations for stage in result.stages)
+    figures.append((f"{result.seconds:.1f} s", f"{iterations} iterations"))
+    figures.append((f"{result.passes:.0f}", "passes of one full render"))
+    inner = "".join(f'<div><b>{escape(value)}</b><span class="soft">{label}</span></div>' for value, label in figures)
+    return f'<div class="figures">{inner}</div>'
+
+
+def _pictures(pictures: Mapping[str, bytes]) -> str:
+    shown = []
+    for name, (title, words) in _CAPTIONS.items():
+        if name in pictures:
+            data = base64.b64encode(pictures[name]).decode("ascii")
+            scale = '<span class="scale">0 <i></i> 1</span>' if name == "difference" else ""
+            shown.append(
+                f'<figure><img src="data:image/png;base64,{data}" alt="{title}: {words}">'
+                f"<figcaption><b>{title}</b>, {words}{scale}</figcaption></figure>"
+            )
+    return "".join(shown)
+
+
+def _value_table(result: FitResult) -> str:
+    heads = ["Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"]
+    if result.certainty:
+        heads.append("How sure")
+    table = _table(heads, value_rows(result))
+    return f'{table}<p class="soft">Colours are linear Rec.709.</p>' if table else ""
+
+
+def _plot(result: FitResult) -> str:
+    plot = loss_plot(result.stages)
+    legend = "Thick: best so far; thin: every iteration. A dashed line marks the switch of the loss."
+    return f'<div class="plot">{plot}</div><p class="soft">{legend}</p>' if plot else ""
+
+
+def _stage_table(result: FitResult) -> str:
+    rows = "".join(
+        f'<tr><th scope="row">{escape(stage.name)}</th><td>{stage.loss_start:.4g}</td><td>{stage.loss_best:.4g}</td>'
+        f"<td>{stage.iterations}</td><td>{stage.seconds:.1f} s</td>"
+        f'<td class="sentence">{escape(stage.status.sentence)}</td></tr>'
+        for stage in result.stages
+    )
+    return _table(("Stage", "Loss at start", "Best loss", "Iterations", "Time", "Ended"), rows)
+
+
+def _error_table(result: FitResult) -> str:
+    rows = "".join(
+        f'<tr><th scope="row">{escape(_ERROR_NAMES.get(name, name))}</th><td>{before:.4g}</td><td>{after:.4g}</td>'
+        f"<td>{f'{before / after:.1f} times smaller' if 0 < after < before else ''}</td></tr>"
+        for name, (before, after) in result.errors.items()
+    )
+    return _table(("Measure", "Start", "Result", ""), rows)
+
+
+def _table(heads: Sequence[str], rows: str) -> str:
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return f'<div class="scroll">{body}</div>' if rows else ""

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures as a user sees them: Blender's view transform Standard, then 8-bit sRGB PNG."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from ..metrics.tone_mapping import DisplayView
+from ..types.image import Encoding, Image, Pixels
+
+
+def displayed(image: Image, view: DisplayView) -> Pixels:
+    """Display values in [0, 1] of an image; one that already holds display values stays as given."""
+    if image.encoding is Encoding.SRGB:
+        return np.clip(image.pixels, 0.0, 1.0)
+    return displayed_linear(image.pixels, view)
+
+
+def displayed_linear(pixels: Pixels, view: DisplayView) -> Pixels:
+    """Display values in [0, 1] of scene-linear pixels; NaN is black."""
+    return view.display(np.nan_to_num(pixels, nan=0.0)).astype(np.float32)
+
+
+def png_bytes(display: Pixels) -> bytes:
+    """An 8-bit PNG of display values (height, width, 3) in [0, 1]."""
+    from PIL import Image as Pillow  # slow to import; only what writes pictures pays for it
+
+    file = io.BytesIO()
+    Pillow.fromarray(np.rint(np.clip(display, 0.0, 1.0) * 255).astype(np.uint8), "RGB").save(file, "PNG")
+    return file.getvalue()

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stand-in for the backend's Python: takes the same command line, tells the same events, computes nothing.
+
+Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes,
+`end` (finished, failed, crash, deaf). Only the standard library, so that any Python of any machine can run it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import sys
+import threading
+import time
+import zlib
+from pathlib import Path
+
+STAGES = ("mse-hdr", "flip-hdr")
+STEPS = 20
+RECOVERED = {"base_color": [0.25, 0.5, 0.0625], "roughness": 0.3125, "metallic": 0.125}
+INITIAL = {"base_color": [0.8, 0.8, 0.8], "roughness": 0.5, "metallic": 0.0}
+
+
+def write_interpreter(path: Path) -> Path:
+    """A program at `path` that runs this file in place of a backend's Python."""
+    path.write_text(f"#!/bin/sh\nexec python3 '{Path(__file__).resolve()}' \"$@\"\n")
+    path.chmod(0o755)
+    return path
+
+
+def png(path: Path, colour: tuple[int, int, int], width: int = 96, height: int = 64) -> None:
+    """A PNG with a disc of one 8-bit sRGB colour on grey."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = bytearray()
+    for y in range(height):
+        rows.append(0)
+        for x in range(width):
+            inside = (x - width / 2) ** 2 + (y - height / 2) ** 2 < (height * 0.4) ** 2
+            rows += bytes(colour if inside else (90, 90, 90))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(rows))) + chunk(b"IEND", b"")
+    temporary = path.with_suffix(".tmp")
+    temporary.write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    os.replace(temporary, path)
+
+
+def say(**event: object) -> None:
+    """One event on stdout."""
+    print(json.dumps(event), flush=True)
+
+
+def main(arguments: list[str]) -> int:
+    """Act as `python -m mfo_backend run JOB ...`."""
+    assert arguments[:3] == ["-m", "mfo_backend", "run"], arguments
+    folder, control = Path(arguments[3]), json.loads(os.environ.get("MFO_FAKE", "{}"))
+    request = json.loads((folder / "request.json").read_text("utf-8"))
+    cancelled = threading.Event()
+
+    def listen() -> None:
+        for line in sys.stdin:
+            if json.loads(line).get("cmd") == "cancel":
+                cancelled.set()
+        os._exit(5) if not cancelled.is_set() else None
+
+    if control.get("end") != "deaf":
+        threading.Thread(target=listen, daemon=True).start()
+    print("fake backend at work", file=sys.stderr, flush=True)
+    pictures = folder / "pictures"
+    pictures.mkdir(exist_ok=True)
+    if control.get("end") == "failed":
+        say(
+            event="failed",
+            status="bad_input",
+            sentence="Reference is 128x128 but the scene renders 256x256: render it anew.",
+        )
+        return 2
+    if control.get("end") == "crash":
+        print("Illegal instruction in a far away library", file=sys.stderr, flush=True)
+        os.abort()
+    png(pictures / "reference.png", (180, 60, 40))
+    say(event="started", stages=STAGES, parameters=list(RECOVERED), seconds=0.1)
+    pause, steps = control.get("seconds", 0.2) / (STEPS * len(STAGES)), STEPS * len(STAGES)
+    for i in range(steps):
+        stage = STAGES[i // STEPS]
+        fraction = (i + 1) / steps
+        loss = 0.2 * 0.9**i
+        say(
+            event="progress", stage=stage, stage_index=i // STEPS, stage_count=2, iteration=i % STEPS, loss=loss * 1.1,
+            best=loss, fraction=fraction, seconds=i * pause, remaining_seconds=(steps - i - 1) * pause,
+        )  # fmt: skip
+        if i % 4 == 0:
+            png(
+                pictures / "current.png", (int(120 + 60 * fraction), int(120 - 60 * fraction), int(120 - 80 * fraction))
+            )
+            say(event="preview", path="pictures/current.png")
+        if i % STEPS == STEPS - 1:
+            say(
+                event="stage_end", stage=stage, status="stale", iterations=STEPS, loss_start=0.2, loss_best=loss,
+                sentence="The best loss did not improve for ten iterations.",
+            )  # fmt: skip
+        time.sleep(pause)
+        if cancelled.is_set():
+            break
+    png(pictures / "start.png", (120, 120, 120))
+    png(pictures / "result.png", (178, 62, 42))
+    png(pictures / "difference.png", (20, 10, 60))
+    (folder / "index.html").write_text("<!doctype html><title>report</title>")
+    partial = cancelled.is_set()
+    status = "cancelled" if partial else "stale"
+    sentence = "Cancelled; the best values so far were kept." if partial else "The fit is done."
+    result = {
+        "schema_version": 1, "status": status, "sentence": sentence, "model": "mitsuba_principled", "partial": partial,
+        "initial": INITIAL, "recovered": RECOVERED, "bounds": {}, "stages": [], "seconds": 1.0, "passes": 1.0,
+        "errors": {"flip": [0.21, 0.012], "hdr_flip": [0.3, 0.05], "mse": [0.1, 0.0004]},
+        "notes": [], "versions": {}, "request_fit": request["fit"],
+    }  # fmt: skip
+    (folder / "result.tmp").write_text(json.dumps(result))
+    os.replace(folder / "result.tmp", folder / "result.json")
+    say(event="finished", status=status, sentence=sentence, result="result.json")
+    return 4 if partial else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

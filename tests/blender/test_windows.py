@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The extension in real windows: the interface never waits, and a running fit survives what users do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ..addon import fake_backend
+from .conftest import ADDON_ID, RealBlender
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+SCRIPT = Path(__file__).resolve().parent / "scripts" / "in_windows.py"
+
+
+def test_in_windows(windowed: RealBlender, tmp_path: Path) -> None:
+    fake_backend.png(tmp_path / "reference.png", (180, 60, 40))
+    python = str(fake_backend.write_interpreter(tmp_path / "backend_python"))
+    out = windowed.script(SCRIPT, ADDON_ID, str(tmp_path), windows=True, MFO_BACKEND_PYTHON=python)
+    assert "ALL GOOD" in out, out[-4000:]
+    assert "script error" not in out, out[-4000:]
+    print(next(line for line in out.splitlines() if "ALL GOOD" in line))

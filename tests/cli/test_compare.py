@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfo compare`: all metrics of two files, as text, JSON and pictures."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+import numpy as np
+import pytest
+from PIL import Image as PillowImage
+
+from mfo_backend.cli import compare
+from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.scene.image_file import write_exr, write_png
+from mfo_backend.types.errors import BadInputError
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A lit square on black, linear and displayed, and a darker, redder one; a mask of the square."""
+    rng = np.random.default_rng(0)
+    reference = np.zeros((24, 30, 3), np.float32)
+    reference[6:18, 6:18] = rng.uniform(0.1, 0.9, (12, 12, 3))
+    test = reference * np.array([1.0, 0.7, 0.6], np.float32)
+    mask = np.zeros(reference.shape)
+    mask[6:18, 6:18] = 1
+    for name, pixels in (("ref", reference), ("test", test)):
+        write_exr(tmp_path / f"{name}.exr", pixels)
+        write_png(tmp_path / f"{name}.png", DisplayView().display(pixels))
+    write_exr(tmp_path / "other.exr", reference[:20])
+    write_exr(tmp_path / "black.exr", 0 * reference)
+    write_exr(tmp_path / "nan.exr", np.where(reference > 0.5, np.nan, reference))
+    write_png(tmp_path / "mask.png", mask)
+    return tmp_path
+
+
+def run(folder, *words):
+    parser = argparse.ArgumentParser()
+    compare.add_parser(parser.add_subparsers())
+    arguments = parser.parse_args(["compare", *(str(folder / w) if "." in w else w for w in words)])
+    return arguments.func(arguments)
+
+
+def metrics(capsys, folder, *words):
+    assert run(folder, *words, "--json") == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_linear_pictures_have_every_metric(files, capsys):
+    found = metrics(capsys, files, "ref.exr", "test.exr")["metrics"]
+    assert list(found) == ["mse", "log_mse", "relative_mse", "pu21_mse", "flip", "hdr_flip", "de_itp"]
+    assert all(value > 0 for value in found.values())
+    assert found["hdr_flip"] < 1 > found["flip"]
+
+
+def test_display_pictures_have_no_errors_of_radiance(files, capsys):
+    content = metrics(capsys, files, "ref.png", "test.png")
+    missing = [name for name, value in content["metrics"].items() if value is None]
+    assert missing == ["log_mse", "relative_mse", "hdr_flip"]
+    assert "need two linear pictures" in content["notes"][0]
+
+
+@pytest.mark.parametrize("pair", [("ref.exr", "ref.exr"), ("ref.png", "ref.png")])
+def test_equal_files_have_no_error(files, capsys, pair):
+    assert set(metrics(capsys, files, *pair)["metrics"].values()) - {None} == {0}
+
+
+def test_a_linear_file_shown_through_the_view_equals_its_png(files, capsys):
+    found = metrics(capsys, files, "ref.exr", "ref.png")["metrics"]
+    assert found["mse"] < 2e-6  # 8 bits: (1/255)^2 / 12
+    assert found["flip"] < 0.01
+    brighter = metrics(capsys, files, "ref.exr", "ref.png", "--exposure", "1")["metrics"]
+    assert brighter["flip"] > 0.05
+
+
+def test_the_mask_averages_over_the_object(files, capsys):
+    whole = metrics(capsys, files, "ref.exr", "test.exr")["metrics"]
+    masked = metrics(capsys, files, "ref.exr", "test.exr", "--mask", "mask.png")["metrics"]
+    assert masked["mse"] == pytest.approx(whole["mse"] * 24 * 30 / 144)  # there is no error outside
+    assert masked["flip"] > 2 * whole["flip"]
+
+
+def test_maps_are_written(files, capsys):
+    content = metrics(capsys, files, "ref.exr", "test.exr", "--out", "maps.dir")
+    assert list(content["pictures"]) == ["flip", "hdr_flip", "de_itp"]
+    for path in content["pictures"].values():
+        with PillowImage.open(path) as picture:
+            assert picture.width > 256
+
+
+def test_text_names_every_metric(files, capsys):
+    assert run(files, "ref.png", "test.png") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[:7]] == list(compare._MEANINGS)
+    assert lines[5].split()[1] == "-"
+
+
+def test_a_black_reference_is_defined(files, capsys):
+    found = metrics(capsys, files, "black.exr", "test.exr")["metrics"]
+    assert all(np.isfinite(value) for value in found.values())
+    assert found["hdr_flip"] > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("ref.exr", "other.exr"), "The test image is 30x20 but the reference is 30x24"),
+        (("nan.exr", "ref.exr"), r"The reference has \d+ pixels with NaN"),
+        (("ref.exr", "missing.exr"), "does not exist"),
+        (("ref.exr", "test.exr", "--mask", "black.exr"), "The mask is empty"),
+        (("ref.exr", "test.exr", "--mask", "other.exr"), "The mask has shape"),
+        (("ref.exr", "test.exr", "--gamma", "-1"), "View gamma is -1.0"),
+        (("ref.exr", "test.exr", "--out", "mask.png"), "cannot be made"),
+    ],
+)
+def test_bad_input(files, words, sentence):
+    with pytest.raises(BadInputError, match=sentence):
+        run(files, *words)

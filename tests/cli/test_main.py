@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The `mfo` command: start-up, errors and exit codes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from mfo_backend import __version__
+from mfo_backend.cli import main as command
+from mfo_backend.types.errors import BadInputError, MfoError, SetupError
+
+ROOT = Path(__file__).resolve().parents[2]
+HELP = "from mfo_backend.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass"
+SLOW = {"numpy", "mitsuba", "drjit", "scipy", "PIL", "OpenEXR", "tqdm", "matplotlib"}
+
+
+def python(code: str) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60)
+
+
+@pytest.mark.parametrize("action", ["import mfo_backend", HELP])
+def test_help_loads_no_heavy_package(action: str) -> None:
+    # without them start-up is that of Python itself, about 30 ms; a time limit would fail on a busy machine
+    done = python(f"import sys\n{action}\nprint(sorted({SLOW} & set(sys.modules)))")
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
+def test_help_names_every_command(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        command.main(["--help"])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    for name in ("doctor", "fit", "run"):
+        assert f"    {name} " in shown
+    assert "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4" in shown
+
+
+@pytest.mark.parametrize("name", ["doctor", "fit", "run"])
+def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        command.main([name, "--help"])
+    assert ended.value.code == 0
+    assert f"usage: mfo {name}" in capsys.readouterr().out
+
+
+def test_the_version(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        command.main(["--version"])
+    assert capsys.readouterr().out == f"mfo {__version__}\n"
+
+
+@pytest.mark.parametrize("words", [[], ["dance"], ["fit"], ["run"], ["run", "x", "--progress", "loud"]])
+def test_wrong_words_exit_with_2(words: list[str], capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        command.main(words)
+    assert ended.value.code == 2
+    assert "usage: mfo" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence", "status"),
+    [
+        (BadInputError("No shape 'x': choose one."), 2, "No shape 'x': choose one.", "bad_input"),
+        (SetupError("No LLVM: get one."), 3, "No LLVM: get one.", "setup"),
+        (MfoError("It failed."), 1, "It failed.", "failed"),
+        (KeyboardInterrupt(), 4, "Interrupted.", "cancelled"),
+    ],
+)
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_error_is_one_line_and_a_code(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+    error: BaseException,
+    code: int,
+    sentence: str,
+    status: str,
+    as_json: bool,
+) -> None:
+    def fail(arguments):
+        raise error
+
+    parsed = SimpleNamespace(func=fail, json=as_json)
+    monkeypatch.setattr(command, "_parser", lambda words: SimpleNamespace(parse_args=lambda words: parsed))
+    assert command.main(["anything"]) == code
+    shown = capsys.readouterr()
+    assert shown.err == f"mfo: {sentence}\n"
+    assert shown.out == "" or json.loads(shown.out) == {"status": status, "sentence": sentence}
+    assert bool(shown.out) == as_json
+
+
+def test_the_module_is_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mfo_backend", "run", "/no/such/job", "--progress", "json"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert json.loads(done.stdout) == {
+        "event": "failed",
+        "status": "bad_input",
+        "sentence": "The job folder /no/such/job does not exist: give a folder that holds a request.json.",
+    }
+
+
+def test_a_closed_pipe_is_no_traceback() -> None:
+    done = subprocess.run(
+        f'"{sys.executable}" -m mfo_backend --help | head -0', shell=True, capture_output=True, text=True, cwd=ROOT
+    )
+    assert "Traceback" not in done.stderr

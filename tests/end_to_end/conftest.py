@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files of one small scene for all tests here, made by Blender in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SIZE = 64
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished `mfo` command."""
+
+    code: int
+    stdout: str
+    stderr: str
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """The object that --json printed."""
+        return json.loads(self.stdout)
+
+    @property
+    def sentence(self) -> str:
+        """The last line on stderr."""
+        return self.stderr.strip().splitlines()[-1]
+
+
+def run_mfo(*arguments: object, environment: dict[str, str] | None = None) -> Done:
+    """Run `mfo` from this checkout."""
+    words = [sys.executable, "-m", "mfo_backend", *map(str, arguments)]
+    env = os.environ | {"PYTHONPATH": str(ROOT)} | (environment or {})
+    done = subprocess.run(words, capture_output=True, text=True, env=env, timeout=280)
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def run_bpy(code: str, *arguments: object) -> None:
+    """Run a script with the bpy module in a process of its own; `argv` are its arguments."""
+    words = [sys.executable, "-c", f"import sys, bpy\nargv = sys.argv[1:]\n{code}", *map(str, arguments)]
+    done = subprocess.run(words, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert done.returncode == 0, done.stderr
+
+
+RENDER = """
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+scene = bpy.context.scene
+scene.cycles.samples, scene.cycles.seed = 64, 3
+settings = scene.render.image_settings
+for path, kind, view in ((argv[1], "OPEN_EXR", "Standard"), (argv[2], "PNG", "Standard"), (argv[3], "PNG", "AgX")):
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, scene.view_settings.view_transform = kind, view
+    settings.color_depth = "32" if kind == "OPEN_EXR" else "8"
+    scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+"""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """`start` and `truth` are .blend files, the pictures are renders of the truth by Cycles."""
+
+    folder: Path
+    start: Path
+    truth: Path
+    exr: Path
+    png: Path
+    agx_png: Path
+    object: str = "Suzanne"
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    folder = tmp_path_factory.mktemp("scene")
+    command = [sys.executable, "-m", "blender_addon.headless", "demo-scene", str(folder), "--size", str(SIZE)]
+    subprocess.run(command, check=True, capture_output=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    made = Scene(
+        folder, *(folder / n for n in ("start.blend", "truth.blend", "reference.exr", "reference.png", "agx.png"))
+    )
+    run_bpy(RENDER, made.truth, made.exr, made.png, made.agx_png)
+    return made
+
+
+@pytest.fixture
+def blend(scene: Scene) -> Callable[..., Done]:
+    """Run `mfo blend` on the start with further arguments."""
+
+    def call(reference: Path, *arguments: object, file: Path = scene.start) -> Done:
+        return run_mfo("blend", file, "--object", scene.object, "--reference", reference, *arguments)
+
+    return call

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every wrong input gives one sentence with what was given and what to do, exit code 2, and leaves no trace."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mfo_backend.scene.image_file import write_exr
+
+from .conftest import SIZE, Done, Scene, run_bpy, run_mfo
+
+HEAD = "bpy.data.objects['Suzanne']"
+# name -> (what is done to the .blend, words of the sentence)
+BROKEN_SCENES = {
+    "no camera": ("bpy.data.objects.remove(bpy.data.objects['Camera'])", ("camera",)),
+    "no material": (f"{HEAD}.data.materials.clear()", ("material", "Suzanne")),
+    "no principled": (
+        f"t = {HEAD}.active_material.node_tree\n"
+        "t.nodes.remove(t.nodes['Principled BSDF'])\nd = t.nodes.new('ShaderNodeBsdfDiffuse')\n"
+        "t.links.new(d.outputs[0], t.nodes['Material Output'].inputs[0])",
+        ("Principled", "Head"),
+    ),
+    "behind the camera": (f"{HEAD}.location = (0, -40, 0)", ("camera", "Suzanne")),
+    "no light": ("bpy.context.scene.world = None", ("light",)),
+    "unsupported node": (
+        f"t = {HEAD}.active_material.node_tree\nn = t.nodes.new('ShaderNodeTexNoise')\n"
+        "t.links.new(n.outputs[0], t.nodes['Principled BSDF'].inputs['Roughness'])",
+        ("Roughness", "Noise"),
+    ),
+}
+SAVE = "\nbpy.ops.wm.save_as_mainfile(filepath=argv[1], copy=True)"
+
+
+def refused(done: Done, job: Path, *words: str) -> None:
+    assert done.code == 2, done.stderr
+    assert done.sentence.startswith("mfo: ")
+    assert "Traceback" not in done.stderr
+    for word in words:
+        assert word.lower() in done.sentence.lower()
+    assert not job.exists()
+
+
+@pytest.mark.parametrize("name", BROKEN_SCENES)
+def test_scene_that_cannot_be_fitted(name: str, scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+    change, words = BROKEN_SCENES[name]
+    broken = tmp_path / "broken.blend"
+    run_bpy(f"bpy.ops.wm.open_mainfile(filepath=argv[0])\n{change}{SAVE}", scene.start, broken)
+    before = hashlib.sha256(broken.read_bytes()).hexdigest()
+    refused(blend(scene.exr, "--out", tmp_path / "job", file=broken), tmp_path / "job", *words)
+    assert hashlib.sha256(broken.read_bytes()).hexdigest() == before
+
+
+@pytest.mark.parametrize("kind", ["size", "unreadable", "missing", "black", "nan", "infinite"])
+def test_reference_that_cannot_be_used(kind: str, scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+    reference = tmp_path / "reference.exr"
+    pixels = np.full((SIZE, SIZE, 3), 0.3, np.float32)
+    words = {
+        "size": ("32x32", f"{SIZE}x{SIZE}"),
+        "unreadable": ("reference.exr",),
+        "missing": ("reference.exr", "not exist"),
+        "black": ("black",),
+        "nan": ("NaN",),
+        "infinite": ("infinite",),
+    }[kind]
+    if kind == "size":
+        pixels = pixels[:32, :32]
+    elif kind == "black":
+        pixels[:] = 0
+    elif kind == "nan":
+        pixels[3, 4] = np.nan
+    elif kind == "infinite":
+        pixels[3, 4] = np.inf
+    if kind == "unreadable":
+        reference.write_bytes(b"not a picture")
+    elif kind != "missing":
+        write_exr(reference, pixels)
+    refused(blend(reference, "--out", tmp_path / "job"), tmp_path / "job", *words)
+
+
+def test_unknown_parameter(scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+    done = blend(scene.exr, "--out", tmp_path / "job", "--parameters", "shininess")
+    refused(done, tmp_path / "job", "shininess", "roughness")
+
+
+def test_unknown_object(scene: Scene, tmp_path: Path) -> None:
+    done = run_mfo("blend", scene.start, "--object", "Teapot", "--reference", scene.exr, "--out", tmp_path / "job")
+    refused(done, tmp_path / "job", "Teapot", "Suzanne")
+
+
+def test_job_folder_that_cannot_be_written(scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine")
+    done = blend(scene.exr, "--out", file / "job")
+    refused(done, file / "job", str(file))
+    assert file.read_text() == "mine"
+
+
+def test_foreign_folder_is_left_alone(scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+    (tmp_path / "job").mkdir()
+    (tmp_path / "job" / "mine.txt").write_text("mine")
+    done = blend(scene.exr, "--out", tmp_path / "job")
+    assert done.code == 2
+    assert [path.name for path in (tmp_path / "job").iterdir()] == ["mine.txt"]
+
+
+def test_missing_blender_program(scene: Scene, tmp_path: Path) -> None:
+    done = run_mfo(
+        "blend", scene.start, "--object", "Suzanne", "--reference", scene.exr, "--blender", tmp_path / "no-blender"
+    )
+    assert done.code == 3
+    assert "no-blender" in done.sentence

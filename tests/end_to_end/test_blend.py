@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The whole road: a .blend and a picture in, recovered values on the material out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mfo_backend.metrics.flip_error import flip_error
+from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.scene.image_file import read_image
+
+from .conftest import Done, Scene, run_bpy, run_mfo
+
+Blend = Callable[..., Done]
+SHOW = """
+import json
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+node = bpy.data.materials["Head"].node_tree.nodes["Principled BSDF"]
+values = {s.name: (list(s.default_value) if hasattr(s.default_value, "__len__") else s.default_value)
+          for s in node.inputs if s.type in ("VALUE", "RGBA")}
+open(argv[1], "w").write(json.dumps(values))
+"""
+
+
+def sockets(file: Path, folder: Path) -> dict[str, float | list[float]]:
+    import json
+
+    run_bpy(SHOW, file, folder / "sockets.json")
+    return json.loads((folder / "sockets.json").read_text())
+
+
+def test_linear_reference_is_recovered_and_applied(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+    before = hashlib.sha256(scene.start.read_bytes()).hexdigest()
+    saved = tmp_path / "recovered.blend"
+    done = blend(scene.exr, "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json")
+    assert done.code == 0, done.stderr
+    start, result = done.answer["errors"]["flip"]
+    # the floor is the noise of both pictures, about 0.03 at 64 samples; the start is another material altogether
+    assert result < 0.06
+    assert result < start / 4
+    assert done.answer["model"] == "blender_principled"
+    assert hashlib.sha256(scene.start.read_bytes()).hexdigest() == before
+    shown, recovered = sockets(saved, tmp_path), done.answer["recovered"]
+    assert shown["Roughness"] == pytest.approx(recovered["roughness"], abs=1e-6)
+    assert shown["Base Color"][:3] == pytest.approx(recovered["base_color"], abs=1e-6)
+    for name in ("reference", "start", "result", "difference"):
+        assert (tmp_path / "job" / "pictures" / f"{name}.png").is_file()
+    assert "Roughness" in (tmp_path / "job" / "index.html").read_text("utf-8").title()
+
+
+def test_display_picture_is_recovered(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+    done = blend(scene.png, "--out", tmp_path / "job", "--preset", "fast", "--json")
+    assert done.code == 0, done.stderr
+    start, result = done.answer["errors"]["flip"]
+    assert result < 0.06  # as above
+    assert result < start / 4
+
+
+def test_agx_picture_is_refused_with_the_cure(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+    agx = tmp_path / "agx.blend"
+    run_bpy(
+        "bpy.ops.wm.open_mainfile(filepath=argv[0])\n"
+        "bpy.context.scene.view_settings.view_transform = 'AgX'\n"
+        "bpy.ops.wm.save_as_mainfile(filepath=argv[1], copy=True)",
+        scene.start,
+        agx,
+    )
+    done = blend(scene.agx_png, "--out", tmp_path / "job", file=agx)
+    assert done.code == 2
+    assert "AgX" in done.sentence
+    assert "OpenEXR" in done.sentence
+    assert not (tmp_path / "job").exists()
+
+
+def test_paper_preset_lowers_flip_after_mse(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+    done = blend(
+        scene.exr, "--out", tmp_path / "job", "--preset", "paper", "--parameters", "reduced", "--spp", 4,
+        "--max-iterations", 150, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    mse, flip = done.answer["stages"]
+    assert [mse["name"], flip["name"]] == ["mse-hdr", "flip-hdr"]
+    assert mse["status"] == "stale"
+    assert mse["loss_best"] < 0.5 * mse["loss_start"]  # a fifth of it is the noise of 4 samples
+    assert flip["loss_best"] < flip["loss_start"]
+    start, result = done.answer["errors"]["hdr_flip"]
+    assert result < start / 2
+
+
+def test_demo_judges_in_cycles(tmp_path: Path) -> None:
+    done = run_mfo("demo", "--out", tmp_path / "demo", "--size", 96, "--samples", 64, "--json")
+    assert done.code == 0, done.stderr
+    assert done.answer["flip_after"] <= 0.06
+    assert done.answer["flip_after"] * 4 <= done.answer["flip_before"]
+    pictures = [read_image(tmp_path / "demo" / f"{name}.exr") for name in ("reference", "after")]
+    assert flip_error(*pictures, display=DisplayView()).mean == pytest.approx(done.answer["flip_after"], abs=1e-6)
+    assert np.isfinite(pictures[1].pixels).all()

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an export refuses: one sentence that names what was given and what to do, and nothing on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from blender_addon.export.job import ExportError, check_export, export_job
+
+from .scenes import add_camera, add_mesh, add_quad, diffuse_material, new_material, world_color
+
+
+def no_camera(scene: Any, target: Any) -> None:
+    scene.camera = None
+
+
+def panorama(scene: Any, target: Any) -> None:
+    scene.camera.data.type = "PANO"
+
+
+def border(scene: Any, target: Any) -> None:
+    scene.render.use_border = True
+
+
+def flat_camera(scene: Any, target: Any) -> None:
+    scene.camera.scale = (1.0, 0.0, 1.0)
+
+
+def no_slot(scene: Any, target: Any) -> None:
+    target.data.materials.clear()
+
+
+def empty_slot(scene: Any, target: Any) -> None:
+    target.data.materials[0] = None
+
+
+def no_principled(scene: Any, target: Any) -> None:
+    target.data.materials[0] = diffuse_material("Plain", (1, 1, 1))
+
+
+def slot_without_faces(scene: Any, target: Any) -> None:
+    target.data.materials.append(new_material("Unused"))
+    target.active_material_index = 1
+
+
+def outside(scene: Any, target: Any) -> None:
+    target.location.x = 5.0
+
+
+def behind(scene: Any, target: Any) -> None:
+    target.location.z = 20.0
+
+
+def covered(scene: Any, target: Any) -> None:
+    add_quad("Lid", 3.0, 1.0, diffuse_material("Lid", (1, 1, 1)))
+
+
+def hidden(scene: Any, target: Any) -> None:
+    target.hide_render = True
+
+
+def dark(scene: Any, target: Any) -> None:
+    scene.world = None
+
+
+def no_faces(scene: Any, target: Any) -> None:
+    target.data.clear_geometry()
+
+
+def override(scene: Any, target: Any) -> None:
+    bpy.context.view_layer.material_override = diffuse_material("Clay", (1, 1, 1))
+
+
+CASES: dict[Callable[[Any, Any], None], str] = {
+    no_camera: "The scene has no camera: add one and make it the active camera.",
+    panorama: "Camera 'Camera' is of type Pano: make it Perspective or Orthographic.",
+    border: "Render Region is on, so the picture shows a part of the frame: turn Render Region off.",
+    flat_camera: "Camera 'Camera' has a scale of zero: give it and its parents a scale other than zero.",
+    no_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
+    empty_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
+    no_principled: "Material 'Plain' has no Principled BSDF linked to Surface of its output: link one directly.",
+    slot_without_faces: "No face of 'Target' uses its active material slot 2: choose another.",
+    outside: "The camera does not see 'Target': move it into the frame.",
+    behind: "The camera does not see 'Target': move it into the frame.",
+    covered: "The camera does not see 'Target': it is hidden behind 'Lid'.",
+    hidden: "Object 'Target' is hidden in the render: show it.",
+    dark: "The scene has no light: add a light or give the world a colour.",
+    override: "View layer 'ViewLayer' replaces materials or the world by 'Clay': remove the override.",
+    no_faces: "No face of 'Target' uses its active material slot 1: choose another.",
+}
+
+
+@pytest.mark.parametrize("spoil", CASES, ids=lambda spoil: spoil.__name__)
+def test_refused_with_one_sentence(spoil: Any, scene: Any, tmp_path: Path) -> None:
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    spoil(scene, target)
+    with pytest.raises(ExportError) as caught:
+        export_job(bpy.context, target, tmp_path / "job", reference=None, fit={})
+    assert str(caught.value) == CASES[spoil]
+    assert list(tmp_path.iterdir()) == []
+    assert check_export(bpy.context, target)[0][0] == CASES[spoil]
+
+
+def test_object_that_is_no_mesh(scene: Any) -> None:
+    item = bpy.data.objects.new("Handle", None)
+    bpy.context.collection.objects.link(item)
+    assert check_export(bpy.context, item)[0] == ["The object to fit is 'Handle' (Empty): select an object with faces."]
+    assert check_export(bpy.context, None)[0] == ["The object to fit is nothing: select an object with faces."]
+
+
+def test_partly_covered_or_behind_glass_is_fine(scene: Any) -> None:
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    add_quad("Lid", 0.9, 1.0, diffuse_material("Lid", (1, 1, 1)))
+    assert check_export(bpy.context, target)[0] == []
+    add_quad("Pane", 3.0, 2.0, new_material("Glass", Transmission_Weight=1.0))
+    assert check_export(bpy.context, target)[0] == []
+
+
+def test_target_larger_than_the_frame_is_fine(scene: Any) -> None:
+    world_color(scene, 1.0)
+    add_camera("PERSP", (0, 0, 1))
+    target = add_mesh("Target", [(-90, -50, 0), (80, -70, 0), (10, 95, 0)], [(0, 1, 2)], new_material("Target"))
+    assert check_export(bpy.context, target)[0] == []

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reference picture: files are copied, images are written, and display colours only under an invertible view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from blender_addon.export.exr_file import write_exr
+from blender_addon.export.job import ExportError
+from blender_addon.export.png_file import write_png
+
+from .scenes import add_camera, add_quad, new_material, world_color
+
+
+@pytest.fixture
+def target(scene: Any) -> Any:
+    scene.render.resolution_x, scene.render.resolution_y = 6, 4
+    scene.view_settings.view_transform = "Standard"
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    return add_quad("Target", 1.0, 0.0, new_material("Target"))
+
+
+def picture(width: int = 6, height: int = 4) -> np.ndarray:
+    return np.random.default_rng(6).random((height, width, 3)).astype(np.float32)
+
+
+def read(path: Path) -> np.ndarray:
+    OpenEXR = pytest.importorskip("OpenEXR")
+    return next(iter(OpenEXR.File(str(path)).channels().values())).pixels
+
+
+def test_exr_file_is_copied(target: Any, export: Any, tmp_path: Path) -> None:
+    write_exr(tmp_path / "ref.EXR", picture())
+    bpy.context.scene.view_settings.view_transform = "AgX"  # does not touch linear files
+    report = export(target, reference=tmp_path / "ref.EXR")
+    assert report.request["reference"] == {"path": "reference.exr", "encoding": "linear"}
+    assert (report.folder / "reference.exr").read_bytes() == (tmp_path / "ref.EXR").read_bytes()
+
+
+def test_png_file_and_view(target: Any, export: Any, tmp_path: Path) -> None:
+    write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
+    view = bpy.context.scene.view_settings
+    view.exposure, view.gamma = 1.5, 0.75
+    report = export(target, reference=tmp_path / "ref.png")
+    assert report.request["reference"] == {"path": "reference.png", "encoding": "srgb"}
+    assert report.request["view"] == {"exposure_ev": 1.5, "gamma": 0.75}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("view_transform", "AgX", "the view transform AgX"),
+        ("look", "Medium High Contrast", "the look Medium High Contrast"),
+        ("use_curve_mapping", True, "view curves"),
+    ],
+)
+def test_display_file_under_another_view_is_refused(
+    name: str, value: Any, reason: str, target: Any, export: Any, tmp_path: Path
+) -> None:
+    write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
+    setattr(bpy.context.scene.view_settings, name, value)
+    with pytest.raises(ExportError, match=f"ref.png holds display colours and the scene uses {reason}.*OpenEXR"):
+        export(target, reference=tmp_path / "ref.png")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ref.png"]
+
+
+def test_float_image_becomes_linear_exr(target: Any, export: Any) -> None:
+    image = bpy.data.images.new("Float", 6, 4, float_buffer=True)
+    pixels = np.ones((4, 6, 4), np.float32)
+    pixels[..., :3] = picture() * 5
+    image.pixels.foreach_set(pixels[::-1].ravel())
+    report = export(target, reference=image)
+    assert report.request["reference"] == {"path": "reference.exr", "encoding": "linear"}
+    np.testing.assert_array_equal(read(report.folder / "reference.exr"), pixels[..., :3])
+
+
+def test_byte_image_becomes_png(target: Any, export: Any) -> None:
+    Image = pytest.importorskip("PIL.Image")
+    image = bpy.data.images.new("Bytes", 6, 4)
+    pixels = np.full((4, 6, 4), 255, np.uint8)
+    pixels[..., :3] = np.arange(72).reshape(4, 6, 3) * 3
+    image.pixels.foreach_set((pixels[::-1] / np.float32(255)).ravel())
+    report = export(target, reference=image)
+    assert report.request["reference"] == {"path": "reference.png", "encoding": "srgb"}
+    with Image.open(report.folder / "reference.png") as found:
+        np.testing.assert_array_equal(np.asarray(found), pixels[..., :3])
+
+
+def test_pixel_aspect_stretches_the_reference(target: Any, export: Any, tmp_path: Path) -> None:
+    bpy.context.scene.render.pixel_aspect_x = 2.0
+    ramp = np.repeat(np.arange(6, dtype=np.float32)[None, :, None], 4, axis=0).repeat(3, axis=2)
+    write_exr(tmp_path / "ref.exr", ramp)
+    before = len(bpy.data.images)
+    report = export(target, reference=tmp_path / "ref.exr")
+    assert (report.request["image"]["width"], report.request["image"]["height"]) == (12, 4)
+    assert len(bpy.data.images) == before
+    wanted = np.clip((np.arange(12) + 0.5) / 2 - 0.5, 0, 5)
+    np.testing.assert_allclose(read(report.folder / "reference.exr")[0, :, 0], wanted, atol=1e-6)
+    assert any(note.startswith("Pixel aspect 2:1") for note in report.notes)
+
+
+def test_wrong_references(target: Any, export: Any, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"none\.exr does not exist: choose another file"):
+        export(target, reference=tmp_path / "none.exr")
+    (tmp_path / "ref.txt").write_text("")
+    with pytest.raises(ExportError, match=r"ref\.txt is no picture we read: use EXR"):
+        export(target, reference=tmp_path / "ref.txt")
+    with pytest.raises(ExportError, match="'Small' is 3x3, but the scene renders 6x4: set the output resolution"):
+        export(target, reference=bpy.data.images.new("Small", 3, 3))
+    empty = bpy.data.images.new("Empty", 1, 1)
+    empty.source = "FILE"
+    empty.filepath = str(tmp_path / "gone.png")
+    empty.reload()
+    with pytest.raises(ExportError, match=r"'Empty' has no pixels .is its file missing"):
+        export(target, reference=empty)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files that a scene names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from mfo_backend.job.job_folder import JobFolder
+from mfo_backend.job.scene_files import check_scene_files, film_size, pack_scene
+from mfo_backend.types.errors import BadInputError
+
+
+def scene_with(inner: str) -> str:
+    return f'<scene version="3.0.0">{inner}</scene>'
+
+
+def mesh(name: str) -> str:
+    return f'<shape type="ply"><string name="filename" value="{name}"/></shape>'
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    folder = tmp_path / "scene"
+    (folder / "a").mkdir(parents=True)
+    (folder / "b").mkdir()
+    (folder / "a" / "mesh.ply").write_bytes(b"first")
+    (folder / "b" / "mesh.ply").write_bytes(b"second")
+    (folder / "metal.spd").write_text("400 1")
+    (tmp_path / "secret.ply").write_bytes(b"secret")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("inner", "words"),
+    [
+        (mesh("../secret.ply"), "outside the job folder"),
+        (mesh("/etc/hostname"), "outside the job folder"),
+        (mesh("link.ply"), "outside the job folder"),
+        (mesh("missing.ply"), "which is not there"),
+        ('<spectrum name="eta" filename="../secret.ply"/>', "outside the job folder"),
+        ('<include filename="a.xml"/>', "has <include>"),
+        ('<path value="/etc"/>', "has <path>"),
+        ('<default name="where" value="/etc/hostname"/>' + mesh("$where"), "outside the job folder"),
+    ],
+)
+def test_a_job_scene_names_files_of_the_job_only(root: Path, inner: str, words: str) -> None:
+    (root / "link.ply").symlink_to(root.parent / "secret.ply")
+    (root / "scene.xml").write_text(scene_with(inner))
+    with pytest.raises(BadInputError, match=words):
+        check_scene_files(JobFolder.open(root), "scene.xml")
+
+
+def test_files_of_the_job_are_fine(root: Path) -> None:
+    (root / "scene.xml").write_text(scene_with(mesh("a/mesh.ply") + '<spectrum name="eta" filename="metal.spd"/>'))
+    check_scene_files(JobFolder.open(root), "scene.xml")
+
+
+def test_packing_copies_every_file_once(root: Path, tmp_path: Path) -> None:
+    spectrum = '<spectrum name="eta" filename="metal.spd"/>'
+    inner = mesh("a/mesh.ply") + mesh("b/mesh.ply") + mesh(str(root / "a" / "mesh.ply")) + spectrum
+    (root / "scene.xml").write_text(scene_with(inner))
+    job = tmp_path / "job"
+    job.mkdir()
+    pack_scene(root / "scene.xml", job)
+    check_scene_files(JobFolder.open(job), "scene.xml")
+    named = [e.get("value") for e in ElementTree.parse(job / "scene.xml").getroot().iter("string")]
+    assert [(job / name).read_bytes() for name in named] == [b"first", b"second", b"first"]
+    assert len(list((job / "meshes").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("film", "size"),
+    [
+        ("", (768, 576)),
+        ('<integer name="width" value="64"/><integer name="height" value="32"/>', (64, 32)),
+        ('<integer name="width" value="64"/><integer name="crop_width" value="16"/>', (16, 576)),
+    ],
+)
+def test_the_size_of_the_film(film: str, size: tuple[int, int]) -> None:
+    xml = scene_with(f'<sensor type="perspective"><film type="hdrfilm">{film}</film></sensor>')
+    assert film_size(ElementTree.fromstring(xml)) == size
+
+
+def test_a_scene_without_camera() -> None:
+    with pytest.raises(BadInputError, match="no camera"):
+        film_size(ElementTree.fromstring(scene_with("")))
