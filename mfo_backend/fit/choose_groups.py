@@ -38,8 +38,9 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
     return groups.take(np.union1d(spread, bright))
 
 
-# Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to the
-# next pixel; by half; by a factor of four. A highlight of roughness 0.06 on a sphere of 100 pixels is narrower than one.
+# Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
+# the next pixel; by half; by a factor of four. A highlight of roughness 0.06 on a sphere of 100 pixels is narrower
+# than one.
 GRID_PLAIN, GRID_DETAIL, GRID_HIGHLIGHT, GRID_PEAK = 2, 6, 20, 50
 
 

@@ -69,9 +69,7 @@ class MitsubaPrincipled:
         unused = {"spec_trans", "specular" if "eta" in {*given, *free} else "eta", *free}
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
 
-    def bind(
-        self, fixed: Mapping[str, Value], free: Collection[str]
-    ) -> Callable[[Mapping, Any, Any], Any]:
+    def bind(self, fixed: Mapping[str, Value], free: Collection[str]) -> Callable[[Mapping, Any, Any], Any]:
         """`evaluate`, which leaves out by itself what is exactly 0."""
         return self.evaluate
 
