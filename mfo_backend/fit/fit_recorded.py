@@ -55,7 +55,9 @@ def fit_recorded(
     Raises
     ------
     BadInputError
-        As `fit_material`, and for materials that recorded paths cannot hold: textures, transmission.
+        As `fit_material`.
+    UnrecordableError
+        For materials that recorded paths cannot hold: textures, transmission.
     """
     from ..render.recorded_scene import RecordedScene
 

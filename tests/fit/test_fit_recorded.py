@@ -163,3 +163,19 @@ def test_a_mirror_like_metal_is_not_taken_for_a_black_plastic(tmp_path):
     assert recovered["metallic"] == pytest.approx(0.999, abs=0.02)
     assert recovered["roughness"] == pytest.approx(0.05, abs=0.005)
     np.testing.assert_allclose(recovered["base_color"], truth["base_color"], atol=0.03)
+
+
+def test_what_cannot_be_recorded_is_fitted_by_the_paper_and_says_so(tmp_path):
+    checker = (
+        '<texture type="checkerboard" name="clearcoat"><float name="color0" value="0.2"/>'
+        '<float name="color1" value="0.9"/></texture>'
+    )
+    renderer = load(tmp_path, POINT, ["roughness"], size=16, material=checker)
+    reference = renderer.image(renderer.table.pack({"roughness": 0.3}), seed=5, spp=64)
+    outcome, events = fit(renderer, reference, preset="balanced")
+    (note,) = outcome.result.notes
+    assert "'clearcoat' is a texture" in note
+    assert "'paper' was used instead of 'balanced'" in note
+    assert [stage.name for stage in outcome.result.stages] == ["mse-hdr", "flip-hdr"]
+    assert sum(isinstance(e, Started) for e in events) == 1
+    assert outcome.result.errors["mse"][1] < outcome.result.errors["mse"][0]
