@@ -27,7 +27,7 @@ from .viewing import Viewing
 
 Array = NDArray[np.floating]
 
-LEAST_SIZE = 8  # pixels; the package's pyramid is not defined for less
+LEAST_SIZE = 2  # pixels; the package has no pyramid for less
 
 
 class ColorVideoVdp:
