@@ -29,4 +29,4 @@ class DisplayLight(ChannelResponse):
     def slope(self, linear: Array) -> Array:
         """See `ChannelResponse`."""
         seen = (linear >= 0) & (linear <= self.peak_nits / self.nits)
-        return seen * linear.dtype.type(self.nits)
+        return np.where(seen, self.nits, 0).astype(linear.dtype)

@@ -111,7 +111,7 @@ def _run(program: str, folder: Path, job: Path, seconds: float) -> str:
     if Path(program).stem.lower() == "matlab":
         command = [program, "-batch", _DRIVER.stem]
     else:
-        command = [program, "--no-gui", "--quiet", "--norc", str(_DRIVER)]
+        command = [program, "--no-gui", "--quiet", str(_DRIVER)]
     environment = {**os.environ, FOLDER_VARIABLE: str(folder), f"{FOLDER_VARIABLE}_JOB": str(job)}
     try:
         done = subprocess.run(

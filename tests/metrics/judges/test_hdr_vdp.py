@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The adapter of HDR-VDP-3: what it hands over and how it fails, with a stand-in for Octave; the original if it is there.
+"""The adapter of HDR-VDP-3: what it hands over and how it fails, with a stand-in for Octave; the original where it is.
 
 The stand-in is a script of Python that reads what Octave would read and scores 10 minus the mean absolute difference.
 `MFO_TEST_OCTAVE=1` runs the driver in the Octave of the machine, with a stand-in for hdrvdp3.m alone.
@@ -94,7 +94,7 @@ def test_the_driver_hands_pictures_over_the_right_way_round(tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("script", "sentence"),
     [
-        ("#!/bin/sh\necho 'warning: x' >&2\necho \"error: package image not found\" >&2\nexit 1\n", "0 scores for 2 pairs .error: package image"),
+        ("#!/bin/sh\necho warning >&2\necho error: no package >&2\nexit 1\n", "0 scores for 2 pairs .error: no package"),
         ("#!/bin/sh\nexit 0\n", "0 scores for 2 pairs .it said nothing"),
         ('#!/bin/sh\necho 9.5 > "$MFO_HDRVDP3_JOB/scores.txt"\n', "1 scores for 2 pairs"),
         ('#!/bin/sh\nprintf "9.5\\nlow\\n" > "$MFO_HDRVDP3_JOB/scores.txt"\n', "0 scores for 2 pairs"),
@@ -122,10 +122,10 @@ def test_matlab_is_started_by_the_drivers_name(set_up):
 def test_what_is_missing_is_named(tmp_path, monkeypatch):
     monkeypatch.delenv("MFO_HDRVDP3", raising=False)
     assert not is_configured()
-    with pytest.raises(SetupError, match="let MFO_HDRVDP3 name the folder that holds hdrvdp3.m"):
+    with pytest.raises(SetupError, match="let MFO_HDRVDP3 name the folder that holds hdrvdp3"):
         hdr_vdp_q_jods([])
     monkeypatch.setenv("MFO_HDRVDP3", str(tmp_path))
-    with pytest.raises(SetupError, match="which holds no hdrvdp3.m"):
+    with pytest.raises(SetupError, match="which holds no hdrvdp3"):
         hdr_vdp_q_jods([])
     (tmp_path / "hdrvdp3.m").write_text("", "utf-8")
     monkeypatch.setenv("PATH", str(tmp_path))

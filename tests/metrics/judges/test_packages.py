@@ -40,7 +40,9 @@ def test_a_missing_part_of_the_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pycvvdp", None)
     monkeypatch.delitem(sys.modules, "pycvvdp")
     monkeypatch.setattr(packages.importlib, "import_module", _fails)
-    with pytest.raises(SetupError, match=r"ColorVideoVDP cannot be imported \(No module named 'ffmpeg'\): run .*cvvdp=="):
+    with pytest.raises(
+        SetupError, match=r"ColorVideoVDP cannot be imported \(No module named 'ffmpeg'\): run .*cvvdp=="
+    ):
         packages.require_pycvvdp()
 
 

@@ -177,7 +177,7 @@ def test_the_cache_of_torch_is_searched_and_the_digest_checked(empty, files, mon
     cache = empty / "hub" / "checkpoints"
     cache.mkdir(parents=True)
     (cache / "squeezenet1_1-b8a52dc0.pth").write_bytes(content)
-    with pytest.raises(BadInputError, match="is damaged .its SHA-256 does not begin with b8a52dc0"):
+    with pytest.raises(BadInputError, match=r"is damaged .its SHA-256 does not begin with b8a52dc0"):
         weights.load_trunk("squeeze")
     name = f"squeezenet1_1-{hashlib.sha256(content).hexdigest()[:8]}.pth"
     (cache / name).write_bytes(content)
@@ -225,7 +225,7 @@ def test_the_heads_are_those_of_version_0_1():
 
 def test_without_the_package_its_name_is_given(monkeypatch):
     monkeypatch.setattr(weights.importlib.util, "find_spec", lambda _: None)
-    with pytest.raises(SetupError, match="pip install \"lpips=="):
+    with pytest.raises(SetupError, match='pip install "lpips=='):
         weights.load_heads("alex")
 
 
@@ -237,5 +237,3 @@ def test_pu_values_are_the_authors():
     numeric = (PuValues(200.0).apply(x + 1e-6) - PuValues(200.0).apply(x - 1e-6)) / 2e-6
     np.testing.assert_allclose(PuValues(200.0).slope(x), numeric, rtol=1e-6)
     assert (PuValues(200.0).slope(np.array([-1.0, 0.0, 9.0])) == [0, 0, 0]).all()
-
-
