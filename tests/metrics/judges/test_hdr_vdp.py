@@ -94,7 +94,7 @@ def test_the_driver_hands_pictures_over_the_right_way_round(tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("script", "sentence"),
     [
-        ("#!/bin/sh\necho warning >&2\necho error: no package >&2\nexit 1\n", "0 scores for 2 pairs .error: no package"),
+        ("#!/bin/sh\necho w >&2\necho error: no package >&2\nexit 1\n", "0 scores for 2 pairs .error: no package"),
         ("#!/bin/sh\nexit 0\n", "0 scores for 2 pairs .it said nothing"),
         ('#!/bin/sh\necho 9.5 > "$MFO_HDRVDP3_JOB/scores.txt"\n', "1 scores for 2 pairs"),
         ('#!/bin/sh\nprintf "9.5\\nlow\\n" > "$MFO_HDRVDP3_JOB/scores.txt"\n', "0 scores for 2 pairs"),
