@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
+import itertools
 import json
 import sys
 from pathlib import Path
@@ -43,19 +44,17 @@ def measure(pairs: list[Pair]) -> tuple[Columns, NDArray[np.float64]]:
     values: dict[str, list[float]] = {name: [] for name in names}
     judged: list[float] = []
     shown = []
-    judge, losses, last = None, {}, None
-    for index, pair in enumerate(pairs):
-        if pair.reference is not last:
-            last = pair.reference
-            losses = {name: make_loss(name, Image(last, Encoding.LINEAR)) for name in names}
-            light = DisplayLight(nits_per_unit(last), HDR_VIEWING.peak_nits)
-            judge = ColorVideoVdp(light.apply(last), HDR_VIEWING)
-        assert judge is not None
+    for _, group in itertools.groupby(pairs, key=lambda pair: id(pair.reference)):
+        tests = [pair.test for pair in group]
+        reference = pairs[len(judged)].reference
+        light = DisplayLight(nits_per_unit(reference), HDR_VIEWING.peak_nits)
+        judge = ColorVideoVdp(light.apply(reference), HDR_VIEWING)
         for name in names:
-            values[name].append(losses[name].value(pair.test))
-        judged.append(judge.value(light.apply(pair.test)))
-        shown.append((light.apply(pair.reference), light.apply(pair.test)))
-        print(f"\r{index + 1} of {len(pairs)} pairs judged", end="", file=sys.stderr)
+            loss = make_loss(name, Image(reference, Encoding.LINEAR))
+            values[name] += [loss.value(test) for test in tests]
+        judged += [judge.value(light.apply(test)) for test in tests]
+        shown += [(light.apply(reference), light.apply(test)) for test in tests]
+        print(f"\r{len(judged)} of {len(pairs)} pairs judged", end="", file=sys.stderr)
     print(file=sys.stderr)
     columns = {name: np.array(column) for name, column in values.items()}
     if is_configured():
