@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import subprocess
 import sys
@@ -11,17 +12,14 @@ import numpy as np
 import pytest
 import scipy.ndimage
 
-from mfo_backend.metrics.judges.packages import require_pycvvdp
 from mfo_backend.metrics.judges.viewing import HDR_VIEWING
 from mfo_backend.metrics.loss import make_loss
-from mfo_backend.types.errors import BadInputError, SetupError
+from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
 
 pytestmark = pytest.mark.judges
-try:
-    require_pycvvdp()
-except SetupError as error:
-    pytest.skip(str(error), allow_module_level=True)
+if not all(map(importlib.util.find_spec, ("torch", "pycvvdp"))):
+    pytest.skip("the extra `judges` is not installed", allow_module_level=True)
 
 from mfo_backend.metrics.judges.color_video_vdp import ColorVideoVdp, color_video_vdp_jod  # noqa: E402
 from mfo_backend.metrics.judges.gaussian_blur import GaussianBlur  # noqa: E402

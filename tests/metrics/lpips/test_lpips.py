@@ -18,15 +18,12 @@ from mfo_backend.types.errors import BadInputError, SetupError
 from mfo_backend.types.image import Encoding, Image
 
 pytestmark = pytest.mark.judges
-try:
-    torch = require_torch()
-except SetupError as error:
-    pytest.skip(str(error), allow_module_level=True)
-if importlib.util.find_spec("lpips") is None:
-    pytest.skip("the package lpips is not installed", allow_module_level=True)
+if not all(map(importlib.util.find_spec, ("torch", "lpips"))):
+    pytest.skip("the extra `judges` is not installed", allow_module_level=True)
+torch = require_torch()
 
 from mfo_backend.metrics.lpips import weights  # noqa: E402
-from mfo_backend.metrics.lpips.distance import Lpips  # noqa: E402
+from mfo_backend.metrics.lpips.distance import Lpips, _unit  # noqa: E402
 from mfo_backend.metrics.lpips.pu_values import PuValues  # noqa: E402
 from mfo_backend.metrics.lpips.trunks import CHANNELS, LEAST_SIZE, Trunk  # noqa: E402
 
@@ -145,6 +142,17 @@ def test_equal_pictures_have_no_distance_and_gradients_are_finite(net):
     black = np.zeros_like(reference)
     assert np.isfinite(lpips.value_and_gradient(black)[1]).all()
     assert np.isfinite(Lpips(net, black).value_and_gradient(reference)[1]).all()
+
+
+def test_features_that_are_all_zero_have_a_slope():
+    features = torch.zeros(1, 4, 2, 2)
+    features[0, :, 0, 0] = torch.tensor([3.0, 0.0, 4.0, 0.0])
+    features.requires_grad_()
+    unit = _unit(features)
+    unit.sum().backward()
+    assert unit[0, :, 0, 0].tolist() == pytest.approx([0.6, 0, 0.8, 0])
+    assert unit[0, :, 1, 1].tolist() == [0, 0, 0, 0]
+    assert torch.isfinite(features.grad).all()
 
 
 @pytest.mark.usefixtures("given")
