@@ -64,9 +64,9 @@ def _color_video_vdp(reference: Array, *, hdr: bool, white: float = 0.0) -> Dist
 
 
 def _lpips(kind: str, reference: Array) -> Distance:
-    from .judges.packages import require_torch
+    from .judges.packages import LPIPS, require_torch
 
-    require_torch()
+    require_torch("LPIPS", LPIPS)
     from .lpips.distance import Lpips
 
     return Lpips(kind.removeprefix("lpips_"), reference)

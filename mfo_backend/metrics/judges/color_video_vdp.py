@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...types.errors import BadInputError
 from ..pixel_check import check_pair
-from .packages import require_pycvvdp, require_torch
+from .packages import CVVDP, require_pycvvdp, require_torch
 from .viewing import Viewing
 
 Array = NDArray[np.floating]
@@ -49,7 +49,7 @@ class ColorVideoVdp:
     """
 
     def __init__(self, reference: Array, viewing: Viewing) -> None:
-        self._torch: Any = require_torch()
+        self._torch: Any = require_torch("ColorVideoVDP", CVVDP)
         package = require_pycvvdp()
         height, width = reference.shape[:2]
         if min(height, width) < LEAST_SIZE:

@@ -18,15 +18,15 @@ CVVDP = "cvvdp==0.5.7"  # another release may score differently
 LPIPS = "lpips==0.1.4"
 
 
-def require_torch() -> Any:
-    """The module torch.
+def require_torch(what: str, requirement: str) -> Any:
+    """The module torch, for `what`, which comes with it when `requirement` is installed.
 
     Raises
     ------
     SetupError
         If it is not installed or does not load.
     """
-    return _require("torch", "PyTorch", "torch")
+    return _require("torch", what, requirement)
 
 
 def require_pycvvdp() -> Any:
@@ -37,7 +37,7 @@ def require_pycvvdp() -> Any:
     SetupError
         If it, or a package it needs, is not installed or does not load.
     """
-    require_torch()
+    require_torch("ColorVideoVDP", CVVDP)
     if "pycvvdp" in sys.modules:
         return sys.modules["pycvvdp"]
     if _loads("torchvision.ops") and _loads("torchvision.transforms"):

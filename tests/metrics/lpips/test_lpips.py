@@ -12,7 +12,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from mfo_backend.metrics.judges.packages import require_torch
+from mfo_backend.metrics.judges.packages import LPIPS, require_torch
 from mfo_backend.metrics.loss import make_loss
 from mfo_backend.types.errors import BadInputError, SetupError
 from mfo_backend.types.image import Encoding, Image
@@ -20,7 +20,7 @@ from mfo_backend.types.image import Encoding, Image
 pytestmark = pytest.mark.judges
 if not all(map(importlib.util.find_spec, ("torch", "lpips"))):
     pytest.skip("the extra `judges` is not installed", allow_module_level=True)
-torch = require_torch()
+torch = require_torch("LPIPS", LPIPS)
 
 from mfo_backend.metrics.lpips import weights  # noqa: E402
 from mfo_backend.metrics.lpips.distance import Lpips, _unit  # noqa: E402
