@@ -121,6 +121,11 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
             ("ldr", "LDR", "Compare displayed values"),
         ),
     )
+    bake_view: BoolProperty(
+        name="Bake View",
+        description="Compare a display picture under the view transform, look, exposure, gamma and curves of the "
+        "scene; it must have been rendered with them",
+    )
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of one stage", default=300, min=1, soft_max=1000, max=100_000
     )

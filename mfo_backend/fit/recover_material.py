@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import View
 from ..render.renderer import Renderer
 from ..types.event import Listener
 from ..types.image import Image
@@ -19,7 +19,7 @@ def recover_material(
     reference: Image,
     settings: FitSettings,
     *,
-    display: DisplayView | None = None,
+    display: View | None = None,
     listener: Listener,
     should_stop: Callable[[], bool],
 ) -> FitOutcome:
