@@ -78,7 +78,8 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
     )
     reference_path: StringProperty(
         name="Reference",
-        description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view",
+        description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view "
+        "(with Bake View: the scene's)",
         subtype="FILE_PATH",
     )
     reference_image: PointerProperty(

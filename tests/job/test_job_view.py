@@ -34,7 +34,7 @@ def test_table_of_the_job(job: Path, request_data: dict) -> None:
     np.testing.assert_allclose(shown, [[0.05, 0.3, 0.4], [1.0, 0.45, 0.6], [1.0, 0.9, 0.0]], atol=1e-6)  # float32
 
     write_exr(job / "view_lut.exr", np.zeros((4, 15, 3), np.float32))
-    with pytest.raises(BadInputError, match="view_lut.exr is 15x4, but request.json says 4 nodes, which is 16x4"):
+    with pytest.raises(BadInputError, match=r"view_lut\.exr is 15x4, but request.json says 4 nodes, which is 16x4"):
         view_of(folder, read_request(folder), REFERENCE)
 
 

@@ -93,5 +93,5 @@ def test_bad_tables_are_refused(value):
         BakedView(table, -3.0, 3.0)
     with pytest.raises(BadInputError, match=r"has shape \(3, 3, 3\)"):
         BakedView(table[0], -3.0, 3.0)
-    with pytest.raises(BadInputError, match="spans 3.0 to -3.0 stops"):
+    with pytest.raises(BadInputError, match=r"spans 3\.0 to -3\.0 stops"):
         BakedView(np.zeros((3, 3, 3, 3), np.float32), 3.0, -3.0)
