@@ -58,6 +58,15 @@ def test_everything_of_a_view_is_in_the_table(scene: Any) -> None:
         plain = changed
 
 
+def test_an_output_with_a_view_of_its_own_does_not_matter(scene: Any) -> None:
+    scene.view_settings.view_transform = "AgX"
+    expected = shown_by(scene, COLOURS)
+    settings = scene.render.image_settings
+    settings.color_management = "OVERRIDE"
+    settings.view_settings.view_transform = "Standard"
+    np.testing.assert_array_equal(shown_by(scene, COLOURS), expected)
+
+
 def test_it_is_what_a_render_writes(scene: Any, tmp_path: Path) -> None:
     """A white world of 0.18, rendered to an 8-bit PNG."""
     Image = pytest.importorskip("PIL.Image")

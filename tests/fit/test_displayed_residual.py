@@ -31,6 +31,10 @@ def test_an_image_brighter_than_a_clipped_reference_agrees_with_it():
     np.testing.assert_array_equal(values, 0)
     np.testing.assert_array_equal(slope[0, 0], 0)
     assert (np.diagonal(slope[0])[1:] > 0.3).all()
+    # half a level of 8 bits below the top is the top
+    nearly = DisplayedResidual(STANDARD, np.full((1, 3), 0.997, np.float32))
+    for found in nearly(np.full((1, 3), 0.999, np.float32)):
+        np.testing.assert_array_equal(found, 0)
     values, slope = DisplayedResidual(STANDARD, reference)(np.array([[0.8, 0.5, 0.2]], np.float32))
     assert values[0, 0] < -0.05
     assert slope[0, 0, 0] > 0.3
