@@ -54,6 +54,7 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
         if body:
             body.prop(settings, "model")
             body.prop(settings, "range")
+            body.prop(settings, "bake_view")
             body.prop(settings, "max_iterations")
 
         layout.separator()

@@ -78,7 +78,8 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
     )
     reference_path: StringProperty(
         name="Reference",
-        description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view",
+        description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view "
+        "(with Bake View: the scene's)",
         subtype="FILE_PATH",
     )
     reference_image: PointerProperty(
@@ -120,6 +121,11 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
             ("hdr", "HDR", "Compare scene-linear values"),
             ("ldr", "LDR", "Compare displayed values"),
         ),
+    )
+    bake_view: BoolProperty(
+        name="Bake View",
+        description="Compare a display picture under the view transform, look, exposure, gamma and curves of the "
+        "scene; it must have been rendered with them",
     )
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of one stage", default=300, min=1, soft_max=1000, max=100_000

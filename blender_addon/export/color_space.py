@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours from Blender's working space, or from sRGB bytes, to linear Rec.709."""
+"""Colours from Blender's working space, or from sRGB bytes, to linear Rec.709, and back."""
 
 from __future__ import annotations
 
@@ -14,6 +14,13 @@ def to_rec709(color: ArrayLike) -> NDArray[np.float64]:
     values = np.asarray(color, dtype=np.float64)
     matrix = working_space_to_rec709()
     return values if matrix is None else values @ matrix.T
+
+
+def from_rec709(color: ArrayLike) -> NDArray[np.float64]:
+    """Return linear Rec.709 (..., 3) as scene-linear RGB."""
+    values = np.asarray(color, dtype=np.float64)
+    matrix = working_space_to_rec709()
+    return values if matrix is None else values @ np.linalg.inv(matrix).T
 
 
 def srgb_to_linear(values: NDArray[np.float32]) -> NDArray[np.float32]:

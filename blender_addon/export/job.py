@@ -40,8 +40,12 @@ def export_job(
     *,
     reference: Path | bpy.types.Image | None,
     fit: dict[str, Any],
+    bake_view: bool = False,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
+
+    With `bake_view` a display picture is taken under any view of the scene, whose table goes into the job; else one
+    that cannot be undone by a formula is refused.
 
     Raises
     ------
@@ -52,7 +56,12 @@ def export_job(
     data = read_scene(context, obj, findings)
     findings.raise_first()
     assert data is not None
-    picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height))
+    picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height), bake_view=bake_view)
+    if picture is not None and picture.view is not None:
+        findings.note(
+            f"Pictures are compared under a table of the view {context.scene.view_settings.view_transform} as the "
+            "scene has it now: the reference must have been rendered with the same look, exposure, gamma and curves."
+        )
     files = scene_files(data, findings)
     request = _request(context, obj, data, files, picture, fit, findings)
     with new_job_folder(Path(folder)) as partial:
@@ -104,6 +113,8 @@ def _request(
     if picture is not None:
         request["reference"] = {"path": picture.name, "encoding": picture.encoding}
     request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
+    if picture is not None and picture.view is not None:
+        request["view"]["lut"] = picture.view.request()
     request["materials"] = {
         identifier: _material(material, files)
         for identifier, material in data.materials.items()

@@ -17,8 +17,8 @@ from .findings import ExportError
 GENERATOR = "material_fit_mfo"
 # what a job folder may hold; a folder with anything else is somebody's own
 OWN_NAMES = {
-    "request.json", "scene.xml", "meshes", "textures", "progress.jsonl", "cancel", "result.json", "pictures",
-    "index.html", "backend.log",
+    "request.json", "scene.xml", "meshes", "textures", "view_lut.exr", "progress.jsonl", "cancel", "result.json",
+    "pictures", "index.html", "backend.log",
 }  # fmt: skip
 
 

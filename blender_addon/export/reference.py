@@ -15,19 +15,25 @@ from .exr_file import write_exr
 from .findings import ExportError
 from .image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from .png_file import write_png
+from .view_lut import ViewLut, bake_view_lut
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
+LINEAR_FORMATS = ("OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR")  # other float images are 16-bit display pictures
 DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8)."""
+    """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8).
+
+    `view` is the view of a display picture where no formula has it.
+    """
 
     name: str
     encoding: str  # linear or srgb
     source: Path | None = None
     pixels: NDArray[np.float32] | NDArray[np.uint8] | None = None
+    view: ViewLut | None = None
 
     def write(self, folder: Path) -> None:
         """Put the picture into `folder`.
@@ -37,6 +43,8 @@ class Reference:
         OSError
             If it cannot be written.
         """
+        if self.view is not None:
+            self.view.write(folder)
         if self.source is not None:
             shutil.copyfile(self.source, folder / self.name)
         elif self.encoding == "linear":
@@ -46,9 +54,15 @@ class Reference:
 
 
 def read_reference(
-    reference: Path | bpy.types.Image | None, scene: bpy.types.Scene, size: tuple[int, int]
+    reference: Path | bpy.types.Image | None,
+    scene: bpy.types.Scene,
+    size: tuple[int, int],
+    *,
+    bake_view: bool = False,
 ) -> Reference | None:
     """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
+
+    With `bake_view` a display picture of a view transform that cannot be undone comes with a table of that view.
 
     Raises
     ------
@@ -59,7 +73,7 @@ def read_reference(
         return None
     stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
     if isinstance(reference, bpy.types.Image):
-        return _from_image(reference, scene, size, stretched)
+        return _from_image(reference, scene, size, stretched, bake_view)
     path = Path(bpy.path.abspath(str(reference)))
     if not path.is_file():
         raise ExportError(f"The reference {path} does not exist: choose another file.")
@@ -69,16 +83,17 @@ def read_reference(
     if stretched:
         image = bpy.data.images.load(str(path), check_existing=False)
         try:
-            return _from_image(image, scene, size, stretched)
+            return _from_image(image, scene, size, stretched, bake_view)
         finally:
             bpy.data.images.remove(image)
-    encoding = "linear" if suffix in LINEAR_SUFFIXES else "srgb"
-    if encoding == "srgb":
-        _refuse_view(scene, path.name)
-    return Reference(f"reference{suffix}", encoding, source=path)
+    if suffix in LINEAR_SUFFIXES:
+        return Reference(f"reference{suffix}", "linear", source=path)
+    return Reference(f"reference{suffix}", "srgb", source=path, view=_view_table(scene, path.name, bake_view))
 
 
-def _from_image(image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool) -> Reference:
+def _from_image(
+    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, bake_view: bool
+) -> Reference:
     try:
         pixels = np.ascontiguousarray(read_pixels(image)[:, :, :3])
     except UnreadableImageError as problem:
@@ -94,16 +109,18 @@ def _from_image(image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int,
         )
     if stretched:
         pixels = _stretch(pixels, size)
-    if image.is_float or image.colorspace_settings.name not in SRGB_NAMES:
+    if image.colorspace_settings.name not in SRGB_NAMES or image.file_format in LINEAR_FORMATS:
         return Reference("reference.exr", "linear", pixels=pixels)
-    _refuse_view(scene, image.name)
+    view = _view_table(scene, image.name, bake_view)
     encoded = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055)
-    return Reference("reference.png", "srgb", pixels=np.rint(encoded.clip(0.0, 1.0) * 255.0).astype(np.uint8))
+    return Reference(
+        "reference.png", "srgb", pixels=np.rint(encoded.clip(0.0, 1.0) * 255.0).astype(np.uint8), view=view
+    )
 
 
-def _refuse_view(scene: bpy.types.Scene, name: str) -> None:
-    """Display values can be undone only if the view did nothing but exposure, gamma and the sRGB curve."""
-    view = scene.view_settings
+def _view_table(scene: bpy.types.Scene, name: str, bake_view: bool) -> ViewLut | None:
+    """None for a view that did nothing but exposure, gamma and the sRGB curve: a formula undoes it. Else its table."""
+    view, device = scene.view_settings, scene.display_settings.display_device
     reasons = []
     if view.view_transform != "Standard":
         reasons.append(f"the view transform {view.view_transform}")
@@ -113,13 +130,17 @@ def _refuse_view(scene: bpy.types.Scene, name: str) -> None:
         reasons.append("view curves")
     if getattr(view, "use_white_balance", False):
         reasons.append("a white balance")
-    if scene.display_settings.display_device != "sRGB":
-        reasons.append(f"the display device {scene.display_settings.display_device}")
-    if reasons:
-        raise ExportError(
-            f"The reference {name} holds display colours and the scene uses {' and '.join(reasons)}, which cannot be "
-            "undone: render the reference as OpenEXR, or render it again with the view transform Standard and no look."
-        )
+    if device == "sRGB" and (bake_view or not reasons):
+        return bake_view_lut(scene) if reasons else None
+    cure = "render the reference as OpenEXR, or render it again with the view transform Standard and no look"
+    if device == "sRGB":
+        cure += ", or turn on Bake View (--bake-view) if it was rendered under this view"
+    else:
+        reasons.append(f"the display device {device}")
+    raise ExportError(
+        f"The reference {name} holds display colours and the scene uses {' and '.join(reasons)}, which cannot be "
+        f"undone: {cure}."
+    )
 
 
 def _stretch(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:

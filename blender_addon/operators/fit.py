@@ -51,6 +51,9 @@ class MFO_OT_fit(bpy.types.Operator):
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of a stage; 0: the scene's setting", min=0, options=_SCRIPT
     )
+    bake_view: BoolProperty(
+        name="Bake View", description="Take a display picture under any view; off: the scene's setting", options=_SCRIPT
+    )
     wait: BoolProperty(
         name="Wait", description="Return when the fit has ended; always so by default in background", options=_SCRIPT
     )
@@ -103,7 +106,8 @@ class MFO_OT_fit(bpy.types.Operator):
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
         try:
-            report = export_job(context, obj, folder, reference=reference, fit=self._fit(settings))
+            bake_view = self.bake_view or settings.bake_view
+            report = export_job(context, obj, folder, reference=reference, fit=self._fit(settings), bake_view=bake_view)
         except ExportError as error:
             raise FitError(str(error)) from error
         try:

@@ -44,6 +44,11 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("file", type=Path, help="the .blend file; it is not changed unless --apply is given alone")
     parser.add_argument("--object", required=True, metavar="NAME", help="object whose active material is fitted")
     parser.add_argument("--reference", required=True, type=Path, help="the picture: EXR, HDR, PNG, JPEG or TIFF")
+    parser.add_argument(
+        "--bake-view",
+        action="store_true",
+        help="compare a PNG, JPEG or TIFF under the view of FILE, which it was rendered with (AgX, Filmic, ...)",
+    )
     add_fit_options(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="job folder (default: a new temporary one)")
     parser.add_argument("--apply", action="store_true", help="put the recovered values on the material and save")
@@ -62,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     host = find_blender_host(arguments.blender)
     stream = take_stdout() if arguments.json else None
     job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
-    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, options)
+    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, options, arguments.bake_view)
     saved, notes = None, fit.notes
     if arguments.apply:
         saved = arguments.save_as or arguments.file
@@ -78,9 +83,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def fit_blend(
-    host: BlenderHost, blend: Path, object_name: str, reference: Path, job: Path, fit: Mapping[str, Any]
+    host: BlenderHost,
+    blend: Path,
+    object_name: str,
+    reference: Path,
+    job: Path,
+    fit: Mapping[str, Any],
+    bake_view: bool = False,
 ) -> BlendFit:
     """Export a job from a .blend file and run it with a progress bar on stderr.
+
+    With `bake_view` a display picture is compared under the view of the .blend file, whatever that is.
 
     Raises
     ------
@@ -88,9 +101,8 @@ def fit_blend(
         With the sentence of the export or of the fit. A cancelled fit is a result, with what was found so far.
     """
     is_new = not job.exists()
-    exported = host.call(
-        "export", blend, "--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)
-    )
+    words = ["--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)]
+    exported = host.call("export", blend, *words, *(["--bake-view"] if bake_view else []))
     done = run_folder(job, fit_scene, is_new=is_new)
     if done.result is None:
         raise _ERRORS.get(done.status, MfoError)(done.sentence)

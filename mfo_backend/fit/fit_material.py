@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..metrics.loss import Loss
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import View
 from ..render.renderer import Interrupted, Renderer
 from ..types.event import Listener, Started
 from ..types.image import Image, Pixels
@@ -35,7 +35,7 @@ def fit_material(
     reference: Image,
     settings: FitSettings,
     *,
-    display: DisplayView | None = None,
+    display: View | None = None,
     listener: Listener,
     should_stop: Callable[[], bool],
 ) -> FitOutcome:

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics.colour import linear_from_srgb
+from ..metrics.baked_view import BakedView
 from ..metrics.itp import Itp
 from ..metrics.pixel_check import check_finite
 from ..metrics.pu21 import Pu21
-from ..metrics.response import Displayed, OnDisplay, Response, nits_per_unit
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.response import OnDisplay, Response, displayed_by, nits_per_unit
+from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..types.certainty import Certainty, Level
 from ..types.event import Listener, Preview, Started
@@ -22,6 +22,7 @@ from ..types.image import Encoding, Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
 from .course import Course
+from .displayed_residual import DisplayedResidual
 from .fit_material import FitOutcome
 from .recorded_stages import MakeResidual, Problem, RecordedFit, RecordedPlan, Vector
 from .residuals import CensoredResidual, RelativeResidual, ResponseResidual, log_residual, residual_rows
@@ -41,7 +42,7 @@ def fit_recorded(
     reference: Image,
     settings: FitSettings,
     *,
-    display: DisplayView | None = None,
+    display: View | None = None,
     listener: Listener,
     should_stop: Callable[[], bool],
     plan: RecordedPlan = RecordedPlan(),  # noqa: B008  frozen
@@ -72,7 +73,6 @@ def fit_recorded(
         else DisplayView.for_scene(reference.pixels, mask)
     )
     light = _linear(reference, view)
-    limit = 2.0**-view.exposure_ev if reference.encoding is Encoding.SRGB else np.inf
     scene = RecordedScene(renderer, int(mask.sum()))
     perceptual = _perceptual(ldr, light, mask, view) if settings.preset == "balanced" else {}
     names = (*STAGES, *perceptual)
@@ -80,13 +80,14 @@ def fit_recorded(
     course = Course(renderer, names, listener, should_stop, began)
     fit = RecordedFit(scene, light, mask, plan, settings.seed, course)
 
-    found = fit.start_from_nothing(_censored(log_residual, limit)).x
+    compressed = _censored(log_residual, reference, view)
+    found = fit.start_from_nothing(compressed).x
     candidates: list[Vector] = [renderer.start]
     certainty: dict[str, Certainty] = {}
     notes = list(scene.needs.notes)
     if not should_stop():
         make = RelativeResidual if scene.needs.sampled else log_residual
-        solution, last = fit.refine(found, _censored(make, limit))
+        solution, last = fit.refine(found, _censored(make, reference, view))
         found, certainty = _keep_unseen(fit, last, solution.x, notes)
         candidates.append(found)
         for name, response in perceptual.items():
@@ -99,7 +100,7 @@ def fit_recorded(
     spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
     pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
     listener(Preview(pictures[-1].image))
-    best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(perceptual), ldr)))
+    best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(perceptual), ldr, compressed)))
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     message = status.sentence
     if best == 0:
@@ -121,24 +122,29 @@ def fit_recorded(
     return FitOutcome(result, pictures[0].image, pictures[best].image)
 
 
-def _linear(reference: Image, view: DisplayView) -> Pixels:
+def _linear(reference: Image, view: View) -> Pixels:
     """Scene-linear values of a reference; those above a display's white are lost."""
     if reference.encoding is Encoding.LINEAR:
         return np.maximum(reference.pixels, 0.0)
-    shown = np.clip(reference.pixels, 0.0, 1.0) ** np.float32(view.gamma)
-    return (linear_from_srgb(shown) * np.float32(2.0**-view.exposure_ev)).astype(np.float32)
+    assert isinstance(view, DisplayView | BakedView)
+    return view.linear(reference.pixels)
 
 
-def _censored(make: MakeResidual, limit: float) -> MakeResidual:
-    if not np.isfinite(limit):
+def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:
+    """Residuals that expect no more of clipped pixels than a display shows."""
+    if reference.encoding is Encoding.LINEAR:
         return make
+    if isinstance(view, BakedView):
+        return lambda target: DisplayedResidual(view, target)
+    assert isinstance(view, DisplayView)
+    limit = 2.0**-view.exposure_ev
     return lambda target: CensoredResidual(make(target), target, limit)
 
 
-def _perceptual(ldr: bool, light: Pixels, mask: NDArray[np.bool_], view: DisplayView) -> dict[str, Response]:
+def _perceptual(ldr: bool, light: Pixels, mask: NDArray[np.bool_], view: View) -> dict[str, Response]:
     """The responses of the perceptual stages by name."""
     if ldr:
-        return {"display": Displayed(view), "itp": OnDisplay(view, Itp(100.0))}
+        return {"display": displayed_by(view), "itp": OnDisplay(view, Itp(100.0))}
     nits = nits_per_unit(light, mask)
     return {"itp": Itp(nits), "pu21": Pu21(nits)}
 
@@ -178,9 +184,10 @@ def _judge(
     reference: Image,
     mask: NDArray[np.bool_],
     settings: FitSettings,
-    view: DisplayView,
+    view: View,
     perceptual: bool,
     ldr: bool,
+    compressed: MakeResidual,
 ) -> list[float]:
     """An error for each picture."""
     if perceptual:
@@ -188,5 +195,5 @@ def _judge(
         loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
         return [loss.value(picture.image) for picture in pictures]
     groups = fit.paths.tile_groups()
-    residual = log_residual(groups.average(fit.reference))
+    residual = compressed(groups.average(fit.reference))
     return [float(np.sqrt(np.mean(residual(groups.average(p.image))[0] ** 2))) for p in pictures]

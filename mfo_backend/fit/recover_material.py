@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Renderer
 from ..types.errors import UnrecordableError
@@ -22,7 +22,7 @@ def recover_material(
     reference: Image,
     settings: FitSettings,
     *,
-    display: DisplayView | None = None,
+    display: View | None = None,
     listener: Listener,
     should_stop: Callable[[], bool],
 ) -> FitOutcome:

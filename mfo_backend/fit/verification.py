@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.loss import Loss, make_loss
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import DisplayView, View
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
 from .region import MaskedLoss, fill_outside
@@ -38,7 +38,7 @@ def stage_losses(
     background: Pixels,
     mask: NDArray[np.bool_],
     settings: FitSettings,
-    display: DisplayView | None,
+    display: View | None,
 ) -> list[Loss]:
     """The named losses over the settings' region, `background` standing in outside of it."""
     if settings.region == "image":
@@ -48,7 +48,7 @@ def stage_losses(
 
 
 def picture_errors(
-    reference: Image, start: Pixels, result: Pixels, mask: NDArray[np.bool_], display: DisplayView | None
+    reference: Image, start: Pixels, result: Pixels, mask: NDArray[np.bool_], display: View | None
 ) -> dict[str, tuple[float, float]]:
     """Mean differences of the whole pictures, [start, result]; HDR-FLIP only for a linear reference."""
     linear = reference.encoding is Encoding.LINEAR

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import View
 from ..types.event import Listener
 from ..types.image import Image, Pixels
 from ..types.result import FitResult
@@ -33,7 +33,7 @@ class Fitter(Protocol):
         folder: JobFolder,
         request: Request,
         reference: Image,
-        view: DisplayView,
+        view: View,
         *,
         listener: Listener,
         should_stop: Callable[[], bool],
@@ -46,7 +46,7 @@ def fit_scene(
     folder: JobFolder,
     request: Request,
     reference: Image,
-    view: DisplayView,
+    view: View,
     *,
     listener: Listener,
     should_stop: Callable[[], bool],

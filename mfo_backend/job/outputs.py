@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..metrics.flip_error import flip_error
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import View
 from ..report.difference_map import magma
 from ..report.html_report import ReportContent, report_html
 from ..report.picture import displayed, displayed_linear, png_bytes
@@ -24,7 +24,7 @@ def write_outputs(
     folder: JobFolder,
     request: Request,
     reference: Image,
-    view: DisplayView,
+    view: View,
     outcome: JobOutcome,
     *,
     notes: Sequence[str],

@@ -53,6 +53,16 @@ class Material:
 
 
 @dataclass(frozen=True)
+class ViewTable:
+    """The file of a view's table; `metrics.baked_view.BakedView` has what it holds."""
+
+    path: str
+    size: int
+    log2_min: float
+    log2_max: float
+
+
+@dataclass(frozen=True)
 class Request:
     """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference."""
 
@@ -64,6 +74,7 @@ class Request:
     encoding: Encoding
     film_transparent: bool = False
     view: DisplayView | None = None
+    view_table: ViewTable | None = None
     materials: Mapping[str, Material] = field(default_factory=dict)
     fit: FitSettings = field(default_factory=FitSettings)
     notes: tuple[str, ...] = ()
@@ -88,6 +99,8 @@ def read_request(folder: JobFolder) -> Request:
     request = request_from_json(data)
     folder.file(request.scene, what=f"{WHERE}: scene")
     folder.file(request.reference, what=f"{WHERE}: reference.path")
+    if request.view_table is not None:
+        folder.file(request.view_table.path, what=f"{WHERE}: view.lut.path")
     check_scene_files(folder, request.scene)
     for bsdf_id, material in request.materials.items():
         for name, socket in material.sockets.items():
@@ -122,6 +135,7 @@ def request_from_json(data: Any) -> Request:
         reference=reference.text("path"),
         encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
         view=_view(top.raw("view", None)),
+        view_table=_view_table(top.raw("view", None)),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
@@ -137,6 +151,9 @@ def request_to_json(request: Request) -> dict[str, Any]:
             name: {key: value for key, value in socket.items() if key != "texture" or value is not None}
             for name, socket in material["sockets"].items()
         }
+    view = asdict(request.view) if request.view is not None else None
+    if request.view_table is not None:
+        view = {**(view or {}), "lut": asdict(request.view_table)}
     return {
         "schema_version": SCHEMA_VERSION,
         "generator": dict(request.generator),
@@ -148,7 +165,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
             "film_transparent": request.film_transparent,
         },
         "reference": {"path": request.reference, "encoding": request.encoding.value},
-        "view": asdict(request.view) if request.view is not None else None,
+        "view": view,
         "materials": materials,
         "fit": asdict(request.fit),
         "notes": list(request.notes),
@@ -195,6 +212,18 @@ def _fit(data: Any) -> FitSettings:
 def _view(data: Any) -> DisplayView | None:
     if data is None:
         return None
-    view = CheckedObject(data, f"{WHERE}: view", ("exposure_ev", "gamma"))
+    view = CheckedObject(data, f"{WHERE}: view", ("exposure_ev", "gamma", "lut"))
     # Blender allows -32 to 32 stops and a gamma of 0 to 5, of which 0 is a black picture
     return DisplayView(view.number("exposure_ev", -32.0, 32.0, 0.0), view.number("gamma", 0.01, 5.0, 1.0))
+
+
+def _view_table(data: Any) -> ViewTable | None:
+    if not isinstance(data, Mapping) or data.get("lut") is None:
+        return None
+    table = CheckedObject(data["lut"], f"{WHERE}: view.lut", ("path", "size", "log2_min", "log2_max"))
+    return ViewTable(
+        path=table.text("path"),
+        size=table.integer("size", 3, 128),
+        log2_min=table.number("log2_min", -64.0, 64.0),
+        log2_max=table.number("log2_max", -64.0, 64.0),
+    )

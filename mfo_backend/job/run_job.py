@@ -7,16 +7,16 @@ import sys
 import traceback
 from pathlib import Path
 
-from ..metrics.tone_mapping import DisplayView
 from ..render.renderer import Interrupted
 from ..report.picture import displayed_linear, png_bytes
 from ..scene.image_file import check_reference, read_image
 from ..types.errors import MfoError
 from ..types.event import Event, Progress
-from ..types.image import Encoding, Image
+from ..types.image import Image
 from ..types.status import Status
 from .fit_scene import Fitter, fit_scene
 from .job_folder import JobFolder, unwritable
+from .job_view import view_of
 from .outputs import bytes_needed, write_outputs
 from .progress import EventWriter
 from .request import Request, read_request
@@ -58,7 +58,7 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> t
     folder = JobFolder.open(path)
     request = read_request(folder)
     reference, notes = read_reference(folder, request)
-    view = view_of(request, reference)
+    view = view_of(folder, request, reference)
     folder.require_space(bytes_needed(request))
     events.attach(folder, lambda pixels: png_bytes(displayed_linear(pixels, view)))
 
@@ -84,13 +84,6 @@ def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[st
     """
     image = read_image(folder.file(request.reference, what="request.json: reference.path"))
     return check_reference(Image(image.pixels, request.encoding, image.alpha), request.width, request.height)
-
-
-def view_of(request: Request, reference: Image) -> DisplayView:
-    """The request's view, else Standard as it is, for a linear reference with an exposure that suits it."""
-    if request.view is not None:
-        return request.view
-    return DisplayView() if reference.encoding is Encoding.SRGB else DisplayView.for_scene(reference.pixels)
 
 
 def _fail(events: EventWriter, status: Status, sentence: str) -> Status:

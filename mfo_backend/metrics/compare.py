@@ -16,7 +16,7 @@ from .loss import DISPLAY_NITS
 from .pixel_check import check_mask, check_pair
 from .pu21 import pu21
 from .response import logarithmic_for, nits_per_unit, relative_to
-from .tone_mapping import DisplayView
+from .tone_mapping import DisplayView, View
 
 Array = NDArray[np.floating]
 
@@ -41,7 +41,7 @@ class Comparison:
 
 
 def compare_images(
-    reference: Image, test: Image, *, mask: NDArray[np.bool_] | None = None, display: DisplayView | None = None
+    reference: Image, test: Image, *, mask: NDArray[np.bool_] | None = None, display: View | None = None
 ) -> Comparison:
     """All metrics of `test` against `reference`.
 

@@ -12,7 +12,7 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding, Image
 from .flip import flip_map
 from .hdr_flip import hdr_flip_map
-from .tone_mapping import DisplayView
+from .tone_mapping import DisplayView, View
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ErrorMap:
         return float(self.map.mean(dtype=np.float64))
 
 
-def flip_error(reference: Image, test: Image, *, display: DisplayView | None = None) -> ErrorMap:
+def flip_error(reference: Image, test: Image, *, display: View | None = None) -> ErrorMap:
     """LDR-FLIP of what a display shows of both pictures, in [0, 1].
 
     A scene-linear picture is shown through `display`; by default that is Standard without exposure if one picture holds
@@ -52,6 +52,6 @@ def hdr_flip_error(reference: Image, test: Image) -> ErrorMap:
     return ErrorMap(hdr_flip_map(reference.pixels, test.pixels))
 
 
-def shown(image: Image, display: DisplayView) -> NDArray[np.float32]:
+def shown(image: Image, display: View) -> NDArray[np.float32]:
     """sRGB display values of a picture; a scene-linear one is seen through `display`."""
     return display.display(image.pixels) if image.encoding is Encoding.LINEAR else image.pixels

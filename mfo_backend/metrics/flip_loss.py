@@ -12,7 +12,7 @@ from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
 from .flip_reference import FlipComparison, FlipReference
 from .hdr_flip import HdrFlip
 from .pixel_check import check_image
-from .tone_mapping import DisplayView
+from .tone_mapping import View
 
 Array = NDArray[np.floating]
 
@@ -21,7 +21,7 @@ class FlipLoss:
     """Mean LDR-FLIP of a scene-linear image seen through `view` against the light `target` of a display, in [0, 1]."""
 
     def __init__(
-        self, name: str, target: Array, view: DisplayView, pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE
+        self, name: str, target: Array, view: View, pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE
     ) -> None:
         self.name = name
         self._view = view
@@ -37,7 +37,7 @@ class FlipLoss:
         """The mean error and its gradient with respect to the scene-linear image."""
         comparison = self._compare(image)
         weight = np.full_like(comparison.error, 1 / comparison.error.size)
-        gradient = pixels_of(comparison.pullback(weight)) * self._view.light_slope(image)
+        gradient = self._view.light_pullback(image, pixels_of(comparison.pullback(weight)))
         return float(comparison.error.mean(dtype=np.float64)), gradient.astype(image.dtype, copy=False)
 
     def _compare(self, image: Array) -> FlipComparison:

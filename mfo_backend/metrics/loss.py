@@ -17,9 +17,9 @@ from .itp import Itp
 from .optional_losses import OPTIONAL_HDR_LOSSES, OPTIONAL_LDR_LOSSES, hdr_perceptual_loss, ldr_perceptual_loss
 from .pixel_check import check_finite, check_mask
 from .pu21 import Pu21
-from .response import Displayed, OnDisplay, Response, Scaled, logarithmic_for, nits_per_unit, relative_to
+from .response import OnDisplay, Response, Scaled, displayed_by, logarithmic_for, nits_per_unit, relative_to
 from .squared_loss import SquaredLoss
-from .tone_mapping import DisplayView
+from .tone_mapping import DisplayView, View
 
 LDR_LOSSES = ("mse-ldr", "pu21-ldr", "itp-ldr", "flip-ldr")
 HDR_LOSSES = ("mse-hdr", "log-hdr", "relative-hdr", "pu21-hdr", "itp-hdr", "flip-hdr")
@@ -55,7 +55,7 @@ class ResidualLoss(Loss, Protocol):
 
 
 def make_loss(
-    name: str, reference: Image, *, mask: NDArray[np.bool_] | None = None, display: DisplayView | None = None
+    name: str, reference: Image, *, mask: NDArray[np.bool_] | None = None, display: View | None = None
 ) -> Loss:
     """The loss `name` against `reference`.
 
@@ -108,7 +108,7 @@ def make_loss(
     if kind == "flip":
         return FlipLoss(name, light, view)
     if kind == "mse":
-        return SquaredLoss(name, srgb_from_linear(light), Displayed(view))
+        return SquaredLoss(name, srgb_from_linear(light), displayed_by(view))
     if name in OPTIONAL_LDR_LOSSES:
         return ldr_perceptual_loss(name, light, view, DISPLAY_NITS)
     on_light = _absolute_response(kind, DISPLAY_NITS)

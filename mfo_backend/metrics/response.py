@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .colour import luminance
-from .tone_mapping import DisplayView
+from .tone_mapping import DisplayView, View
 
 Array = NDArray[np.floating]
 
@@ -97,10 +97,34 @@ class Displayed(ChannelResponse):
 
 
 @dataclass(frozen=True)
+class DisplayedMixed:
+    """sRGB display values through a view that mixes channels."""
+
+    view: View
+
+    def apply(self, linear: Array) -> Array:
+        """See `Response`."""
+        return self.view.display(linear)
+
+    def pullback(self, linear: Array, gradient: Array) -> Array:
+        """See `Response`."""
+        return self.view.display_pullback(linear, gradient)
+
+    def push(self, linear: Array, tangent: Array) -> Array:
+        """See `Response`."""
+        return self.view.display_push(linear, tangent)
+
+
+def displayed_by(view: View) -> Response:
+    """sRGB display values through a view, channel by channel where it allows that."""
+    return Displayed(view) if isinstance(view, DisplayView) else DisplayedMixed(view)
+
+
+@dataclass(frozen=True)
 class OnDisplay:
     """A response to the light of a display that shows the radiance through a view."""
 
-    view: DisplayView
+    view: View
     response: Response
 
     def apply(self, linear: Array) -> Array:
@@ -109,11 +133,11 @@ class OnDisplay:
 
     def pullback(self, linear: Array, gradient: Array) -> Array:
         """See `Response`."""
-        return self.response.pullback(self.view.light(linear), gradient) * self.view.light_slope(linear)
+        return self.view.light_pullback(linear, self.response.pullback(self.view.light(linear), gradient))
 
     def push(self, linear: Array, tangent: Array) -> Array:
         """See `Response`."""
-        return self.response.push(self.view.light(linear), tangent * self.view.light_slope(linear))
+        return self.response.push(self.view.light(linear), self.view.light_push(linear, tangent))
 
 
 def relative_to(reference: Array) -> Scaled:

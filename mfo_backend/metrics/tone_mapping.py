@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,34 @@ Array = NDArray[np.floating]
 _UNCLIPPED_SHARE = 0.99
 # A gamma other than 1 has infinite slope at black; below this display value the slope is the one here
 _GAMMA_SLOPE_FLOOR = 1e-3
+
+
+class View(Protocol):
+    """What a display shows of scene-linear values (..., 3), with the derivatives in both directions."""
+
+    def display(self, linear: Array) -> Array:
+        """sRGB display values in [0, 1]."""
+        ...
+
+    def display_pullback(self, linear: Array, gradient: Array) -> Array:
+        """Gradient with respect to `linear` from one with respect to `display(linear)`."""
+        ...
+
+    def display_push(self, linear: Array, tangent: Array) -> Array:
+        """Change of `display(linear)` for the change `tangent` of `linear`, with any leading axes."""
+        ...
+
+    def light(self, linear: Array) -> Array:
+        """Linear light in [0, 1] an sRGB display emits."""
+        ...
+
+    def light_pullback(self, linear: Array, gradient: Array) -> Array:
+        """Gradient with respect to `linear` from one with respect to `light(linear)`."""
+        ...
+
+    def light_push(self, linear: Array, tangent: Array) -> Array:
+        """Change of `light(linear)` for the change `tangent` of `linear`, with any leading axes."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -80,6 +109,27 @@ class DisplayView:
         if self.gamma == 1:
             return self._exposed_slope(linear)
         return self.display_slope(linear) * linear_from_srgb_slope(self.display(linear))
+
+    def display_pullback(self, linear: Array, gradient: Array) -> Array:
+        """See `View`."""
+        return gradient * self.display_slope(linear)
+
+    def display_push(self, linear: Array, tangent: Array) -> Array:
+        """See `View`."""
+        return tangent * self.display_slope(linear)
+
+    def light_pullback(self, linear: Array, gradient: Array) -> Array:
+        """See `View`."""
+        return gradient * self.light_slope(linear)
+
+    def light_push(self, linear: Array, tangent: Array) -> Array:
+        """See `View`."""
+        return tangent * self.light_slope(linear)
+
+    def linear(self, display: Array) -> Array:
+        """Scene-linear values of sRGB display values; those above a display's white are lost."""
+        shown = np.clip(display, 0, 1) ** display.dtype.type(self.gamma)
+        return linear_from_srgb(shown) * display.dtype.type(2.0**-self.exposure_ev)
 
     def _exposed(self, linear: Array) -> Array:
         # dividing the limit, not multiplying the values, cannot overflow

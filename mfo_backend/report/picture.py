@@ -7,18 +7,18 @@ import io
 
 import numpy as np
 
-from ..metrics.tone_mapping import DisplayView
+from ..metrics.tone_mapping import View
 from ..types.image import Encoding, Image, Pixels
 
 
-def displayed(image: Image, view: DisplayView) -> Pixels:
+def displayed(image: Image, view: View) -> Pixels:
     """Display values in [0, 1] of an image; one that already holds display values stays as given."""
     if image.encoding is Encoding.SRGB:
         return np.clip(image.pixels, 0.0, 1.0)
     return displayed_linear(image.pixels, view)
 
 
-def displayed_linear(pixels: Pixels, view: DisplayView) -> Pixels:
+def displayed_linear(pixels: Pixels, view: View) -> Pixels:
     """Display values in [0, 1] of scene-linear pixels; NaN is black."""
     return view.display(np.nan_to_num(pixels, nan=0.0)).astype(np.float32)
 

@@ -61,20 +61,39 @@ def test_display_picture_is_recovered(scene: Scene, blend: Blend, tmp_path: Path
     assert result < start / 4
 
 
-def test_agx_picture_is_refused_with_the_cure(scene: Scene, blend: Blend, tmp_path: Path) -> None:
-    agx = tmp_path / "agx.blend"
+@pytest.fixture
+def agx(scene: Scene, tmp_path: Path) -> Path:
+    """The start with the view transform AgX."""
+    file = tmp_path / "agx.blend"
     run_bpy(
         "bpy.ops.wm.open_mainfile(filepath=argv[0])\n"
         "bpy.context.scene.view_settings.view_transform = 'AgX'\n"
         "bpy.ops.wm.save_as_mainfile(filepath=argv[1], copy=True)",
         scene.start,
-        agx,
+        file,
     )
+    return file
+
+
+def test_agx_picture_is_refused_with_the_cure(scene: Scene, blend: Blend, agx: Path, tmp_path: Path) -> None:
     done = blend(scene.agx_png, "--out", tmp_path / "job", file=agx)
     assert done.code == 2
     assert "AgX" in done.sentence
     assert "OpenEXR" in done.sentence
+    assert "--bake-view" in done.sentence
     assert not (tmp_path / "job").exists()
+
+
+def test_agx_picture_is_recovered_through_its_view(scene: Scene, blend: Blend, agx: Path, tmp_path: Path) -> None:
+    done = blend(scene.agx_png, "--bake-view", "--out", tmp_path / "job", "--json", file=agx)
+    assert done.code == 0, done.stderr
+    start, result = done.answer["errors"]["flip"]
+    assert result < 0.06  # as above
+    assert result < start / 4
+    reference = read_image(tmp_path / "job" / "pictures" / "reference.png").pixels
+    shown = read_image(tmp_path / "job" / "pictures" / "result.png").pixels
+    # the pictures of the report are seen through the view too: under Standard they would be 0.1 apart
+    assert np.abs(shown - reference).mean() < 0.02
 
 
 def test_paper_preset_lowers_flip_after_mse(scene: Scene, blend: Blend, tmp_path: Path) -> None:

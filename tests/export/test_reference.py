@@ -70,6 +70,51 @@ def test_display_file_under_another_view_is_refused(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["ref.png"]
 
 
+def test_baked_view_goes_into_the_job(target: Any, export: Any, tmp_path: Path) -> None:
+    write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
+    view = bpy.context.scene.view_settings
+    view.view_transform, view.exposure = "AgX", 1.5
+    with pytest.raises(ExportError, match=r"or turn on Bake View \(--bake-view\) if it was rendered under this view"):
+        export(target, reference=tmp_path / "ref.png")
+    report = export(target, reference=tmp_path / "ref.png", bake_view=True)
+    assert report.request["reference"] == {"path": "reference.png", "encoding": "srgb"}
+    lut = {"path": "view_lut.exr", "size": 48, "log2_min": -14.25, "log2_max": 3.0}
+    assert report.request["view"] == {"exposure_ev": 1.5, "gamma": 1.0, "lut": lut}
+    assert any("a table of the view AgX as the scene has it now" in note for note in report.notes)
+    table = read(report.folder / "view_lut.exr")
+    assert table.shape == (48, 48 * 48, 3)
+    np.testing.assert_allclose(table[0, 0], 0, atol=1e-4)  # AgX is black there to a few of 65535 levels
+    np.testing.assert_allclose(table[-1, -1], 1, atol=1e-4)
+    assert np.argmax(table[0, 47]) == 0  # red is fastest
+    assert np.argmax(table[47, 0]) == 2
+    again = export(target, reference=tmp_path / "ref.png", bake_view=True)  # over the first
+    assert (again.folder / "view_lut.exr").is_file()
+
+
+@pytest.mark.parametrize("view", ["Standard", "AgX"])
+def test_no_table_where_a_formula_does(view: str, target: Any, export: Any, tmp_path: Path) -> None:
+    write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
+    write_exr(tmp_path / "ref.exr", picture())
+    bpy.context.scene.view_settings.view_transform = view
+    reference = tmp_path / ("ref.png" if view == "Standard" else "ref.exr")
+    report = export(target, reference=reference, bake_view=True)
+    assert "lut" not in report.request["view"]
+    assert not (report.folder / "view_lut.exr").exists()
+
+
+def test_16_bit_image_holds_display_colours(target: Any, export: Any, tmp_path: Path) -> None:
+    """Blender loads it as floats."""
+    scene = bpy.context.scene
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "PNG", "16"
+    image = bpy.data.images.new("Ramp", 6, 4, float_buffer=True)
+    image.save_render(str(tmp_path / "deep.png"), scene=scene)
+    deep = bpy.data.images.load(str(tmp_path / "deep.png"))
+    assert export(target, reference=deep).request["reference"] == {"path": "reference.png", "encoding": "srgb"}
+    scene.view_settings.view_transform = "AgX"
+    with pytest.raises(ExportError, match=r"deep.png holds display colours and the scene uses the view transform AgX"):
+        export(target, reference=deep)
+
+
 def test_float_image_becomes_linear_exr(target: Any, export: Any) -> None:
     image = bpy.data.images.new("Float", 6, 4, float_buffer=True)
     pixels = np.ones((4, 6, 4), np.float32)

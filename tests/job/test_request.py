@@ -12,7 +12,7 @@ import pytest
 
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.job.job_folder import JobFolder
-from mfo_backend.job.request import read_request, request_from_json, request_to_json
+from mfo_backend.job.request import ViewTable, read_request, request_from_json, request_to_json
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding
@@ -55,6 +55,21 @@ def test_a_request_goes_through_json_unchanged(request_data: dict) -> None:
     request = request_from_json(request_data)
     text = json.dumps(request_to_json(request), allow_nan=False)
     assert request_from_json(json.loads(text)) == request
+
+
+def test_a_view_table_goes_through_json_and_is_checked(job: Path, request_data: dict) -> None:
+    table = {"path": "view_lut.exr", "size": 4, "log2_min": -3.5, "log2_max": 2.0}
+    request_data["view"]["lut"] = table
+    request = request_from_json(request_data)
+    assert request.view_table == ViewTable(**table)
+    assert request_from_json(json.loads(json.dumps(request_to_json(request)))) == request
+    (job / "request.json").write_text(json.dumps(request_data))
+    with pytest.raises(BadInputError, match=r"view\.lut\.path") as refused:
+        read_request(JobFolder.open(job))
+    assert_one_sentence(refused.value)
+    for key, value in (("size", 1), ("log2_min", None), ("path", DELETE), ("other", 1)):
+        with pytest.raises(BadInputError, match=rf"{key}"):
+            request_from_json(changed(request_data, f"view/lut/{key}", value))
 
 
 def test_what_the_documentation_shows_is_a_request() -> None:

@@ -10,11 +10,21 @@ from mfo_backend.metrics import itp
 from mfo_backend.metrics.itp import Itp, de_itp_map
 from mfo_backend.metrics.loss import LOSS_NAMES, make_loss
 from mfo_backend.metrics.pu21 import Pu21, pu21
-from mfo_backend.metrics.response import Displayed, Logarithmic, OnDisplay, Scaled, nits_per_unit, relative_to
+from mfo_backend.metrics.response import (
+    Displayed,
+    Logarithmic,
+    OnDisplay,
+    Scaled,
+    displayed_by,
+    nits_per_unit,
+    relative_to,
+)
 from mfo_backend.metrics.squared_loss import SquaredLoss
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
+
+from .view_tables import baked, filmic
 
 RNG = np.random.default_rng(7)
 RADIANCE = 10 ** RNG.uniform(-2, 1, (5, 6, 3))
@@ -28,6 +38,8 @@ RESPONSES = {
     "pu21 on a display": OnDisplay(DisplayView(-1.5, 1.3), Pu21(100.0)),
     "itp": Itp(100.0),
     "itp on a display": OnDisplay(DisplayView(-2), Itp(100.0)),
+    "displayed by a table": displayed_by(baked(filmic)),
+    "itp on a display by a table": OnDisplay(baked(filmic), Itp(100.0)),
 }
 SQUARED_LOSSES = [name for name in LOSS_NAMES if not name.startswith("flip")]
 
