@@ -31,7 +31,7 @@ MATERIALS: dict[str, dict[str, Any]] = {
         "Sheen Roughness": 0.4,
         "Sheen Tint": (1.0, 0.8, 0.7),
     },
-    "glass": {"Base Color": (0.9, 0.97, 0.95), "Roughness": 0.25, "Transmission Weight": 1.0, "IOR": 1.45},
+    "glass": {"Base Color": (0.9, 0.97, 0.95), "Roughness": 0.35, "Transmission Weight": 1.0, "IOR": 1.45},
 }
 LIGHTS = ("point", "area", "environment")
 BOUNCES = 8
@@ -101,11 +101,11 @@ def _light(scene: Any, kind: str, **settings: Any) -> None:
 
 
 def _point(scene: Any) -> None:
-    _light(scene, "POINT", energy=800.0, shadow_soft_size=0.3, use_soft_falloff=False)
+    _light(scene, "POINT", energy=800.0, shadow_soft_size=0.8, use_soft_falloff=False)
 
 
 def _area(scene: Any) -> None:
-    _light(scene, "AREA", energy=400.0, shape="RECTANGLE", size=2.0, size_y=1.0)
+    _light(scene, "AREA", energy=400.0, shape="RECTANGLE", size=2.5, size_y=2.0)
 
 
 def _environment(scene: Any) -> None:
