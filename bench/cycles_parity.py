@@ -119,14 +119,16 @@ def measure(material: str, light: str, folder: Path, *, size: int, samples: int,
 
 INTRODUCTION = """# Exported scenes here and in Cycles
 
-`python -m bench.cycles_parity` writes this file. A ball on a floor, {size}x{size} pixels, box filter, in Cycles 5.0.1 with
-{samples} samples per pixel and, exported by the add-on, in our renderer with the model `blender_principled` and {spp}.
-Both renders come in two halves with seeds of their own, so that the noise can be taken out: what is left of the product
-of the halves' differences is the difference of the renderers. Means over {block}x{block} pixels are compared, in percent
-of the picture's mean. `mean` is a lower bound of the mean absolute difference, tight where `noise`, that of the compared
-means, is small; `rms`, the root of the mean square with 95 % confidence, is an upper bound. `level` is the difference of the
-means of whole pictures with its standard deviation. Glass, with its caustics, has pictures of half the size with eight
-times the samples.
+`python -m bench.cycles_parity` writes this file. A ball on a floor, {size}x{size} pixels, box filter, in Cycles 5.0.1
+with {samples} samples per pixel and, exported by the add-on, in our renderer with the model `blender_principled` and
+{spp}; glass, with its caustics, in half the size with {more} times the samples. Both renders come in two halves with
+seeds of their own, so that the noise can be taken out: the halves' differences share nothing but the difference of the
+renderers. Compared are means over {block}x{block} pixels, in percent of the picture's mean:
+
+- level: difference of the means of whole pictures, with its standard deviation;
+- mean: mean absolute difference, a lower bound, tight where the noise is small;
+- rms: root of the mean squared difference, with 95 % confidence, an upper bound of the mean absolute difference;
+- noise: mean absolute noise of what is compared.
 
 | material | light | level | mean | rms | noise |
 |---|---|---|---|---|---|
@@ -159,7 +161,9 @@ def main() -> None:
             notes += [note for note in said if note not in notes]
             print(rows[-1], flush=True)
     if not chosen.only:
-        text = INTRODUCTION.format(size=chosen.size, samples=chosen.samples, spp=chosen.spp, block=BLOCK)
+        text = INTRODUCTION.format(
+            size=chosen.size, samples=chosen.samples, spp=chosen.spp, block=BLOCK, more=NOISY["glass"][1]
+        )
         said = "\n\nNotes of the exporter: " + " ".join(notes) if notes else ""
         TABLE.write_text(text + "\n".join(rows) + said + "\n", "utf-8")
 

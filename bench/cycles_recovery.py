@@ -112,15 +112,16 @@ def _run(module: str, *words: Any) -> dict[str, Any]:
 
 INTRODUCTION = """# Materials recovered from Cycles' pictures
 
-`python -m bench.cycles_recovery` writes this file. Scene 1 is that of `mfo demo`; the others have its head and table with
-other random materials, starts and lights ({size}x{size} pixels, {samples} samples per pixel, Blender 5.0.1, Blender's own
-render and light settings but for adaptive sampling and denoising). `mfo blend --preset balanced` fits all parameters to a
-Cycles render, and Cycles renders the saved result with another seed. Mean FLIP of the whole picture against the reference:
+`python -m bench.cycles_recovery` writes this file. Scene 1 is that of `mfo demo`; the others have its head and table
+with other random materials, starts and lights: {size}x{size} pixels, {samples} samples per pixel, Blender 5.0.1 and its
+own render settings but for adaptive sampling and denoising. `mfo blend --preset balanced` fits all parameters to a
+Cycles render, and Cycles renders the saved result with another seed. Mean FLIP of the whole picture against the
+reference:
 
 - before, after: Cycles' render of the start and of the recovered material;
 - floor: Cycles' render of the true material, which differs by noise alone; the excess is after minus floor;
-- model gap: our own render of the true material; above the floor it is what the export and the renderer lose, and
-  the noise of our render, which has {own} times the samples but independent ones.
+- model gap: our own render of the true material. Above the floor it is what the export and the renderer lose, and the
+  noise of our render, which has {own} times the samples but independent ones.
 
 | scene | light | before | after | floor | excess | model gap | fit |
 |---|---|---|---|---|---|---|---|
