@@ -161,9 +161,8 @@ def main() -> None:
             notes += [note for note in said if note not in notes]
             print(rows[-1], flush=True)
     if not chosen.only:
-        text = INTRODUCTION.format(
-            size=chosen.size, samples=chosen.samples, spp=chosen.spp, block=BLOCK, more=NOISY["glass"][1]
-        )
+        numbers = {"size": chosen.size, "samples": chosen.samples, "spp": chosen.spp, "more": NOISY["glass"][1]}
+        text = INTRODUCTION.format(**numbers, block=BLOCK)
         said = "\n\nNotes of the exporter: " + " ".join(notes) if notes else ""
         TABLE.write_text(text + "\n".join(rows) + said + "\n", "utf-8")
 
