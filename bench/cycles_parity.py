@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "docs" / "cycles_parity.md"
 BLOCK = 4  # pixels along each side of the means that are compared
 SPP_AT_ONCE = 32
-NOISY = {"glass": (2, 8)}  # smaller by, and more samples by: caustics
+NOISY = {"glass": (2, 4)}  # smaller by, and more samples by: caustics
 CONFIDENCE = 1.64  # standard deviations that 95 % of normal draws stay below
 Array = NDArray[np.float64]
 
