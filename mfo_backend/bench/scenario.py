@@ -49,8 +49,8 @@ class Scenario:
 SCENARIOS = {
     scenario.name: scenario
     for scenario in (
-        Scenario("base", "point", "all", reference_spp=512, fit_spp=16, max_depth=2),
-        Scenario("parameters", "point", "reduced", reference_spp=512, fit_spp=16, max_depth=2),
+        Scenario("base", "point", "all", reference_spp=4096, fit_spp=16, max_depth=2),
+        Scenario("parameters", "point", "reduced", reference_spp=4096, fit_spp=16, max_depth=2),
         Scenario("noise", "probe", "all", reference_spp=4, fit_spp=4, max_depth=3),
         Scenario(
             "transparency",
