@@ -7,6 +7,7 @@ Meshes are Y up with a bounding sphere of radius 1, probes are lat-long with a m
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,14 +19,17 @@ from ..types.errors import BadInputError
 from ..types.image import Pixels
 from .bumpy_sphere import bumpy_sphere, write_ply
 
-# the paper's kinds of objects: Stanford scans, McGuire's archive, a blob and two bumpy surfaces; 12 000 triangles suffice
+# the paper's kinds of objects: Stanford scans, McGuire's archive, a blob, two bumpy surfaces; low levels suffice
 CLOSED_OBJECTS = (
-    "bunny_low armadillo_low dragon_low lucy_low asian_dragon lps_head own_blob_low own_surface1_low own_surface2_low "
-    "testknob shaderball_low spot nefertiti_low"
-).split()
-OPEN_OBJECTS = ["teapot", "suzanne"]
+    *("bunny_low", "armadillo_low", "dragon_low", "lucy_low", "asian_dragon", "lps_head", "own_blob_low"),
+    *("own_surface1_low", "own_surface2_low", "testknob", "shaderball_low", "spot", "nefertiti_low"),
+)
+OPEN_OBJECTS = ("teapot", "suzanne")
 # as the paper: six of the USC gallery (two of them its lower-resolution classics) and one by Vogl
-PROBES = "usc_uffizi usc_pisa usc_ennis_blur usc_doge2_blur usc_gracenew_256 debevec_grace vogl_museum".split()
+PROBES = (
+    *("usc_uffizi", "usc_pisa", "usc_ennis_blur", "usc_doge2_blur", "usc_gracenew_256"),
+    *("debevec_grace", "vogl_museum"),
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Assets:
     @property
     def objects(self) -> tuple[str, ...]:
         """Names of the meshes the folder holds."""
-        return self._present("meshes", [*CLOSED_OBJECTS, *OPEN_OBJECTS], "ply")
+        return self._present("meshes", (*CLOSED_OBJECTS, *OPEN_OBJECTS), "ply")
 
     @property
     def probes(self) -> tuple[str, ...]:
@@ -72,7 +76,9 @@ class Assets:
         write_ply(path, *bumpy_sphere(seed))
         return "generated", path
 
-    def place_probe(self, rng: np.random.Generator, folder: Path, file: str, *, other_than: str = "") -> tuple[str, Path]:
+    def place_probe(
+        self, rng: np.random.Generator, folder: Path, file: str, *, other_than: str = ""
+    ) -> tuple[str, Path]:
         """Name and file of a random probe, not the one named; a generated one is written into `folder`."""
         names = [name for name in self.probes if name != other_than]
         choice, seed = rng.random(), int(rng.integers(2**31))
@@ -83,7 +89,7 @@ class Assets:
         write_exr(path, generated_probe(seed))
         return "generated", path
 
-    def _present(self, folder: str, names: list[str], ending: str) -> tuple[str, ...]:
+    def _present(self, folder: str, names: Sequence[str], ending: str) -> tuple[str, ...]:
         if self.data is None:
             return ()
         return tuple(name for name in names if (self.data / folder / f"{name}.{ending}").is_file())

@@ -21,6 +21,7 @@ class Task:
 
     @property
     def key(self) -> Key:
+        """What tells rows apart."""
         return self.scenario, self.scene, self.method
 
 
@@ -74,4 +75,5 @@ class Row:
 
     @property
     def key(self) -> Key:
+        """What tells rows apart."""
         return self.scenario, self.scene, self.method

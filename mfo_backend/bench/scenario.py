@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenarios: what is unknown, under which light, and how noisy the pictures are.
 
-They follow the paper's; "Specular transmission in [0.75, 1], roughness in [0, 0.6]" is its Transparency. Where it leaves
-something open, the choice is stated here.
+They follow the paper's, at 32 samples for Transparency. Where it leaves something open, the choice is stated here.
 """
 
 from __future__ import annotations

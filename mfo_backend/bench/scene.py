@@ -92,15 +92,16 @@ def _probe_light(path: Path, rng: np.random.Generator) -> str:
 
 def _xml(scenario: Scenario, start: Mapping[str, Value], mesh: Path, camera: str, emitter: str, size: int) -> str:
     values = "".join(
-        f'<float name="{name}" value="{value!r}"/>'
-        if isinstance(value, float)
-        else f'<rgb name="{name}" value="{", ".join(map(repr, value))}"/>'
+        f'<rgb name="{name}" value="{", ".join(map(repr, value))}"/>'
+        if isinstance(value, tuple)
+        else f'<float name="{name}" value="{value!r}"/>'
         for name, value in start.items()
     )
     glass = "spec_trans" in start
-    bsdf = f'<bsdf type="principled"{f" id={chr(34)}target_bsdf{chr(34)}" if glass else ""}>{values}</bsdf>'
-    if not glass:
-        bsdf = f'<bsdf type="twosided" id="target_bsdf">{bsdf}</bsdf>'
+    if glass:
+        bsdf = f'<bsdf type="principled" id="target_bsdf">{values}</bsdf>'
+    else:
+        bsdf = f'<bsdf type="twosided" id="target_bsdf"><bsdf type="principled">{values}</bsdf></bsdf>'
     return f"""<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="{scenario.max_depth}"/></integrator>
 <sensor type="perspective"><float name="fov" value="{_FIELD_OF_VIEW}"/>
