@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from mfo_backend.bench import fit_runner
 from mfo_backend.bench.assets import Assets
 from mfo_backend.bench.fit_runner import FitRunner
+from mfo_backend.bench.method import method_settings
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.summary import SOLVED_FLIP
 from mfo_backend.types.errors import BadInputError
@@ -23,13 +27,14 @@ def never() -> bool:
 
 def test_fast_solves_the_reduced_set(runner):
     rows = [runner(Task("parameters", scene, "fast"), never) for scene in range(4)]
-    assert sum(r.flip <= SOLVED_FLIP for r in rows) >= MOST_SOLVED
-    assert max(r.passes for r in rows) < MOST_PASSES
+    assert sum(r.flip <= SOLVED_FLIP for r in rows) == 4
+    # 88, 45, 36 and 36 when this was written; a stage that runs to its limit costs hundreds
+    assert max(r.passes for r in rows) < 120
     assert rows[0].warm_up_seconds > 0
     assert rows[1].warm_up_seconds == 0
     for r in rows:
         assert r.flip < r.start_flip
-        assert 0 <= r.relative_rmse
+        assert r.relative_rmse >= 0
         assert set(r.parameter_errors) == {"base_color", "roughness", "metallic", "specular"}
 
 
@@ -39,7 +44,7 @@ def test_the_truth_itself_has_no_error(runner):
     difference = judge.difference(judge.true_values())
     assert (difference.flip, difference.relative_rmse) == (0.0, 0.0)  # the same picture twice
     assert judge.relit_relative_rmse(judge.true_values()) == 0.0
-    assert 0 < judge.floor.relative_rmse
+    assert judge.floor.relative_rmse > 0
 
 
 def test_glass_is_refused_by_our_presets(runner):
@@ -47,10 +52,13 @@ def test_glass_is_refused_by_our_presets(runner):
         runner(Task("transparency", 0, "fast"), never)
 
 
-def test_the_papers_loop_improves_on_the_start_under_a_probe(runner):
-    row = runner(Task("noise", 0, "mse-hdr"), never)
-    assert row.status in ("stale", "unchanged", "max_iterations")
-    assert row.flip < 0.7 * row.start_flip
+def test_the_papers_loop_improves_on_the_start_under_a_probe(runner, monkeypatch):
+    monkeypatch.setattr(fit_runner, "method_settings", lambda *a: replace(method_settings(*a), max_iterations=8))
+    row = runner(Task("noise", 0, "mfo-hdr"), never)
+    assert row.status == "max_iterations"
+    assert row.flip < row.start_flip
+    # start; two stages, whose last iteration needs no slope; the final pictures of start and both stages
+    assert row.passes == 1 + 2 * (8 + 7 * 2) + 3
 
 
 def test_a_stopped_fit_is_no_row(runner):

@@ -61,7 +61,7 @@ def test_scenes_that_a_method_lacks_are_left_out_and_counted():
 
 def test_time_to_quality_ends_at_the_share_that_reached_it():
     root = ElementTree.fromstring(time_to_quality([*ROWS, *OTHERS], 0.02))
-    ours = [line for line in root.iter("{http://www.w3.org/2000/svg}polyline")][1]
+    ours = list(root.iter("{http://www.w3.org/2000/svg}polyline"))[1]
     heights = [float(point.split(",")[1]) for point in ours.get("points", "").split()]
     top, bottom = 30.0, 294.0  # of the frame
     assert heights[0] == bottom

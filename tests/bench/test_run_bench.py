@@ -97,7 +97,7 @@ def test_a_damaged_line_is_refused_by_number(tmp_path):
     file.append(row(Task("base", 0, "fast")))
     with open(file.path, "a") as damaged:
         damaged.write("{]\n")
-    with pytest.raises(BadInputError, match="Line 2 of .* is no row of a bench"):
+    with pytest.raises(BadInputError, match=r"Line 2 of .* is no row of a bench"):
         file.read()
 
 

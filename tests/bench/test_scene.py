@@ -78,7 +78,9 @@ def test_meshes_of_the_folder_are_used_and_open_ones_not_for_glass(tmp_path):
     for name in ("teapot", "spot"):
         (tmp_path / "meshes" / f"{name}.ply").touch()
     assets = Assets(tmp_path)
-    scenes = [write_scene(SCENARIOS[name], n, 8, assets, tmp_path) for name in ("base", "transparency") for n in range(8)]
+    scenes = [
+        write_scene(SCENARIOS[name], n, 8, assets, tmp_path) for name in ("base", "transparency") for n in range(8)
+    ]
     assert {s.object for s in scenes if s.scenario.name == "base"} == {"teapot", "spot"}
     assert {s.object for s in scenes if s.scenario.name == "transparency"} == {"spot"}
 

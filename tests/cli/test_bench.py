@@ -8,6 +8,7 @@ import argparse
 import pytest
 
 from mfo_backend.bench.row_file import RowFile
+from mfo_backend.bench.run_bench import all_tasks
 from mfo_backend.cli.bench import work
 from mfo_backend.cli.main import main
 from tests.bench.rows import FakeRunner
@@ -26,10 +27,7 @@ def test_rows_and_report(tmp_path, capsys):
 
 
 def test_a_stopped_bench_reports_what_is_there_and_exits_with_4(tmp_path, capsys):
-    runner = FakeRunner()
-    from mfo_backend.bench.run_bench import all_tasks
-
-    runner._cancelled = all_tasks(["base"], ["fast", "mfo-hdr"], 2)[2]
+    runner = FakeRunner(cancelled=all_tasks(["base"], ["fast", "mfo-hdr"], 2)[2])
     assert work(arguments(tmp_path), runner, {}) == 4
     captured = capsys.readouterr()
     assert "| fast | 1 |" in captured.out
