@@ -75,12 +75,17 @@ def _head(rows: Sequence[Row]) -> list[str]:
     machines = [row.machine for row in rows]
     versions = seen(f"{name} {value}" for m in machines for name, value in m.get("versions", {}).items())
     warm = sum(row.warm_up_seconds for row in rows)
+    facts = [
+        f"{len(rows)} rows at {seen(f'{row.size}x{row.size}' for row in rows)} pixels",
+        f"commit {seen(m.get('commit') for m in machines) or 'unknown'}",
+        seen(m.get("device") for m in machines),
+        f"{seen(m.get('threads') for m in machines) or 'unknown'} threads",
+        versions,
+    ]
     return [
         "# Speed against error",
         "",
-        f"{len(rows)} rows at {seen(f'{row.size}x{row.size}' for row in rows)} pixels; commit "
-        f"{seen(m.get('commit') for m in machines) or 'unknown'}; {seen(m.get('device') for m in machines)}, "
-        f"{seen(m.get('threads') for m in machines)} threads; {versions}. "
+        f"{'; '.join(filter(None, facts))}. "
         f"Warm-up before the first row of each scenario and method: {warm:.0f} s in all, not in the tables.",
         "",
     ]
@@ -91,7 +96,9 @@ def _floor(rows: Sequence[Row]) -> str:
     floor = quantile([row.floor_flip for row in scenes if row.floor_flip is not None], 0.5)
     start = quantile([row.start_flip for row in scenes if row.start_flip is not None], 0.5)
     count = len({row.scene for row in rows})
-    return f"{count} scenes; median FLIP of the reference's own noise {_number(floor)}, of the start {_number(start)}."
+    plural = "" if count == 1 else "s"
+    noise = f"median FLIP of the reference's own noise {_number(floor)}, of the start {_number(start)}"
+    return f"{count} scene{plural}; {noise}."
 
 
 def _cells(summary: Summary) -> tuple[str, ...]:
@@ -149,6 +156,8 @@ def _page(head: Sequence[str], sections: Sequence[str]) -> str:
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
 <title>Speed against error</title>
 <style>{style}
+main {{ max-width: 1320px; }}
+p + .scroll {{ margin-top: 14px; }}
 .pictures {{ grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); margin-top: 18px; }}</style>
 </head>
 <body>

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
-WIDTH, HEIGHT = 560, 340
-_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 16, 30, 46
+WIDTH, HEIGHT = 560, 360
+_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 16, 50, 46
 # Okabe and Ito's palette without its yellow and black, which vanish on one of the grounds, and two greys
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7a7a7a", "#a65628")
 _GREY = "#8a8f94"
@@ -55,12 +55,12 @@ class SvgAxes:
         self.parts.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4.5" fill="{colour}"/>')
 
     def legend(self, names: Sequence[tuple[str, str]]) -> None:
-        """Names with their colours over the frame."""
-        at = float(_LEFT)
-        for name, colour in names:
-            self.parts.append(f'<circle cx="{at + 4:.1f}" cy="18" r="4" fill="{colour}"/>')
-            self.parts.append(_text(at + 12, 22, name, colour=colour))
-            at += 26 + 6.6 * len(name)
+        """Names with their colours over the frame, at most four in each of two rows."""
+        for number, (name, colour) in enumerate(names):
+            row, column = divmod(number, 4)
+            x, y = _LEFT + column * (WIDTH - _LEFT - _RIGHT) / 4, 18 + 18 * row
+            self.parts.append(f'<circle cx="{x + 4:.1f}" cy="{y - 4}" r="4" fill="{colour}"/>')
+            self.parts.append(_text(x + 12, y, name, colour=colour))
 
     def svg(self) -> str:
         """The SVG element."""

@@ -63,7 +63,7 @@ def test_time_to_quality_ends_at_the_share_that_reached_it():
     root = ElementTree.fromstring(time_to_quality([*ROWS, *OTHERS], 0.02))
     ours = list(root.iter("{http://www.w3.org/2000/svg}polyline"))[1]
     heights = [float(point.split(",")[1]) for point in ours.get("points", "").split()]
-    top, bottom = 30.0, 294.0  # of the frame
+    top, bottom = 50.0, 314.0  # of the frame
     assert heights[0] == bottom
     assert heights[-1] == pytest.approx((top + bottom) / 2, abs=0.1)  # two of four
 
