@@ -14,6 +14,7 @@ from ..bench.row import Row
 from ..bench.row_file import RowFile, keep_setup
 from ..bench.run_bench import Runner, all_tasks, run_bench
 from ..bench.scenario import SCENARIOS
+from ..job.progress_bar import terminal_columns
 from ..job.stop import StopSignal
 from ..types.errors import BadInputError
 from ..types.status import Status
@@ -60,7 +61,9 @@ def work(arguments: argparse.Namespace, runner: Runner, machine: dict) -> int:
     left = sum(task.key not in done for task in tasks)
     print(f"{left} of {len(tasks)} rows to measure, in {file.path}", file=sys.stderr)
     stop = StopSignal()
-    with stop.watching(), tqdm(total=left, unit="row", disable=None, smoothing=0.0) as bar:
+    # disable=None: shown on a terminal only; the time left is reckoned from the mean of all rows so far
+    shape = {"disable": None, "smoothing": 0.0, "ncols": terminal_columns(), "nrows": 20}
+    with stop.watching(), tqdm(total=left, unit="row", **shape) as bar:
 
         def listener(row: Row) -> None:
             tqdm.write(_line(row), file=sys.stderr)
