@@ -23,6 +23,7 @@ COMMANDS = {
     "fit": "fit a material of a Mitsuba scene to a reference picture",
     "blend": "fit a material of a .blend file to a reference picture",
     "compare": "measure the difference between two pictures",
+    "bench": "measure speed against error on random scenes",
     "run": "run a job folder (what the Blender add-on starts)",
 }
 _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled."
