@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .colour import srgb_from_linear
 from .perceptual_loss import Distance, PerceptualLoss
 from .response import Displayed, OnDisplay, Response, Scaled
-from .tone_mapping import DisplayView
+from .tone_mapping import View
 
 Array = NDArray[np.floating]
 
@@ -41,7 +41,7 @@ def hdr_perceptual_loss(name: str, target: Array, nits: float) -> PerceptualLoss
     return PerceptualLoss(name, target.shape, response, _lpips(kind, response.apply(target)))
 
 
-def ldr_perceptual_loss(name: str, light: Array, view: DisplayView, nits: float) -> PerceptualLoss:
+def ldr_perceptual_loss(name: str, light: Array, view: View, nits: float) -> PerceptualLoss:
     """A judge's distance to the linear `light` in [0, 1] of a display whose white has `nits` cd/m^2.
 
     Raises

@@ -52,9 +52,7 @@ class RecordedScene:
 
     def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
         if renderer.shape.is_emitter():
-            raise UnrecordableError(
-                "The target emits light and recorded paths hold reflected light only."
-            )
+            raise UnrecordableError("The target emits light and recorded paths hold reflected light only.")
         self.renderer = renderer
         self._covered = covered
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
@@ -134,9 +132,7 @@ def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Val
         if name is None:
             continue
         if parts[parts.index(name) + 1 :] not in ([], ["value"]):
-            raise UnrecordableError(
-                f"Parameter {name!r} is a texture: recorded paths need one value."
-            )
+            raise UnrecordableError(f"Parameter {name!r} is a texture: recorded paths need one value.")
         numbers = np.array(keys[key], np.float64).ravel()
         size = model.table[name].size
         values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))
