@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .colour import srgb_from_linear
 from .perceptual_loss import Distance, PerceptualLoss
-from .response import Displayed, OnDisplay, Response, Scaled
+from .response import OnDisplay, Response, Scaled, displayed_by
 from .tone_mapping import View
 
 Array = NDArray[np.floating]
@@ -53,7 +53,7 @@ def ldr_perceptual_loss(name: str, light: Array, view: View, nits: float) -> Per
     if kind == "cvvdp":
         response: Response = OnDisplay(view, Scaled(nits))
         return PerceptualLoss(name, light.shape, response, _color_video_vdp(light * nits, hdr=False, white=nits))
-    return PerceptualLoss(name, light.shape, Displayed(view), _lpips(kind, srgb_from_linear(light)))
+    return PerceptualLoss(name, light.shape, displayed_by(view), _lpips(kind, srgb_from_linear(light)))
 
 
 def _color_video_vdp(reference: Array, *, hdr: bool, white: float = 0.0) -> Distance:
