@@ -92,8 +92,8 @@ def test_agx_picture_is_recovered_through_its_view(scene: Scene, blend: Blend, a
     assert result < start / 4
     reference = read_image(tmp_path / "job" / "pictures" / "reference.png").pixels
     shown = read_image(tmp_path / "job" / "pictures" / "result.png").pixels
-    # the pictures of the report are seen through the view too: under Standard they would be 0.1 apart
-    assert np.abs(shown - reference).mean() < 0.02
+    # the report's pictures are seen through the view too: measured 0.007, and 0.020 between AgX and Standard
+    assert np.abs(shown - reference).mean() < 0.014
 
 
 def test_paper_preset_lowers_flip_after_mse(scene: Scene, blend: Blend, tmp_path: Path) -> None:
