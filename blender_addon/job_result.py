@@ -20,7 +20,10 @@ class JobResultError(Exception):
 
 @dataclass(frozen=True)
 class JobResult:
-    """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result)."""
+    """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result).
+
+    `certainty` holds the levels of `docs/architecture.md` by parameter name, where the preset finds them out.
+    """
 
     folder: Path
     object_name: str
@@ -33,6 +36,7 @@ class JobResult:
     initial: Mapping[str, Value]
     recovered: Mapping[str, Value]
     errors: Mapping[str, tuple[float, float]]
+    certainty: Mapping[str, str]
     notes: tuple[str, ...]
     seconds: float
 
@@ -66,6 +70,7 @@ def read_job_result(folder: Path) -> JobResult:
             initial={str(k): _value(v) for k, v in result.get("initial", {}).items()},
             recovered={str(k): _value(v) for k, v in result["recovered"].items()},
             errors={str(k): (float(a), float(b)) for k, (a, b) in result.get("errors", {}).items()},
+            certainty={str(k): str(c["level"]) for k, c in result.get("certainty", {}).items()},
             notes=tuple(map(str, result.get("notes", ()))),
             seconds=float(result.get("seconds", 0.0)),
         )

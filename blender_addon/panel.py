@@ -23,6 +23,14 @@ class _Panel:
     bl_category = "Material Fit"
 
 
+# levels of result.json: icon before the value, and its meaning in the legend
+_CERTAINTY = {
+    "determined": ("CHECKMARK", "determined by the picture"),
+    "weak": ("QUESTION", "weakly determined"),
+    "not_visible": ("HIDE_ON", "not visible, kept as it was"),
+}
+
+
 class MFO_PT_fit(_Panel, bpy.types.Panel):
     """Reference, settings and the run."""
 
@@ -155,14 +163,23 @@ def _draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...]) -> None:
 def _draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection, title: str) -> None:
     if not rows:
         return
-    grid = layout.box().column(align=True)
-    for name, *cells in ((title, "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
-        split = grid.split(factor=0.46)
-        split.label(text=name)
+    box = layout.box()
+    grid = box.column(align=True)
+    known = any(row.certainty for row in rows)
+    lines = ((title, "Start", "Result", ""), *((row.name, row.start, row.result, row.certainty) for row in rows))
+    for name, *cells, certainty in lines:
+        split = grid.split(factor=0.5 if known else 0.46)
+        split.label(text=name, **({"icon": _CERTAINTY.get(certainty, ("BLANK1",))[0]} if known else {}))
         columns = split.split(factor=0.5)  # a row would pack swatches to the left
         for cell in cells:
             swatch = previews.icon(cell)  # colours have one, and no room for their hex code beside it
             columns.label(text="" if swatch else cell, icon_value=swatch)
+    if known:
+        legend = box.column(align=True)
+        legend.scale_y = 0.8
+        for level in dict.fromkeys(row.certainty for row in rows if row.certainty in _CERTAINTY):
+            icon, words = _CERTAINTY[level]
+            legend.label(text=words, icon=icon)
 
 
 def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:

@@ -143,6 +143,7 @@ class MFO_PG_row(bpy.types.PropertyGroup):
 
     start: StringProperty()
     result: StringProperty()
+    certainty: StringProperty()  # level in result.json, empty where unknown
 
 
 class MFO_PG_runtime(bpy.types.PropertyGroup):

@@ -19,7 +19,7 @@ import bpy
 from . import previews
 from .job_process import Event, JobProcess, Outcome
 from .job_result import JobResult, JobResultError, Value, read_job_result
-from .write_back import WriteBackError, result_to_sockets
+from .write_back import WriteBackError, result_to_sockets, socket_to_parameter
 
 TICK = 0.15  # seconds between two looks at the process
 _PICTURES = ("reference", "start", "result", "difference")
@@ -133,6 +133,7 @@ def show_result(found: JobResult, uid: int) -> None:
         _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
     for name, value in result_to_sockets(found).items():
         _add_row(runtime.values, name, found.sockets_start.get(name), value)
+        runtime.values[-1].certainty = found.certainty.get(socket_to_parameter(name), "")
     for note in found.notes:
         if note not in runtime.messages:
             add_message(runtime, note, "INFO")
