@@ -28,7 +28,7 @@ LOCK = ROOT / "requirements" / "dev.lock"
 # The bpy module that the demo and the tests use exists for this Python only.
 PYTHON = (3, 11)
 # libLLVM compiles Mitsuba's kernels, the others are what the bpy module links against; a bare Debian has none.
-LLVM_PACKAGE = "libllvm19"
+RENDERER_PACKAGES = ["libllvm19", "libatomic1"]
 BPY_PACKAGES = [
     "libx11-6",
     "libxrender1",
@@ -132,19 +132,19 @@ def set_up_environment() -> None:
     stamp.write_text(lock_hash())
 
 
-def set_up_llvm() -> None:
-    """Make sure that a libLLVM is found which compiles a real kernel.
+def set_up_renderer() -> None:
+    """Make sure that Mitsuba loads and that a libLLVM is found which compiles a real kernel.
 
     Raises
     ------
     DevError
-        If none is found and none may be installed.
+        If something is missing and may not be installed.
     """
-    probe = [venv_program("python"), "-m", "mfo_backend", "doctor", "--require", "renderer"]
+    probe = [venv_program("python"), "-m", "mfo_backend", "doctor"]
     if runs(*probe):
         return
     if can_apt_install():
-        apt_install([LLVM_PACKAGE])
+        apt_install(RENDERER_PACKAGES)
     if not runs(*probe):
         run(*probe)
 
@@ -174,7 +174,7 @@ def set_up() -> None:
     start = time.monotonic()
     set_up_environment()
     set_up_bpy()
-    set_up_llvm()
+    set_up_renderer()
     say(f"ready after {time.monotonic() - start:.1f} s")
 
 

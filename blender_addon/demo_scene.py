@@ -10,6 +10,8 @@ from pathlib import Path
 
 import bpy
 
+from .versions import nodes_enabled
+
 OBJECT = "Suzanne"
 WORLDS = ("city", "courtyard", "forest", "interior", "studio", "sunrise", "sunset")  # night is nearly black
 
@@ -63,9 +65,8 @@ def _add_world(name: str, rotation: float) -> None:
     """An environment texture turned about the vertical, packed so that the file opens anywhere."""
     world = bpy.data.worlds.new("World")
     bpy.context.scene.world = world
-    if world.node_tree is None:  # before Blender 5.0 a new world has no nodes
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
+    tree = nodes_enabled(world)
+    nodes, links = tree.nodes, tree.links
     nodes.clear()
     image = bpy.data.images.load(
         str(Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world" / f"{name}.exr")
@@ -119,7 +120,5 @@ def _add_head() -> bpy.types.Node:
 def _new_material(target: bpy.types.Object, name: str) -> bpy.types.Node:
     """Give `target` a new Principled material; returns the node."""
     material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
     target.data.materials.append(material)
-    return next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    return next(node for node in nodes_enabled(material).nodes if node.type == "BSDF_PRINCIPLED")

@@ -68,6 +68,13 @@ def node_tree_of(owner: Any) -> bpy.types.NodeTree | None:
     return tree if owner.use_nodes else None
 
 
+def nodes_enabled(owner: Any) -> bpy.types.NodeTree:
+    """Return the node tree of a new material or world, made if there is none (5.0: it always has one)."""
+    if owner.node_tree is None:
+        owner.use_nodes = True
+    return owner.node_tree
+
+
 def default_surface_is_principled() -> bool:
     """Whether Cycles gives faces without material a Principled BSDF, as since Blender 5.0, or a diffuse of 0.8.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-LAYERS = ["types", "scene", "material", "render", "metrics", "solve", "fit", "report", "job", "cli"]
+LAYERS = ["types", "scene", "material", "render", "metrics", "solve", "fit", "report", "job", "bench", "cli"]
 RENDERER_MODULES = {"mitsuba", "drjit"}
 # material/ holds the models as Dr.Jit functions, render/ everything else that touches Mitsuba
 RENDERER_LAYERS = {"render", "material"}

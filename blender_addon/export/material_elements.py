@@ -61,6 +61,23 @@ def emission_element(material: Material, scale: float, save: Callable[[Texture],
     return add(emitter, rgb("radiance", material.emission * scale))
 
 
+def approximated(material: Material) -> list[str]:
+    """Return a sentence for each thing that no model of the backend has, Blender's own included."""
+    found = []
+    if material.value("Subsurface Weight", 0.0) != 0.0:
+        found.append("Subsurface is fitted as diffuse: no light travels below the surface.")
+    if material.value("Thin Wall", False):
+        found.append("Thin Wall is left out.")
+    above = [
+        name
+        for name, nothing in (("Coat Weight", 0.0), ("Sheen Weight", 0.0), ("Alpha", 1.0))
+        if material.value(name, nothing) != nothing
+    ]
+    if above and material.emission.max(initial=0.0) > 0.0:
+        found.append(f"the emission is not dimmed by {', '.join(above)}, as it is in Cycles.")
+    return found
+
+
 def _transmits(material: Material) -> bool:
     socket = material.sockets.get("Transmission Weight", Socket(0.0))
     return socket.texture is not None or socket.value > 0.0
@@ -83,8 +100,10 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
     if lost:
         findings.note(
             f"Material '{material.name}': {', '.join(lost)} has no counterpart in Mitsuba's principled and is missing "
-            "in scene.xml."
+            "in a fit with the model mitsuba_principled."
         )
+    for sentence in approximated(material):
+        findings.note(f"Material '{material.name}': {sentence}")
     element = plugin("bsdf", "principled")
     for name, value in values.items():
         if every or name in textures or name in ("base_color", "roughness", "eta") or value != 0.0:

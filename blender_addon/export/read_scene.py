@@ -74,9 +74,26 @@ def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings
         return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
     if cycles.sample_clamp_direct > 0.0:
         findings.note("Cycles clamps direct light; the fit does not.")
+    _note_limits(cycles, findings)
     # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces))
     return RenderSettings(pixel_filter, bounces + 2, scene.render.film_transparent, cycles.film_exposure, DEFAULT_SPP)
+
+
+def _note_limits(cycles: bpy.types.PropertyGroup, findings: Findings) -> None:
+    """List the settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
+    used = []
+    if cycles.blur_glossy > 0.0 and cycles.max_bounces > 0:
+        used.append(f"Filter Glossy ({cycles.blur_glossy:.3g})")
+    if cycles.sample_clamp_indirect > 0.0:
+        used.append(f"clamping of indirect light ({cycles.sample_clamp_indirect:.3g})")
+    bounces = {kind: getattr(cycles, f"{kind}_bounces") for kind in ("diffuse", "glossy", "transmission")}
+    most = min(max(bounces.values()), cycles.max_bounces)
+    used += [f"limit of {count} {kind} bounces" for kind, count in bounces.items() if count < most]
+    if not (cycles.caustics_reflective and cycles.caustics_refractive):
+        used.append("removal of caustics")
+    if used:
+        findings.note(f"Left out of the fit: Cycles' {', '.join(used)}. They change indirect light only.")
 
 
 class _Walk:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.compare import Comparison, compare_images
+from ..metrics.judges.judgement import judge_images
 from ..metrics.tone_mapping import DisplayView
 from ..report.difference_map import draw_map
 from ..scene.image_file import read_image, write_png
@@ -24,6 +25,8 @@ _MEANINGS = {
     "flip": "FLIP, 0 equal to 1",
     "hdr_flip": "HDR-FLIP, 0 equal to 1",
     "de_itp": "colour difference, 1 is just noticeable",
+    "jod": "ColorVideoVDP, 10 is equal; sees contrast and hue, not how bright all of it is",
+    "hdrvdp3_q_jod": "HDR-VDP-3, 10 is equal; ignores hue (runs where MFO_HDRVDP3 names it)",
 }
 _DRAWN = {"flip": 1.0, "hdr_flip": 1.0, "de_itp": None}  # name of the map, end of its bar (None: its 99th percentile)
 
@@ -56,14 +59,17 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.exposure is not None or arguments.gamma is not None:
         display = DisplayView(arguments.exposure or 0.0, 1.0 if arguments.gamma is None else arguments.gamma)
     comparison = compare_images(reference, test, mask=mask, display=display)
+    judgement = judge_images(reference, test, display=display)
+    metrics = {**comparison.metrics, "jod": judgement.jod, "hdrvdp3_q_jod": judgement.hdrvdp3_q_jod}
+    notes = [*comparison.notes, *judgement.notes]
     pictures = {} if arguments.out is None else _write_maps(arguments.out, comparison)
     if arguments.json:
-        content = {"metrics": comparison.metrics, "pictures": pictures, "notes": list(comparison.notes)}
+        content = {"metrics": metrics, "judges": judgement.conditions, "pictures": pictures, "notes": notes}
         print(json.dumps(content))
         return 0
-    for name, value in comparison.metrics.items():
+    for name, value in metrics.items():
         print(f"{name:13} {'-' if value is None else f'{value:.6g}':>12}  {_MEANINGS[name]}")
-    for line in (*comparison.notes, *(f"Wrote {path}" for path in pictures.values())):
+    for line in (*notes, *(f"Wrote {path}" for path in pictures.values())):
         print(line)
     return 0
 

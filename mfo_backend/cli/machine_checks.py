@@ -16,7 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..render.cache_folder import cache_folder
-from ..render.llvm import find_llvm, llvm_cure, needs_llvm, require_mitsuba
+from ..render.llvm import find_llvm, library_cure, llvm_cure, missing_system_library, needs_llvm, require_mitsuba
 from ..types.errors import SetupError
 
 PINNED = {"mitsuba": "3.9.1", "drjit": "1.5.0"}  # those of pyproject.toml; a test compares them
@@ -79,6 +79,10 @@ def _renderer() -> Iterator[Check]:
     if needs_llvm():
         library, verdicts = find_llvm()
         failed = "; ".join(f"{v.path}: {v.reason}" for v in verdicts if not v.works)
+        missing = missing_system_library(verdicts)
+        if library is None and missing:
+            yield Check("drjit", "problem", f"{missing} is missing", _sentence(library_cure(missing)))
+            return
         if library is None:
             yield Check("LLVM", "problem", failed or "no library found", _sentence(llvm_cure()))
             return

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,6 +23,7 @@ COMMANDS = {
     "fit": "fit a material of a Mitsuba scene to a reference picture",
     "blend": "fit a material of a .blend file to a reference picture",
     "compare": "measure the difference between two pictures",
+    "bench": "measure speed against error on random scenes",
     "run": "run a job folder (what the Blender add-on starts)",
 }
 _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled."
@@ -29,6 +31,8 @@ _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not install
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    # NumPy's own threads would fight with Dr.Jit's; read when NumPy is first imported
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if arguments is None else arguments)
     parsed = _parser(words).parse_args(words)
     stream = sys.stdout if getattr(parsed, "json", False) else None

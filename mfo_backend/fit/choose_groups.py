@@ -38,10 +38,10 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
     return groups.take(np.union1d(spread, bright))
 
 
-# Camera rays along each axis of a pixel where lights are exact: everywhere, where the picture changes by a tenth to the
-# next pixel, and where it changes by half. A highlight of roughness 0.06 on a sphere of 100 pixels is narrower than a
-# pixel.
-GRID_PLAIN, GRID_DETAIL, GRID_HIGHLIGHT = 2, 6, 20
+# Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
+# the next pixel; by half; by a factor of four. A highlight of roughness 0.06 on a sphere of 100 pixels is narrower
+# than one.
+GRID_PLAIN, GRID_DETAIL, GRID_HIGHLIGHT, GRID_PEAK = 2, 6, 20, 50
 
 
 def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -61,4 +61,5 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
     grid = np.full(level.shape, GRID_PLAIN)
     grid[mask & (change > 0.1)] = GRID_DETAIL
     grid[inside & (change > 0.5)] = GRID_HIGHLIGHT
+    grid[inside & (change > 1.4)] = GRID_PEAK
     return grid

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..metrics.baked_view import HALF_LEVEL, BakedView
 from ..metrics.itp import Itp
+from ..metrics.pixel_check import check_finite
 from ..metrics.pu21 import Pu21
 from ..metrics.response import OnDisplay, Response, displayed_by, nits_per_unit
 from ..metrics.tone_mapping import DisplayView, View
@@ -31,7 +32,7 @@ from .uncertainty import certainties, standard_deviations
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 
 STAGES = ("scan", "start", "refine")
-PERCEPTUAL = {"hdr": ("itp", "pu21"), "ldr": ("display", "itp")}
+_CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
 
@@ -55,13 +56,16 @@ def fit_recorded(
     Raises
     ------
     BadInputError
-        As `fit_material`, and for materials that recorded paths cannot hold: textures, transmission.
+        As `fit_material`.
+    UnrecordableError
+        For materials that recorded paths cannot hold: textures, transmission.
     """
     from ..render.recorded_scene import RecordedScene
 
     began = time.monotonic()
     mask = renderer.target_mask()
     check_reference(reference, mask)
+    check_finite(reference.pixels, "The reference")
     ldr = reference.encoding is Encoding.SRGB or settings.range == "ldr"
     view = (
         (display or DisplayView())
@@ -94,7 +98,8 @@ def fit_recorded(
         candidates.append(found)
 
     seed = settings.seed ^ VERIFY_STREAM
-    pictures = [Candidate(x, renderer.image(x, seed=seed, spp=settings.verify_spp)) for x in candidates]
+    spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
+    pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
     listener(Preview(pictures[-1].image))
     best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(perceptual), ldr, compressed)))
     status = Status.CANCELLED if should_stop() else Status.CONVERGED

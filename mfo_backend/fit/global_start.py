@@ -18,13 +18,18 @@ Vector = NDArray[np.float64]
 # Geometric in the lobe width: neighbours' highlights overlap, so one of them lies in the right basin.
 ROUGHNESS_NODES = (0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9)
 SECOND_NODES = (0.3, 0.9)
+# From the middle of the box a mirror-like metal is taken for a black plastic: the diffuse lobe can vanish by a black
+# colour or by full metallic, and the two are different basins. So every roughness is solved as a metal once, too.
+METAL = 0.98
+METAL_SECOND_NODES = (0.6,)
 
 
 @dataclass(frozen=True)
 class ScanNode:
-    """One node of the scan: the scanned values, the best vector found with them held, its cost."""
+    """One node of the scan: the values it held, whether it was held a metal, the best vector and its cost."""
 
     held: tuple[float, ...]
+    metal: bool
     x: Vector
     cost: float
 
@@ -41,29 +46,32 @@ def scan(
     middle of the box solve it; no user start is needed.
     """
     held = [name for name in scanned if name in table.names]
-    grids = [ROUGHNESS_NODES if name == held[0] == scanned[0] else SECOND_NODES for name in held]
-    middle = 0.5 * (table.lower + table.upper)
     nodes = []
-    for values in product(*grids):
-        start, lower, upper = middle.copy(), table.lower, table.upper
-        for name, value in zip(held, values, strict=True):
-            start[table.slice_of(name)] = lower[table.slice_of(name)] = upper[table.slice_of(name)] = value
-        limits = SolveLimits(evaluations=evaluations, cost_change=1e-3, damping=1e-3)
-        solution = solve_bounded(residuals, start, lower, upper, limits)
-        nodes.append(ScanNode(values, solution.x, solution.equations.cost))
+    for metal, second in ((False, SECOND_NODES), (True, METAL_SECOND_NODES)):
+        if metal and "metallic" not in table.names:
+            continue
+        hold = {"metallic": METAL} if metal else {}
+        for values in product(*(ROUGHNESS_NODES if name == scanned[0] else second for name in held)):
+            start, lower, upper = 0.5 * (table.lower + table.upper), table.lower, table.upper
+            for name, value in {**hold, **dict(zip(held, values, strict=True))}.items():
+                part = table.slice_of(name)
+                start[part] = lower[part] = upper[part] = value
+            limits = SolveLimits(evaluations=evaluations, cost_change=1e-3, damping=1e-3)
+            solution = solve_bounded(residuals, start, lower, upper, limits)
+            nodes.append(ScanNode(values, metal, solution.x, solution.equations.cost))
     return sorted(nodes, key=lambda node: node.cost)
 
 
 def different_nodes(nodes: Sequence[ScanNode], count: int) -> list[ScanNode]:
-    """The best `count` nodes that are no neighbours: apart by more than 0.2 in a log lobe width or in another value."""
+    """The best `count` nodes that are no neighbours: apart by more than 0.2 in a log value or in being a metal."""
     chosen: list[ScanNode] = []
     for node in nodes:
-        if all(_apart(node.held, other.held) for other in chosen):
+        if all(_apart(node, other) for other in chosen):
             chosen.append(node)
         if len(chosen) == count:
             break
     return chosen
 
 
-def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return any(abs(np.log(p / q)) > 0.2 for p, q in zip(a, b, strict=True)) or not a
+def _apart(a: ScanNode, b: ScanNode) -> bool:
+    return a.metal != b.metal or any(abs(np.log(p / q)) > 0.2 for p, q in zip(a.held, b.held, strict=True))

@@ -32,8 +32,10 @@ class RecordedPlan:
         Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
     scan_lanes, start_lanes
         Recorded lanes the scan and the fits from its nodes look at.
+    refine_lanes
+        Those the last stage looks at where every light is exact: without noise more of them say nothing new.
     starts
-        Nodes of the scan to start from, besides the material in the scene and a random one.
+        Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     trial_evaluations
         After as many only starts within `keep_factor` of the best cost go on.
     solved_rms
@@ -44,6 +46,7 @@ class RecordedPlan:
     grid_last: int = 8
     scan_lanes: int = 20_000
     start_lanes: int = 80_000
+    refine_lanes: int = 160_000
     starts: int = 3
     trial_evaluations: int = 10
     keep_factor: float = 10.0
@@ -108,6 +111,8 @@ class RecordedFit:
             more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
+            metals = [node for node in nodes if node.metal]
+            starts += [node.x for node in metals[:2] if not any(node.x is x for x in starts)]
             starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
             best = self._race(watched, starts)
             stage.vector = best.x
@@ -151,7 +156,10 @@ class RecordedFit:
             sampled = self.scene.needs.sampled
             if sampled:
                 self.paths = self.scene.record(start, grid=self.plan.grid_last, seed=self.seed + 1, near=True)
-            problem = self.problem(all_groups(self.paths, tiles=sampled), make)
+            groups = all_groups(self.paths, tiles=sampled)
+            if not sampled:
+                groups = fewer_groups(groups, self.reference, self.plan.refine_lanes)
+            problem = self.problem(groups, make)
             solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
             stage.vector = solution.x
         return solution, problem

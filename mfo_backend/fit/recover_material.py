@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fit by the preset the settings name."""
+"""A fit by the preset the settings name, and the way out where that preset cannot do it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from ..metrics.tone_mapping import View
+from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Renderer
+from ..types.errors import UnrecordableError
 from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
@@ -23,6 +26,18 @@ def recover_material(
     listener: Listener,
     should_stop: Callable[[], bool],
 ) -> FitOutcome:
-    """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`)."""
-    fit = fit_material if settings.preset == "paper" else fit_recorded
-    return fit(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
+    """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`).
+
+    A scene that recorded paths cannot hold is fitted by `fit_material` whatever the preset, and a note says so.
+    """
+    reason = ""
+    if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer):
+        try:
+            return fit_recorded(
+                renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
+            )
+        except UnrecordableError as error:
+            reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
+    outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
+    notes = (*outcome.result.notes, *([reason] if reason else []))
+    return replace(outcome, result=replace(outcome.result, notes=notes))

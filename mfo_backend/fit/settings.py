@@ -26,6 +26,9 @@ class FitSettings:
 
     Attributes
     ----------
+    preset
+        ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
+        ``"balanced"``: perceptual least squares from there. They use only `range`, `seed`, `verify_spp` and `region`.
     model, parameters
         Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
         holds Blender's socket values, else Mitsuba's.

@@ -78,7 +78,7 @@ def fit_scene(
             request.target.shape_id,
             model=request.fit.model,
             parameters=request.fit.parameters,
-            materials=_materials(folder, request),
+            materials=request_materials(folder, request),
         )
 
     if request.fit.preset == "paper":
@@ -93,7 +93,7 @@ def fit_scene(
     return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
 
 
-def _materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
+def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
     """The request's materials with textures by absolute path and the Blender version they come from."""
     materials = request_to_json(request)["materials"]
     for material in materials.values():

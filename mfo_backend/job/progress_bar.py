@@ -29,7 +29,7 @@ class ProgressBar:
                     leave=False,
                     disable=None,  # shown on a terminal only
                     miniters=0,
-                    ncols=_columns(),
+                    ncols=terminal_columns(),
                     nrows=20,  # tqdm would ask the terminal, and draw nothing where it reports no rows
                 )
             self._bar.set_description_str(f"{event.stage} ({event.stage_index + 1}/{event.stage_count})", refresh=False)
@@ -50,7 +50,7 @@ class ProgressBar:
             self._bar = None
 
 
-def _columns() -> int:
+def terminal_columns() -> int:
     """Width of the terminal at stderr; some report none, and tqdm would draw nothing there."""
     try:
         return os.get_terminal_size(2).columns or 100

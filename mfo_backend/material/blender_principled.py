@@ -47,8 +47,8 @@ def emitted(parameters: Mapping[str, Any], wi: Any, lobes: Lobes = ALL_LOBES, mo
     return layer_stack(parameters, wi, lobes, model).emission
 
 
-def evaluate(layers: Layers, wo: Any) -> Any:
-    """f_r |cos| of the stack for light from `wo` in the frame of the layers."""
+def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
+    """f_r |cos| of the stack for light from `wo` in the frame of the layers; `reachable_only` as in `refracted`."""
     wi = layers.wi
     above = wo.z > 0
     h = dr.normalize(wi + type(wi)(wo.x, wo.y, dr.abs(wo.z)))
@@ -79,7 +79,7 @@ def evaluate(layers: Layers, wo: Any) -> Any:
         value += layers.subsurface * lambert(up)
     value = dr.select(above & (wi.z > 0), value, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
-        value += refracted(layers, wo)
+        value += refracted(layers, wo, reachable_only=reachable_only)
     return value
 
 
@@ -95,17 +95,21 @@ def refraction_normal(layers: Layers, wo: Any) -> tuple[Any, Any, Any]:
     return h, dr.square(n) / squared * dr.abs(dr.dot(wo, h)), possible
 
 
-def refracted(layers: Layers, wo: Any) -> Any:
+def refracted(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     """f_r |cos| of light that comes through the surface from `wo` below it.
 
-    Cycles also evaluates pairs that no microfacet can connect, which its own sampling never reaches; so does this.
+    Cycles also evaluates pairs that no microfacet can connect, which its own sampling never reaches, so that they count
+    for lights it samples; so does this, unless `reachable_only`.
     """
     assert layers.glass_fresnel is not None
     wi, alpha = layers.wi, layers.glass_alpha
-    h, jacobian, _ = refraction_normal(layers, wo)
+    h, jacobian, possible = refraction_normal(layers, wo)
     c = dr.abs(dr.dot(wi, h))
     g2 = dr.rcp(1 + smith_lambda(wi, alpha, alpha) + smith_lambda(wo, alpha, alpha))
     lobe = density(h, alpha, alpha) * g2 * c * jacobian / dr.maximum(wi.z, 1e-7)
+    counted = (wo.z < 0) & (wi.z > 0)
     return dr.select(
-        (wo.z < 0) & (wi.z > 0), layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe, 0
+        counted & possible if reachable_only else counted,
+        layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe,
+        0,
     )

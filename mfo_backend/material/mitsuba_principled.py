@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..types.errors import BadInputError
+from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable, Value
 from .mitsuba_parameters import MITSUBA_PRINCIPLED
 
@@ -59,19 +59,15 @@ class MitsubaPrincipled:
 
         Raises
         ------
-        BadInputError
+        UnrecordableError
             If the material transmits light.
         """
         if "spec_trans" in free or given.get("spec_trans", 0.0) != 0.0:
-            raise BadInputError(
-                "Material with 'spec_trans': recorded paths hold reflected light only, use the preset 'paper'."
-            )
+            raise UnrecordableError("The material has 'spec_trans' and recorded paths hold reflected light only.")
         unused = {"spec_trans", "specular" if "eta" in {*given, *free} else "eta", *free}
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
 
-    def bind(
-        self, fixed: Mapping[str, Value], free: Collection[str]
-    ) -> Callable[[Mapping, Any, Any], Any]:
+    def bind(self, fixed: Mapping[str, Value], free: Collection[str]) -> Callable[[Mapping, Any, Any], Any]:
         """`evaluate`, which leaves out by itself what is exactly 0."""
         return self.evaluate
 

@@ -20,11 +20,13 @@ def blender_principled_dict(
     distribution: str = "MULTI_GGX",
     version: Sequence[int] = (5, 0),
     free: Collection[str] = (),
+    unreachable_refraction: bool = True,
 ) -> dict[str, Any]:
     """Properties for `mi.load_dict` from `{"Base Color": {"value": [r, g, b]}, ...}`, colours linear Rec.709.
 
     A socket with a `texture` becomes a nested bitmap read without colour conversion. Sockets at their default are left
-    out unless `free`, so that their lobes stay out of the kernel.
+    out unless `free`, so that their lobes stay out of the kernel. `unreachable_refraction` should be False where a
+    uniform world is the only light (see the plugin).
 
     Raises
     ------
@@ -36,6 +38,8 @@ def blender_principled_dict(
         "distribution": distribution,
         "blender_version": ".".join(str(part) for part in tuple(version)[:2]),
     }
+    if not unreachable_refraction:
+        result["unreachable_refraction"] = False
     if free:
         result["free"] = ",".join(BLENDER_PRINCIPLED.select(free).names)
     for socket, content in sockets.items():

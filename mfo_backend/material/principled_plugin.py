@@ -4,8 +4,9 @@
 Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a nested texture read at the surface point,
 further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will
 change after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later
-brings the lobe back and compiles anew. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
-`<id>.<name>.data`.
+brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
+no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `mi.traverse` shows
+`<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`.
 
 A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
 on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
@@ -19,6 +20,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ..types.errors import SetupError
 from ..types.parameter import Value
 from .blender_principled import evaluate
 from .cycles_model import cycles_model
@@ -35,8 +37,11 @@ class BlenderPrincipled(mi.BSDF):
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
+        if not mi.is_rgb:
+            raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
         version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")))
+        self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
         self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
@@ -111,15 +116,21 @@ class BlenderPrincipled(mi.BSDF):
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)
 
+    def _value(self, layers: Layers, local: Any) -> Any:
+        return mi.Color3f(evaluate(layers, local, reachable_only=self.reachable_only))
+
+    def _density(self, layers: Layers, choice: LobeChoice, local: Any) -> Any:
+        return pdf(layers, choice, local, reachable_only=self.reachable_only)
+
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
         layers = self._layers(si, active)
-        return dr.select(active, mi.Color3f(evaluate(layers, layers.to_frame(wo))), 0)
+        return dr.select(active, self._value(layers, layers.to_frame(wo)), 0)
 
     def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""
         layers = self._layers(si, active)
-        return dr.select(active, pdf(layers, self._choice(ctx, layers), layers.to_frame(wo)), 0)
+        return dr.select(active, self._density(layers, self._choice(ctx, layers), layers.to_frame(wo)), 0)
 
     def eval_pdf(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
@@ -127,8 +138,8 @@ class BlenderPrincipled(mi.BSDF):
         """`eval` and `pdf`, the layers evaluated once."""
         layers = self._layers(si, active)
         local = layers.to_frame(wo)
-        density = pdf(layers, self._choice(ctx, layers), local)
-        return dr.select(active, mi.Color3f(evaluate(layers, local)), 0), dr.select(active, density, 0)
+        density = self._density(layers, self._choice(ctx, layers), local)
+        return dr.select(active, self._value(layers, local), 0), dr.select(active, density, 0)
 
     def sample(
         self,
@@ -143,8 +154,8 @@ class BlenderPrincipled(mi.BSDF):
         choice = self._choice(ctx, layers)
         local, lobe, valid = sample(layers, choice, sample1, sample2)
         valid &= active
-        density = pdf(layers, choice, local)
-        weight = mi.Color3f(evaluate(layers, local)) / dr.maximum(density, 1e-30)
+        density = self._density(layers, choice, local)
+        weight = self._value(layers, local) / dr.maximum(density, 1e-30)
         weight = dr.select(density > 0, weight, 0)
         glass = lobe == NAMES.index("glass")
         diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))

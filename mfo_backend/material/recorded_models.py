@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Protocol
 
-from ..types.errors import BadInputError
+from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable, Value
 from .blender_principled import BLENDER_5_0, blender_principled
 from .cycles_model import CyclesModel
@@ -41,7 +41,7 @@ class RecordedModel(Protocol):
 
         Raises
         ------
-        BadInputError
+        UnrecordableError
             If the material transmits light.
         """
         ...
@@ -70,7 +70,7 @@ class BlenderPrincipledModel:
         """See `RecordedModel`."""
         for name, opaque in (("transmission_weight", 0.0), ("alpha", 1.0)):
             if name in free or given.get(name, opaque) != opaque:
-                raise BadInputError(f"Material with {name!r}: recorded paths hold reflected light only, use 'paper'.")
+                raise UnrecordableError(f"The material has {name!r} and recorded paths hold reflected light only.")
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in free}
 
     def bind(self, fixed: Mapping[str, Value], free: Collection[str]) -> Evaluate:
@@ -88,11 +88,11 @@ def recorded_model(name: str, bsdf: Any) -> RecordedModel:
 
     Raises
     ------
-    BadInputError
+    UnrecordableError
         If there is none.
     """
     if name == "mitsuba_principled":
         return MitsubaPrincipled()
     if name == "blender_principled":
         return BlenderPrincipledModel(getattr(bsdf, "model", BLENDER_5_0))
-    raise BadInputError(f"Material model {name!r} has no recorded-path version: use the preset 'paper'.")
+    raise UnrecordableError(f"Material model {name!r} has no recorded-path version.")

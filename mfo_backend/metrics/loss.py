@@ -14,6 +14,7 @@ from .colour import linear_from_srgb, srgb_from_linear
 from .exposure_range import lit_exposures
 from .flip_loss import FlipLoss, HdrFlipLoss
 from .itp import Itp
+from .optional_losses import OPTIONAL_HDR_LOSSES, OPTIONAL_LDR_LOSSES, hdr_perceptual_loss, ldr_perceptual_loss
 from .pixel_check import check_finite, check_mask
 from .pu21 import Pu21
 from .response import OnDisplay, Response, Scaled, displayed_by, logarithmic_for, nits_per_unit, relative_to
@@ -23,6 +24,7 @@ from .tone_mapping import DisplayView, View
 LDR_LOSSES = ("mse-ldr", "pu21-ldr", "itp-ldr", "flip-ldr")
 HDR_LOSSES = ("mse-hdr", "log-hdr", "relative-hdr", "pu21-hdr", "itp-hdr", "flip-hdr")
 LOSS_NAMES = LDR_LOSSES + HDR_LOSSES
+OPTIONAL_LOSS_NAMES = OPTIONAL_LDR_LOSSES + OPTIONAL_HDR_LOSSES  # need PyTorch, and packages or weights of the user
 DISPLAY_NITS = 100.0  # white of a display in cd/m^2 (IEC 61966-2-1 has 80, a usual monitor is set brighter)
 
 
@@ -60,8 +62,9 @@ def make_loss(
     Parameters
     ----------
     name
-        One of `LOSS_NAMES`. The LDR losses compare what a display shows, the HDR losses scene-linear values. All but
-        the FLIP losses are `ResidualLoss` as well.
+        One of `LOSS_NAMES` or `OPTIONAL_LOSS_NAMES`. The LDR losses compare what a display shows, the HDR losses
+        scene-linear values; ``lpips_*-hdr`` is LPIPS(PU). The squared ones of `LOSS_NAMES`, which are all but FLIP,
+        are `ResidualLoss` as well.
     mask
         Pixels (height, width) that see the object; they choose exposures, the error is the mean over all pixels.
     display
@@ -73,9 +76,11 @@ def make_loss(
     BadInputError
         For an unknown name, NaN or infinite pixels, a mask of another size or without pixels, or an HDR loss with
         display values. The loss itself raises it for an image of another size or with NaN or infinite pixels.
+    SetupError
+        If an optional loss lacks its package or weights.
     """
-    if name not in LOSS_NAMES:
-        raise BadInputError(f"Unknown loss {name!r}: choose one of {', '.join(LOSS_NAMES)}.")
+    if name not in LOSS_NAMES + OPTIONAL_LOSS_NAMES:
+        raise BadInputError(f"Unknown loss {name!r}: choose one of {', '.join(LOSS_NAMES + OPTIONAL_LOSS_NAMES)}.")
     check_finite(reference.pixels, "The reference")
     if mask is not None:
         check_mask(mask, reference.pixels.shape[:2])
@@ -89,6 +94,8 @@ def make_loss(
             )
         if kind == "flip":
             return HdrFlipLoss(name, target, lit_exposures(target, mask))
+        if name in OPTIONAL_HDR_LOSSES:
+            return hdr_perceptual_loss(name, target, nits_per_unit(target, mask))
         response = _hdr_response(kind, target, mask)
         return SquaredLoss(name, response.apply(target), response)
 
@@ -102,6 +109,8 @@ def make_loss(
         return FlipLoss(name, light, view)
     if kind == "mse":
         return SquaredLoss(name, srgb_from_linear(light), displayed_by(view))
+    if name in OPTIONAL_LDR_LOSSES:
+        return ldr_perceptual_loss(name, light, view, DISPLAY_NITS)
     on_light = _absolute_response(kind, DISPLAY_NITS)
     return SquaredLoss(name, on_light.apply(light), OnDisplay(view, on_light))
 

@@ -15,9 +15,11 @@ import importlib.util
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -26,6 +28,11 @@ from .cache_folder import cache_folder
 from .llvm_candidates import llvm_candidates
 
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
+_LIBRARY_AT_FAULT = ("LLVM ERROR", "too old")
+_NOT_LOADED = r"ImportError: (\S+\.so[.\d]*): cannot open shared object file"
+_PACKAGE_OF = {
+    "libatomic.so.1": ("libatomic1", "libatomic")
+}  # a minimal Debian has no such package, Dr.Jit links to it
 PROBE_SECONDS = 120.0  # 1.2 s on a quiet core; a loaded machine or a cold disk may take far longer
 
 
@@ -47,6 +54,9 @@ def probe_llvm(path: Path, *, timeout: float = PROBE_SECONDS) -> LlvmVerdict:
     verdict = _probe_in_child(path, timeout)
     if verdict is None:  # says nothing about the library, so it is not kept
         return LlvmVerdict(str(path), False, f"gave no answer within {timeout:.0f} seconds")
+    # any other failure may be the machine's, and be gone after a repair
+    if not verdict.works and not any(mark in verdict.reason for mark in _LIBRARY_AT_FAULT):
+        return verdict
     with contextlib.suppress(OSError):
         remembered.parent.mkdir(parents=True, exist_ok=True)
         remembered.write_text(json.dumps(asdict(verdict)), "utf-8")
@@ -64,6 +74,20 @@ def find_llvm() -> tuple[Path | None, list[LlvmVerdict]]:
     return None, verdicts
 
 
+def missing_system_library(verdicts: Sequence[LlvmVerdict]) -> str:
+    """The shared library for want of which Dr.Jit could not be loaded, such as "libatomic.so.1", else nothing."""
+    found = (re.search(_NOT_LOADED, verdict.reason) for verdict in verdicts)
+    return next((match[1] for match in found if match), "")
+
+
+def library_cure(library: str) -> str:
+    """How to get a missing system library, as the end of a sentence."""
+    package = _PACKAGE_OF.get(library)
+    if package is None:
+        return f"install the package of your system that has {library}."
+    return f"run `apt install {package[0]}` on Debian or Ubuntu, `dnf install {package[1]}` on Fedora."
+
+
 def configure_llvm() -> Path:
     """The libLLVM that Dr.Jit will load, now named in `DRJIT_LIBLLVM_PATH`.
 
@@ -75,6 +99,9 @@ def configure_llvm() -> Path:
     require_mitsuba()
     found, verdicts = find_llvm()
     if found is None:
+        missing = missing_system_library(verdicts)
+        if missing:
+            raise SetupError(f"Dr.Jit needs the system library {missing}, which is missing: {library_cure(missing)}")
         tried = "; ".join(f"{v.path}: {v.reason}" for v in verdicts)
         what = f"No usable LLVM library was found (tried {tried})" if tried else "No LLVM library was found"
         raise SetupError(f"{what}: {llvm_cure()}")
@@ -176,7 +203,7 @@ def _probe_in_child(path: Path, timeout: float) -> LlvmVerdict | None:
 def _reason(stderr: str, returncode: int) -> str:
     """The line of a failed probe's output that says why."""
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
-    for mark in ("LLVM ERROR", "too old", "FMA"):
+    for mark in ("ImportError: lib", *_LIBRARY_AT_FAULT, "FMA"):
         for line in lines:
             if mark in line:
                 return line[line.find("LLVM ERROR") :][:120] if mark == "LLVM ERROR" else line.split(". ")[0][:160]

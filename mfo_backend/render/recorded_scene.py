@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..material.recorded_models import RecordedModel, recorded_model
-from ..types.errors import BadInputError
+from ..types.errors import UnrecordableError
 from ..types.parameter import Value
 from .mitsuba_renderer import MitsubaRenderer
 from .proposal import DefensiveProposal
@@ -46,15 +46,13 @@ class RecordedScene:
 
     Raises
     ------
-    BadInputError
+    UnrecordableError
         If the material has textures or a lobe that recorded paths cannot hold.
     """
 
     def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
         if renderer.shape.is_emitter():
-            raise BadInputError(
-                "The target emits light: recorded paths hold reflected light only, use the preset 'paper'."
-            )
+            raise UnrecordableError("The target emits light and recorded paths hold reflected light only.")
         self.renderer = renderer
         self._covered = covered
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
@@ -123,7 +121,7 @@ def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Val
 
     Raises
     ------
-    BadInputError
+    UnrecordableError
         If one of them is a texture.
     """
     keys = mi.traverse(renderer.shape.bsdf())
@@ -134,9 +132,7 @@ def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Val
         if name is None:
             continue
         if parts[parts.index(name) + 1 :] not in ([], ["value"]):
-            raise BadInputError(
-                f"Parameter {name!r} is a texture: recorded paths need one value, use the preset 'paper'."
-            )
+            raise UnrecordableError(f"Parameter {name!r} is a texture: recorded paths need one value.")
         numbers = np.array(keys[key], np.float64).ravel()
         size = model.table[name].size
         values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))

@@ -22,3 +22,7 @@ class SetupError(MfoError):
     """Something outside the job is missing: a package, LLVM, a Blender program."""
 
     status = Status.SETUP
+
+
+class UnrecordableError(BadInputError):
+    """The target's material or scene is none that recorded light paths can hold; the preset `paper` can."""

@@ -40,7 +40,7 @@ def test_fit_apply_undo_revert(blender: RealBlender, tmp_path: Path, variables: 
     out = blender.script(SCRIPTS / "fit_apply_revert.py", ADDON_ID, str(tmp_path), **variables)
     assert "ALL GOOD" in out
     asked = json.loads((tmp_path / "job" / "request.json").read_text("utf-8"))
-    assert asked["fit"]["preset"] == "paper"
+    assert asked["fit"]["preset"] == "balanced"
     request = pytest.importorskip("mfo_backend.job.request")
     assert request.request_from_json(asked).target.object == "Cube"  # every socket of this version is understood
 

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -14,6 +16,14 @@ from mfo_backend.cli import compare
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.scene.image_file import write_exr, write_png
 from mfo_backend.types.errors import BadInputError
+
+
+@pytest.fixture(autouse=True)
+def _no_judges(request, monkeypatch):
+    """The same metrics on every machine; the judges have tests of their own."""
+    if request.node.get_closest_marker("judges") is None:
+        monkeypatch.setitem(sys.modules, "torch", None)
+        monkeypatch.delenv("MFO_HDRVDP3", raising=False)
 
 
 @pytest.fixture
@@ -49,15 +59,17 @@ def metrics(capsys, folder, *words):
 
 def test_linear_pictures_have_every_metric(files, capsys):
     found = metrics(capsys, files, "ref.exr", "test.exr")["metrics"]
+    judges = {name: found.pop(name) for name in ("jod", "hdrvdp3_q_jod")}
     assert list(found) == ["mse", "log_mse", "relative_mse", "pu21_mse", "flip", "hdr_flip", "de_itp"]
     assert all(value > 0 for value in found.values())
+    assert set(judges.values()) == {None}
     assert found["hdr_flip"] < 1 > found["flip"]
 
 
 def test_display_pictures_have_no_errors_of_radiance(files, capsys):
     content = metrics(capsys, files, "ref.png", "test.png")
     missing = [name for name, value in content["metrics"].items() if value is None]
-    assert missing == ["log_mse", "relative_mse", "hdr_flip"]
+    assert missing == ["log_mse", "relative_mse", "hdr_flip", "jod", "hdrvdp3_q_jod"]
     assert "need two linear pictures" in content["notes"][0]
 
 
@@ -92,14 +104,33 @@ def test_maps_are_written(files, capsys):
 def test_text_names_every_metric(files, capsys):
     assert run(files, "ref.png", "test.png") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines[:7]] == list(compare._MEANINGS)
+    assert [line.split()[0] for line in lines[:9]] == list(compare._MEANINGS)
     assert lines[5].split()[1] == "-"
 
 
 def test_a_black_reference_is_defined(files, capsys):
     found = metrics(capsys, files, "black.exr", "test.exr")["metrics"]
-    assert all(np.isfinite(value) for value in found.values())
+    assert all(np.isfinite(found[name]) for name in found if "jod" not in name)
     assert found["hdr_flip"] > 0
+
+
+def test_absent_judges_are_one_note(files, capsys):
+    notes = metrics(capsys, files, "ref.exr", "test.exr")["notes"]
+    assert [note for note in notes if "pip install" in note] == notes[-1:]
+
+
+@pytest.mark.judges
+@pytest.mark.parametrize(("end", "peak"), [("exr", 1500), ("png", 100)])
+def test_the_judges_score_and_what_they_were_told_is_recorded(files, capsys, end, peak):
+    if not all(map(importlib.util.find_spec, ("torch", "pycvvdp"))):
+        pytest.skip("the extra `judges` is not installed")
+    content = metrics(capsys, files, f"ref.{end}", f"test.{end}")
+    assert 3 < content["metrics"]["jod"] < 9.9
+    told = content["judges"]
+    assert (told["width"], told["height"], told["peak_nits"]) == (30, 24, peak)
+    assert told["pixels_per_degree"] == pytest.approx(67.0206, abs=1e-4)
+    assert f"30x24 pictures on a display of {peak} cd/m^2" in " ".join(content["notes"])
+    assert metrics(capsys, files, f"ref.{end}", f"ref.{end}")["metrics"]["jod"] == 10
 
 
 @pytest.mark.parametrize(

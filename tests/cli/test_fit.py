@@ -138,7 +138,8 @@ def test_a_scene_whose_file_is_missing_leaves_nothing(scene: Path) -> None:
 
 
 def test_a_real_fit_of_a_small_scene(scene: Path) -> None:
-    words = ["--parameters", "base_color", "--max-iterations", "3", "--spp", "1", "--out", "job", "--json"]
+    words = ["--preset", "paper", "--parameters", "base_color", "--max-iterations", "3", "--spp", "1"]
+    words += ["--out", "job", "--json"]
     done = mfo_fit(scene, "--target", "ball", "--reference", "ref.exr", *words, fake=False)
     if done.returncode == 3:
         pytest.skip(done.stderr)

@@ -59,6 +59,20 @@ def test_every_socket_is_in_the_request(scene: Any, export: Any) -> None:
     assert report.request["notes"] == list(report.notes)
 
 
+def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    glow = {"Emission_Color": (1.0, 0.5, 0.2), "Emission_Strength": 2.0}
+    plain, coated = new_material("Plain", Subsurface_Weight=0.3), new_material("Coated", Coat_Weight=0.5, **glow)
+    add_quad("Floor", 1.0, -1.0, new_material("Glow", **glow))
+    add_quad("Wall", 1.0, -2.0, coated)
+    notes = export(add_quad("Target", 1.0, 0.0, plain)).notes
+    assert [note for note in notes if "mitsuba_principled" not in note] == [
+        "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface.",
+        "Material 'Coated': the emission is not dimmed by Coat Weight, as it is in Cycles.",
+    ]
+
+
 def test_pictures_stay_linked(scene: Any, export: Any, mitsuba: Any) -> None:
     """sRGB bytes are decoded, Non-Color is not, float pictures are linear already; channels can be picked."""
     world_color(scene, 1.0)

@@ -11,6 +11,7 @@ from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.certainty import Level
+from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.event import Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
@@ -120,3 +121,61 @@ def test_cancel_returns_the_best_so_far(tmp_path):
     outcome, _ = fit(renderer, reference, stop=lambda: next(calls) > 20)
     assert outcome.result.status is Status.CANCELLED
     assert np.isfinite(renderer.table.pack(outcome.result.recovered)).all()
+
+
+def test_a_reference_with_holes_is_refused(tmp_path):
+    renderer = load(tmp_path, POINT, size=24)
+    reference = renderer.image(renderer.start, seed=5, spp=4)
+    reference[12, 12] = np.nan
+    with pytest.raises(BadInputError, match="1 pixels with NaN"):
+        fit(renderer, reference)
+
+
+def test_a_mirror_like_metal_is_not_taken_for_a_black_plastic(tmp_path):
+    names = [*REDUCED, "spec_tint", "anisotropic", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss"]
+    renderer = load(tmp_path, POINT, names, size=80)
+    truth = {
+        "base_color": (0.16, 0.59, 0.82),
+        "roughness": 0.05,
+        "metallic": 0.999,
+        "anisotropic": 0.54,
+        "spec_tint": 0.9,
+        "sheen": 0.99,
+        "sheen_tint": 0.24,
+        "clearcoat": 0.11,
+        "clearcoat_gloss": 0.35,
+    }
+    x = renderer.table.pack(truth)
+    from mfo_backend.fit.choose_groups import detail_grid
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    # a recording as reference: path tracing finds a highlight narrower than a pixel by luck only
+    scene, mask = RecordedScene(renderer, 3000), renderer.target_mask()
+    reference = np.zeros((80, 80, 3), np.float32)
+    grid: int | np.ndarray = 4
+    for _ in range(2):
+        paths = scene.record(x, grid=grid, seed=3, near=False)
+        groups = paths.pixel_groups()
+        reference.reshape(-1, 3)[groups.pixels] = scene.evaluator(paths, groups)(x)[:, :, 0]
+        grid = detail_grid(reference, mask) + 2
+    outcome, _ = fit(renderer, reference)
+    recovered = outcome.result.recovered
+    assert recovered["metallic"] == pytest.approx(0.999, abs=0.02)
+    assert recovered["roughness"] == pytest.approx(0.05, abs=0.005)
+    np.testing.assert_allclose(recovered["base_color"], truth["base_color"], atol=0.03)
+
+
+def test_what_cannot_be_recorded_is_fitted_by_the_paper_and_says_so(tmp_path):
+    checker = (
+        '<texture type="checkerboard" name="clearcoat"><float name="color0" value="0.2"/>'
+        '<float name="color1" value="0.9"/></texture>'
+    )
+    renderer = load(tmp_path, POINT, ["roughness"], size=16, material=checker)
+    reference = renderer.image(renderer.table.pack({"roughness": 0.3}), seed=5, spp=64)
+    outcome, events = fit(renderer, reference, preset="balanced")
+    (note,) = outcome.result.notes
+    assert "'clearcoat' is a texture" in note
+    assert "'paper' was used instead of 'balanced'" in note
+    assert [stage.name for stage in outcome.result.stages] == ["mse-hdr", "flip-hdr"]
+    assert sum(isinstance(e, Started) for e in events) == 1
+    assert outcome.result.errors["mse"][1] < outcome.result.errors["mse"][0]

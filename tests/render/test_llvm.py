@@ -137,7 +137,7 @@ def test_a_verdict_holds_until_the_file_changes(tmp_path: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"works": true}'])
 def test_a_damaged_verdict_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str) -> None:
-    fresh = llvm.LlvmVerdict(str(tmp_path / "a.so"), False, "fresh")
+    fresh = llvm.LlvmVerdict(str(tmp_path / "a.so"), True, "fresh")
     monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: fresh)
     llvm.probe_llvm(tmp_path / "a.so")
     (kept,) = (cache_folder() / "llvm").iterdir()
@@ -179,6 +179,18 @@ def test_what_was_tried_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: verdict)
     with pytest.raises(SetupError, match=r"tried /x/libLLVM-15\.so: LLVM ERROR: Cannot select"):
         llvm.configure_llvm()
+
+
+def test_a_missing_system_library_is_named_and_not_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stderr = "ImportError: libatomic.so.1: cannot open shared object file: No such file\nNameError: name '_drjit_ext'"
+    monkeypatch.setattr(llvm, "llvm_candidates", lambda: [tmp_path / "libLLVM-19.so"])
+    verdict = llvm.LlvmVerdict("libLLVM-19.so", False, llvm._reason(stderr, 1))
+    monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: verdict)
+    with pytest.raises(SetupError, match=r"needs the system library libatomic\.so\.1.*apt install libatomic1"):
+        llvm.configure_llvm()
+    works = llvm.LlvmVerdict("libLLVM-19.so", True, "")
+    monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout: works)
+    assert llvm.configure_llvm() == tmp_path / "libLLVM-19.so"
 
 
 def test_without_mitsuba_llvm_is_not_blamed(monkeypatch: pytest.MonkeyPatch) -> None:

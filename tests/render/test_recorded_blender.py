@@ -14,8 +14,14 @@ from mfo_backend.types.image import Encoding, Image
 from tests.render.scenes import POINT, SKY, write_scene
 
 NAMES = ["base_color", "metallic", "roughness", "specular_ior_level", "coat_weight", "coat_roughness"]
-TRUTH = {"base_color": (0.7, 0.3, 0.1), "metallic": 0.3, "roughness": 0.4, "specular_ior_level": 0.6, "coat_weight": 0.5,
-         "coat_roughness": 0.15}  # fmt: skip
+TRUTH = {
+    "base_color": (0.7, 0.3, 0.1),
+    "metallic": 0.3,
+    "roughness": 0.4,
+    "specular_ior_level": 0.6,
+    "coat_weight": 0.5,
+    "coat_roughness": 0.15,
+}
 
 
 def load(folder, lights, names=NAMES, sockets=None, **options):

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows summed up per scenario and method. A run that raised stays in every share and counts as an infinite error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from .method import METHODS
+from .row import Row
+from .scenario import SCENARIOS
+
+SOLVED_FLIP = 0.02  # mean FLIP over the object; fixed before the first run
+TARGETS = (0.1, 0.05, SOLVED_FLIP)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One method in one scenario.
+
+    `solved` and `close` count runs with a mean FLIP of at most 0.02 and 0.05. `seconds` are of runs that did not
+    raise: median and 90th percentile. `seconds_per_solved` is the time of all runs over the number solved.
+    `flip` holds the quartiles of all runs.
+    """
+
+    scenario: str
+    method: str
+    runs: int
+    raised: int
+    solved: int
+    close: int
+    seconds: tuple[float, float]
+    seconds_per_solved: float
+    passes: float
+    flip: tuple[float, float, float]
+    relative_rmse: float
+    relit_relative_rmse: float
+
+
+@dataclass(frozen=True)
+class Comparable:
+    """The rows of scenes that every method of their scenario has, in the order of the tables, and the others' count."""
+
+    rows: tuple[Row, ...]
+    left_out: int
+
+
+def comparable(rows: Iterable[Row]) -> Comparable:
+    """Leave out scenes that a stopped bench did not finish: methods are compared on the same ones."""
+    rows = list(rows)
+    methods: dict[str, set[str]] = {}
+    present: dict[tuple[str, int], set[str]] = {}
+    for row in rows:
+        methods.setdefault(row.scenario, set()).add(row.method)
+        present.setdefault((row.scenario, row.scene), set()).add(row.method)
+    kept = [row for row in rows if present[row.scenario, row.scene] == methods[row.scenario]]
+    kept.sort(key=lambda row: (_place(row.scenario, tuple(SCENARIOS)), row.scene, _place(row.method, METHODS)))
+    return Comparable(tuple(kept), len(rows) - len(kept))
+
+
+def summaries(rows: Iterable[Row]) -> list[Summary]:
+    """One summary per scenario and method, in the order of the tables."""
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        groups.setdefault((row.scenario, row.method), []).append(row)
+    order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], METHODS)))
+    return [_summary(scenario, method, groups[scenario, method]) for scenario, method in order]
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """The quantile with linear interpolation (type 7); infinite where it touches an infinite value, NaN of nothing."""
+    if not values:
+        return math.nan
+    ordered = sorted(values)
+    below, part = divmod(share * (len(ordered) - 1), 1.0)
+    low = ordered[int(below)]
+    if part == 0.0:
+        return low
+    high = ordered[int(below) + 1]
+    return high if math.isinf(high) else low + part * (high - low)
+
+
+def error_of(value: float | None) -> float:
+    """An error measure; infinite where there is none."""
+    return math.inf if value is None or math.isnan(value) else value
+
+
+def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
+    seconds = [row.seconds for row in rows if row.seconds is not None]
+    flips = [error_of(row.flip) for row in rows]
+    solved = sum(flip <= SOLVED_FLIP for flip in flips)
+    return Summary(
+        scenario=scenario,
+        method=method,
+        runs=len(rows),
+        raised=sum(bool(row.error) for row in rows),
+        solved=solved,
+        close=sum(flip <= 0.05 for flip in flips),
+        seconds=(quantile(seconds, 0.5), quantile(seconds, 0.9)),
+        seconds_per_solved=sum(seconds) / solved if solved else math.inf,
+        passes=quantile([row.passes for row in rows if row.passes is not None], 0.5),
+        flip=(quantile(flips, 0.25), quantile(flips, 0.5), quantile(flips, 0.75)),
+        relative_rmse=quantile([error_of(row.relative_rmse) for row in rows], 0.5),
+        relit_relative_rmse=quantile([error_of(row.relit_relative_rmse) for row in rows], 0.5),
+    )
+
+
+def _place(name: str, order: Sequence[str]) -> int:
+    return order.index(name) if name in order else len(order)

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfo bench`: speed against error on random scenes, and `mfo bench report DIR`: tables and plots of its rows."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..bench.assets import Assets
+from ..bench.method import METHODS
+from ..bench.report import write_report
+from ..bench.row import Row
+from ..bench.row_file import RowFile, keep_setup
+from ..bench.run_bench import Runner, all_tasks, run_bench
+from ..bench.scenario import SCENARIOS
+from ..job.progress_bar import terminal_columns
+from ..job.stop import StopSignal
+from ..types.errors import BadInputError
+from ..types.status import Status
+
+
+def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
+    """Add `mfo bench` and `mfo bench report`."""
+    parser = subparsers.add_parser(
+        "bench",
+        help="measure speed against error on random scenes",
+        description="Fit random scenes with several methods. An interrupted bench goes on where it stopped.",
+    )
+    parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="again for more (default: all)")
+    parser.add_argument("--method", action="append", choices=METHODS, help="again for more (default: all)")
+    parser.add_argument("--scenes", type=_positive, default=20, metavar="N", help="scenes of each scenario (20)")
+    parser.add_argument("--size", type=_positive, default=128, metavar="PIXELS", help="width and height (128)")
+    parser.add_argument("--out", type=Path, default=Path("mfo-bench"), metavar="DIR", help="folder (mfo-bench)")
+    parser.set_defaults(func=run)
+    actions = parser.add_subparsers(dest="action", metavar="[report DIR]")
+    report = actions.add_parser("report", help="print and write the report of a bench folder")
+    report.add_argument("folder", type=Path, metavar="DIR", help="folder of a bench")
+    report.add_argument("--note", action="append", default=[], help="a remark for the report, such as a busy machine")
+    report.set_defaults(func=run_report)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the bench with real fits, then report."""
+    from ..bench.fit_runner import FitRunner
+    from ..bench.machine import machine_facts
+
+    assets = Assets.find()
+    keep_setup(arguments.out, _setup(arguments, assets))
+    runner = FitRunner(arguments.out / "scenes", arguments.size, assets)
+    return work(arguments, runner, machine_facts(runner.variant))
+
+
+def work(arguments: argparse.Namespace, runner: Runner, machine: dict) -> int:
+    """Run the bench with a given runner; returns the exit code."""
+    from tqdm import tqdm
+
+    file = RowFile(arguments.out)
+    tasks = all_tasks(arguments.scenario or SCENARIOS, arguments.method or METHODS, arguments.scenes)
+    done = {row.key for row in file.read()}
+    left = sum(task.key not in done for task in tasks)
+    print(f"{left} of {len(tasks)} rows to measure, in {file.path}", file=sys.stderr)
+    stop = StopSignal()
+    # disable=None: shown on a terminal only; the time left is reckoned from the mean of all rows so far
+    shape = {"disable": None, "smoothing": 0.0, "ncols": terminal_columns(), "nrows": 20}
+    with stop.watching(), tqdm(total=left, unit="row", **shape) as bar:
+
+        def listener(row: Row) -> None:
+            tqdm.write(_line(row), file=sys.stderr)
+            bar.update()
+
+        def log(text: str) -> None:
+            with open(arguments.out / "errors.log", "a", encoding="utf-8") as errors:
+                errors.write(text + "\n")
+
+        complete = run_bench(
+            tasks, file, runner, machine=machine, listener=listener, should_stop=stop.requested, log=log
+        )
+    if file.read():
+        print(write_report(arguments.out))
+    if not complete:
+        print("mfo: stopped; the same command goes on where it was.", file=sys.stderr)
+        return Status.CANCELLED.exit_code
+    return 0
+
+
+def run_report(arguments: argparse.Namespace) -> int:
+    """Print and write the report of a folder's rows."""
+    if not RowFile(arguments.folder).read():
+        raise BadInputError(f"{arguments.folder} holds no rows of a bench: run `mfo bench --out {arguments.folder}`.")
+    print(write_report(arguments.folder, notes=arguments.note))
+    return 0
+
+
+def _setup(arguments: argparse.Namespace, assets: Assets) -> dict:
+    return {"size": arguments.size, "objects": list(assets.objects), "probes": list(assets.probes)}
+
+
+def _line(row: Row) -> str:
+    name = f"{row.scenario} {row.scene} {row.method}"
+    if row.error:
+        return f"{name}: {row.status}: {row.error}"
+    figures = [(row.seconds, "{:.1f} s"), (row.passes, "{:.0f} passes"), (row.flip, "FLIP {:.4f}")]
+    return f"{name}: {', '.join(form.format(v) for v, form in figures if v is not None)}, {row.status}"
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is not a whole number from 1 on")
+    return value

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Real fits of tiny scenes. Counts are guarded, not seconds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from mfo_backend.bench import fit_runner
+from mfo_backend.bench.assets import Assets
+from mfo_backend.bench.fit_runner import FitRunner
+from mfo_backend.bench.method import method_settings
+from mfo_backend.bench.row import Task
+from mfo_backend.bench.summary import SOLVED_FLIP
+from mfo_backend.types.errors import BadInputError
+
+
+@pytest.fixture(scope="module")
+def runner(tmp_path_factory):
+    return FitRunner(tmp_path_factory.mktemp("bench"), 32, Assets(None))
+
+
+def never() -> bool:
+    return False
+
+
+def test_fast_solves_the_reduced_set(runner):
+    rows = [runner(Task("parameters", scene, "fast"), never) for scene in range(4)]
+    assert sum(r.flip <= SOLVED_FLIP for r in rows) == 4
+    # 88, 45, 36 and 36 when this was written; a stage that runs to its limit costs hundreds
+    assert max(r.passes for r in rows) < 120
+    assert rows[0].warm_up_seconds > 0
+    assert rows[1].warm_up_seconds == 0
+    for r in rows:
+        assert r.flip < r.start_flip
+        assert r.relative_rmse >= 0
+        assert set(r.parameter_errors) == {"base_color", "roughness", "metallic", "specular"}
+
+
+def test_the_truth_itself_has_no_error(runner):
+    runner(Task("parameters", 0, "fast"), never)
+    judge = runner._judge
+    difference = judge.difference(judge.true_values())
+    assert (difference.flip, difference.relative_rmse) == (0.0, 0.0)  # the same picture twice
+    assert judge.relit_relative_rmse(judge.true_values()) == 0.0
+    assert judge.floor.relative_rmse > 0
+
+
+def test_glass_is_refused_by_our_presets(runner):
+    with pytest.raises(BadInputError, match="spec_trans"):
+        runner(Task("transparency", 0, "fast"), never)
+
+
+def test_the_papers_loop_improves_on_the_start_under_a_probe(runner, monkeypatch):
+    monkeypatch.setattr(fit_runner, "method_settings", lambda *a: replace(method_settings(*a), max_iterations=8))
+    row = runner(Task("noise", 0, "mfo-hdr"), never)
+    assert row.status == "max_iterations"
+    assert row.flip < row.start_flip
+    # start; two stages, whose last iteration needs no slope; the final pictures of start and both stages
+    assert row.passes == 1 + 2 * (8 + 7 * 2) + 3
+
+
+def test_a_stopped_fit_is_no_row(runner):
+    assert runner(Task("parameters", 0, "balanced"), lambda: True).status == "cancelled"
