@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics.baked_view import BakedView
+from ..metrics.baked_view import HALF_LEVEL, BakedView
 from ..metrics.itp import Itp
 from ..metrics.pixel_check import check_finite
 from ..metrics.pu21 import Pu21
@@ -78,7 +78,8 @@ def fit_recorded(
     names = (*STAGES, *perceptual)
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
-    fit = RecordedFit(scene, light, mask, plan, settings.seed, course)
+    clipped = _clipped(reference, view)
+    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped)
 
     compressed = _censored(log_residual, reference, view)
     found = fit.start_from_nothing(compressed).x
@@ -128,6 +129,14 @@ def _linear(reference: Image, view: View) -> Pixels:
         return np.maximum(reference.pixels, 0.0)
     assert isinstance(view, DisplayView | BakedView)
     return view.linear(reference.pixels)
+
+
+def _clipped(reference: Image, view: View) -> Pixels | None:
+    """1 where only a lower bound of the radiance is known, else 0; None for a linear reference."""
+    if reference.encoding is Encoding.LINEAR:
+        return None
+    top = view.top if isinstance(view, BakedView) else 1 - HALF_LEVEL
+    return (reference.pixels >= top).astype(np.float32)
 
 
 def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:

@@ -16,7 +16,7 @@ from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
 from .course import Course
 from .global_start import different_nodes, scan
-from .residuals import ImageAndJacobian, Residual, normal_equations
+from .residuals import ImageAndJacobian, OneSidedResidual, Residual, normal_equations
 
 Vector = NDArray[np.float64]
 MakeResidual = Callable[[NDArray[np.float32]], Residual]
@@ -68,7 +68,10 @@ class Problem:
 
 
 class RecordedFit:
-    """The stages of one fit; `reference` is scene-linear, `mask` holds the pixels that see the target."""
+    """The stages of one fit; `reference` is scene-linear, `mask` holds the pixels that see the target.
+
+    `clipped` is 1 where the radiance is only known to be the reference's or more, else 0, (height, width, 3).
+    """
 
     def __init__(
         self,
@@ -78,15 +81,19 @@ class RecordedFit:
         plan: RecordedPlan,
         seed: int,
         course: Course,
+        clipped: NDArray[np.float32] | None = None,
     ) -> None:
         self.scene, self.reference, self.mask = scene, reference, mask
-        self.plan, self.seed, self.course = plan, seed, course
+        self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
         self.table = scene.renderer.table
 
     def problem(self, groups: LaneGroups, make: MakeResidual) -> Problem:
         """The residuals of these groups of the present recording."""
-        return Problem(self.scene.evaluator(self.paths, groups), make(groups.average(self.reference)), groups)
+        residual = make(groups.average(self.reference))
+        if self.clipped is not None:
+            residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
+        return Problem(self.scene.evaluator(self.paths, groups), residual, groups)
 
     def start_from_nothing(self, make: MakeResidual) -> Solution:
         """Stages `scan` and `start`: the best solution from the scan's nodes, the scene's material and a random one."""
@@ -160,7 +167,8 @@ class RecordedFit:
     def polish(self, name: str, groups: LaneGroups, make: MakeResidual, start: Vector) -> Solution:
         """A stage with another residual on the same recording."""
         with self.course.stage(name) as stage:
-            problem = self.problem(groups, make)
+            residual = make(groups.average(self.reference))
+            problem = Problem(self.scene.evaluator(self.paths, groups), residual, groups)
             solution = self._solve(self.course.watch(stage, problem.equations), start, 25)
             stage.vector = solution.x
         return solution

@@ -86,6 +86,23 @@ class CensoredResidual:
         return values, slope * np.where(over, np.float32(0.0), np.float32(1.0))
 
 
+class OneSidedResidual:
+    """Another residual that does not look above the reference where `at_least` (g, 3) says that it is a lower bound.
+
+    Such is the mean of pixels some of which are clipped.
+    """
+
+    def __init__(self, residual: Residual, at_least: NDArray[np.bool_]) -> None:
+        self._residual = residual
+        self._at_least = at_least
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values, slope = self._residual(image)
+        keep = ~(self._at_least & (values > 0))
+        return values * keep, slope * (keep if slope.ndim == 2 else keep[..., None])
+
+
 def residual_rows(table: Rows, residual: Residual) -> NDArray[np.float64]:
     """Values and derivatives (g, 3, 1 + k) of the residual from those of the image."""
     values, slope = residual(table[:, :, 0])

@@ -15,7 +15,7 @@ from .invert_view import coordinates_of
 
 Array = NDArray[np.floating]
 
-_HALF_LEVEL = 0.5 / 255  # display values are given in 8 bits as a rule; closer to the top they count as clipped
+HALF_LEVEL = 0.5 / 255  # display values are given in 8 bits as a rule; closer to the top they count as clipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +52,13 @@ class BakedView:
     @cached_property
     def top(self) -> float:
         """Display values from here on are clipped."""
-        return float(self.table.max()) - _HALF_LEVEL
+        return float(self.table.max()) - HALF_LEVEL
 
     @cached_property
     def white(self) -> NDArray[np.float64]:
         """Radiance (3,) from which on a grey's channels are clipped."""
         grey = np.einsum("iiic->ic", self.table)
-        first = [np.searchsorted(np.maximum.accumulate(grey[:, c]), grey[:, c].max() - _HALF_LEVEL) for c in range(3)]
+        first = [np.searchsorted(np.maximum.accumulate(grey[:, c]), grey[:, c].max() - HALF_LEVEL) for c in range(3)]
         return self._radiance(np.array(first, np.float64))
 
     def display(self, linear: Array) -> Array:

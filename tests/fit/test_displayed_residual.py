@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The residual of display values: its slopes, and its one side where the reference is clipped."""
+"""The residual of display values: its slopes, and the one side of residuals where the reference is clipped."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from mfo_backend.fit.displayed_residual import DisplayedResidual
+from mfo_backend.fit.residuals import OneSidedResidual, RelativeResidual
 from mfo_backend.metrics.tone_mapping import DisplayView
 
 from ..metrics.view_tables import baked, filmic
@@ -45,3 +46,16 @@ def test_an_image_above_white_finds_back_to_an_unclipped_reference():
     # 3 stops at 0.05 a stop on top of the difference from white
     np.testing.assert_allclose(values, 1 - STANDARD.display(np.full((1, 3), 0.5)) + 0.15, atol=1e-4)
     np.testing.assert_allclose(slope[0], np.eye(3) * 0.05 / np.log(2) / 8, rtol=1e-4)
+
+
+def test_mean_of_partly_clipped_pixels_is_a_lower_bound():
+    reference, image = np.full((2, 3), 0.5, np.float32), np.array([[0.7, 0.3, 0.7], [0.7, 0.3, 0.7]], np.float32)
+    at_least = np.array([[True, True, False], [False, False, False]])
+    for plain in (RelativeResidual(reference), DisplayedResidual(STANDARD, reference)):
+        (values, slope), (all_values, all_slope) = OneSidedResidual(plain, at_least)(image), plain(image)
+        keep = np.array([[False, True, True], [True, True, True]])
+        np.testing.assert_array_equal(values[keep], all_values[keep])
+        np.testing.assert_array_equal(slope[keep], all_slope[keep])
+        assert values[0, 0] == 0
+        assert not np.any(slope[0, 0])
+        assert (all_values[:, 0] > 0).all()
