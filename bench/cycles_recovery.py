@@ -159,7 +159,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="keep the scenes here, and do not repeat those that are there")
     chosen = parser.parse_args()
     scenes = [(seed, light) for seed, light in SCENES if not chosen.only or f"{seed}/{light}" in chosen.only]
-    rows, found, notes = [], [], []
+    rows, found = [], []
+    notes: dict[str, list[str]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         for seed, light in scenes:
             folder = (chosen.out or Path(temporary)).absolute() / str(seed)
@@ -169,12 +170,14 @@ def main() -> None:
                 rows.append(f"| {seed} | {light} | failed: {error} |")
             else:
                 rows.append(table_row(seed, light, found[-1]))
-                notes += [f"- scene {seed}: {note}" for note in found[-1].notes]
+                for note in found[-1].notes:
+                    notes.setdefault(note, []).append(str(seed))
             print(rows[-1], flush=True)
     print(summary(found, len(scenes)))
     if not chosen.only:
         text = INTRODUCTION.format(size=chosen.size, samples=chosen.samples, own=OWN_SAMPLES) + "\n".join(rows)
-        said = "\n\nNotes of the exporter and the fit:\n\n" + "\n".join(notes) if notes else ""
+        lines = [f"- {note} Scenes {', '.join(seeds)}." for note, seeds in notes.items()]
+        said = "\n\nNotes of the exporter and the fit:\n\n" + "\n".join(lines) if notes else ""
         TABLE.write_text(f"{text}\n\n{summary(found, len(scenes))}{said}\n", "utf-8")
 
 
