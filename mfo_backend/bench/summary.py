@@ -11,7 +11,7 @@ from .method import METHODS
 from .row import Row
 from .scenario import SCENARIOS
 
-SOLVED_FLIP = 0.02  # mean FLIP over the object; fixed before the first run
+SOLVED_FLIP = 0.02  # mean FLIP over the object; set before the runs of docs/bench
 TARGETS = (0.1, 0.05, SOLVED_FLIP)
 
 
