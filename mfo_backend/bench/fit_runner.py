@@ -71,14 +71,17 @@ class FitRunner:
             self._at = at
 
     def _fit(self, settings: FitSettings, should_stop: Callable[[], bool]) -> FitOutcome:
-        from ..fit.recover_material import recover_material
-        from ..render.renderer import load_renderer
+        from ..fit.fit_material import fit_material
+        from ..fit.fit_recorded import fit_recorded
+        from ..render.mitsuba_renderer import load_mitsuba_renderer
 
         # a renderer of its own for every fit: passes count from 0 and nothing is left over from the fit before
-        renderer = load_renderer(self._scene.file, SHAPE, model=settings.model, parameters=settings.parameters)
-        return recover_material(
-            renderer, self._judge.reference, settings, listener=lambda event: None, should_stop=should_stop
+        renderer = load_mitsuba_renderer(
+            self._scene.file, SHAPE, model=settings.model, parameters=settings.parameters, materials={}
         )
+        # not `recover_material`: a preset that hands a scene over to another has not fitted it
+        fit = fit_material if settings.preset == "paper" else fit_recorded
+        return fit(renderer, self._judge.reference, settings, listener=lambda event: None, should_stop=should_stop)
 
     def _row(self, task: Task, outcome: FitOutcome, warm_up: float) -> Row:
         result = outcome.result
