@@ -7,6 +7,7 @@ columns of a least-squares Jacobian.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,12 +36,12 @@ class Response(Protocol):
         ...
 
 
-class ChannelResponse:
+class ChannelResponse(ABC):
     """A response of each channel to itself alone, given by its slope."""
 
+    @abstractmethod
     def slope(self, linear: Array) -> Array:
         """Derivative of the response, of the shape of `linear`."""
-        raise NotImplementedError
 
     def pullback(self, linear: Array, gradient: Array) -> Array:
         """See `Response`."""

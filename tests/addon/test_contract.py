@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import pytest
-
 from blender_addon import job_process, job_result
 from mfo_backend.types.status import Status
 
@@ -43,14 +41,13 @@ def test_sockets_are_those_of_the_model(addon: object) -> None:
 
 def test_schema_versions_agree(addon: object) -> None:
     from blender_addon.export import job as export
+    from mfo_backend.job import request, result
 
-    request = pytest.importorskip("mfo_backend.job.request")
-    result = pytest.importorskip("mfo_backend.job.result")
     assert job_result.SCHEMA_VERSION == export.SCHEMA_VERSION == request.SCHEMA_VERSION == result.SCHEMA_VERSION
 
 
 def test_backend_accepts_what_is_exported(scene: SimpleNamespace) -> None:
-    request = pytest.importorskip("mfo_backend.job.request")
+    from mfo_backend.job import request
     from mfo_backend.job.job_folder import JobFolder
 
     scene.bpy.ops.mfo.fit(reference=scene.reference, job_folder=scene.job, parameters="roughness", max_iterations=3)

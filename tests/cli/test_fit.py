@@ -141,8 +141,6 @@ def test_a_real_fit_of_a_small_scene(scene: Path) -> None:
     words = ["--preset", "paper", "--parameters", "base_color", "--max-iterations", "3", "--spp", "1"]
     words += ["--out", "job", "--json"]
     done = mfo_fit(scene, "--target", "ball", "--reference", "ref.exr", *words, fake=False)
-    if done.returncode == 3:
-        pytest.skip(done.stderr)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert [stage["name"] for stage in result["stages"]] == ["mse-hdr", "flip-hdr"]
@@ -155,8 +153,6 @@ def test_a_real_fit_of_a_small_scene(scene: Path) -> None:
 def test_an_unknown_parameter_is_named(scene: Path) -> None:
     words = ["--parameters", "shininess", "--out", "job"]
     done = mfo_fit(scene, "--target", "ball", "--reference", "ref.exr", *words, fake=False)
-    if done.returncode == 3:
-        pytest.skip(done.stderr)
     assert done.returncode == 2
     assert "'shininess'" in done.stderr
     assert "roughness" in done.stderr
