@@ -27,11 +27,10 @@ _ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
 @dataclass(frozen=True)
 class BlendFit:
-    """A finished job of a .blend file: its folder, result.json and the sentences of the export."""
+    """A finished job of a .blend file: its folder and the content of result.json."""
 
     job: Path
     result: Mapping[str, Any]
-    notes: tuple[str, ...]
 
 
 def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
@@ -68,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     stream = take_stdout() if arguments.json else None
     job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
     fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, options, arguments.bake_view)
-    saved, notes = None, fit.notes
+    saved, notes = None, tuple(fit.result["notes"])
     if arguments.apply:
         saved = arguments.save_as or arguments.file
         notes += apply_result(host, arguments.file, fit.job, saved)
@@ -102,11 +101,11 @@ def fit_blend(
     """
     is_new = not job.exists()
     words = ["--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)]
-    exported = host.call("export", blend, *words, *(["--bake-view"] if bake_view else []))
+    host.call("export", blend, *words, *(["--bake-view"] if bake_view else []))
     done = run_folder(job, fit_scene, is_new=is_new)
     if done.result is None:
         raise _ERRORS.get(done.status, MfoError)(done.sentence)
-    return BlendFit(job, done.result, tuple(exported.get("notes", ())))
+    return BlendFit(job, done.result)
 
 
 def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path) -> tuple[str, ...]:
