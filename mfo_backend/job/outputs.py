@@ -49,7 +49,7 @@ def write_outputs(
     write_exr(folder.pictures / "result.exr", outcome.result_image)
     report = ReportContent(
         title=_title(request),
-        subtitle=_subtitle(request),
+        subtitle=_subtitle(request, outcome.result.model),
         result=outcome.result,
         pictures=pictures,
         notes=(*notes, *outcome.result.notes),
@@ -72,9 +72,10 @@ def _title(request: Request) -> str:
     return f"{material} on {target.object}" if target.object else material
 
 
-def _subtitle(request: Request) -> str:
+def _subtitle(request: Request, model: str) -> str:
     kind = "scene-linear" if request.encoding.value == "linear" else "sRGB display values"
+    samples = f", {request.fit.spp} samples per pixel" if request.fit.preset == "paper" else ""
     return (
-        f"{request.reference}, {request.width} × {request.height} pixels, {kind}; model {request.fit.model}, "
-        f"preset {request.fit.preset}, {request.fit.spp} samples per pixel, seed {request.fit.seed}"
+        f"{request.reference}, {request.width} × {request.height} pixels, {kind}; model {model}, "
+        f"preset {request.fit.preset}{samples}, seed {request.fit.seed}"
     )
