@@ -33,7 +33,8 @@ collect_ignore = (
 
 @pytest.fixture(scope="session")
 def mitsuba() -> Any:
-    mi = pytest.importorskip("mitsuba")
+    import mitsuba as mi
+
     mi.set_variant("llvm_ad_rgb")
     return mi
 

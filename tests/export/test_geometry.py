@@ -255,10 +255,9 @@ def test_mirrored_object_shades_as_in_cycles(scene: Any, export: Any, render_cyc
 
 def test_mitsuba_command_renders(scene: Any, export: Any, tmp_path: Path) -> None:
     """`mitsuba scene.xml` works from another folder, on a job whose folder has spaces and quotes in its name."""
-    OpenEXR = pytest.importorskip("OpenEXR")
+    import OpenEXR
+
     command = Path(sys.executable).with_name("mitsuba")
-    if not command.exists():
-        pytest.skip("the mitsuba command is not beside this Python")
     world_color(scene, 1.0)
     add_camera("ORTHO", ortho_scale=2.0)
     add_light("SPOT", spot_size=1.0)

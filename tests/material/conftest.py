@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from types import ModuleType
 
+import mitsuba as mi
 import pytest
 
-mi = pytest.importorskip("mitsuba")
 VARIANT = "llvm_ad_rgb"
 
 

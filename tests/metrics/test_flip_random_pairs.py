@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 
+import flip_evaluator as oracle
 import numpy as np
 import pytest
 
@@ -14,7 +15,6 @@ from mfo_backend.metrics.flip_reference import FlipReference
 from mfo_backend.metrics.hdr_flip import HdrFlip, hdr_flip_map
 
 PAIRS = int(os.environ.get("MFO_FLIP_PAIRS", "48"))
-oracle = pytest.importorskip("flip_evaluator")
 
 # Rounding of float32 where FLIP's powers magnify it: a dozen units in the last place of a Lab value near 100 and one of
 # a luminance near 1. Where two pictures nearly agree, both implementations move by what this makes of the exact value.

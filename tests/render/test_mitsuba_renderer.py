@@ -213,7 +213,6 @@ def test_refuses_scenes_that_cannot_be_rendered(tmp_path: Path, change: dict, se
 
 
 def test_an_exr_world_loads_on_a_single_thread(tmp_path: Path) -> None:
-    pytest.importorskip("OpenEXR")
     import OpenEXR
 
     pixels = np.full((8, 16, 3), 0.5, np.float32)

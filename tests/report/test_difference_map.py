@@ -10,9 +10,10 @@ from mfo_backend.report.difference_map import difference_picture, draw_map, magm
 
 
 def test_magma_is_matplotlibs():
-    matplotlib = pytest.importorskip("matplotlib")
+    import matplotlib as mpl
+
     values = np.linspace(0, 1, 256)
-    expected = np.array(matplotlib.colormaps["magma"].colors)
+    expected = np.array(mpl.colormaps["magma"].colors)
     np.testing.assert_allclose(magma(values), expected, atol=3 / 255)  # seventeen nodes of 256
     np.testing.assert_array_equal(magma(np.array([-1, 2, np.nan])), magma(np.array([0, 1, 0])))
 
