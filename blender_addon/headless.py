@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -189,10 +191,20 @@ def _arguments() -> list[str]:
     return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
 
 
+def _leave(code: int) -> NoReturn:
+    """End the process of the bpy module at once: after a render the destructors of bpy 4.5 wait for ever."""
+    import bpy
+
+    sys.stdout.flush()
+    sys.stderr.flush()
+    shutil.rmtree(bpy.app.tempdir, ignore_errors=True)  # what Blender's own end would remove
+    os._exit(code)
+
+
 if __name__ == "__main__":
     if not __package__:  # run by a Blender program as a script: come back as a module of the package
         sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
         from blender_addon import headless
 
         sys.exit(headless.main(_arguments()))
-    sys.exit(main(_arguments()))
+    _leave(main(_arguments()))

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The commands of `headless.py` in a process of the bpy module: answer, exit code, and a clean end."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("bpy", reason="the bpy module is not installed for this Python")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "status"),
+    [
+        (("demo-scene", "{}/scene", "--size", "16"), 0, "ok"),
+        (("render", "{}/no.blend", "--out", "{}/a.exr"), 2, "bad_input"),
+    ],
+    ids=["ok", "bad input"],
+)
+def test_the_process_ends_with_its_code_and_leaves_no_files(
+    arguments: tuple[str, ...], code: int, status: str, tmp_path: Path
+) -> None:
+    (temporary := tmp_path / "temporary").mkdir()
+    words = [word.format(tmp_path) for word in arguments]
+    done = subprocess.run(
+        [sys.executable, "-m", "blender_addon.headless", *words],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)},
+        timeout=60,
+    )
+    assert done.returncode == code
+    assert json.loads(done.stdout.strip().splitlines()[-1])["status"] == status
+    assert list(temporary.iterdir()) == []
