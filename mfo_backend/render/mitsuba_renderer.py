@@ -136,7 +136,7 @@ def load_mitsuba_renderer(
     from ..material.principled_plugin import register
 
     register()
-    with _two_threads():
+    with two_threads():
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
             scene = mi.load_string(to_text(document), optimize=False, parallel=False)
@@ -167,7 +167,7 @@ def _opaque(seed: int) -> Any:
 
 
 @contextlib.contextmanager
-def _two_threads() -> Iterator[None]:
+def two_threads() -> Iterator[None]:
     """Mitsuba 3.9.1 waits for ever for an EXR file when its thread pool holds the calling thread alone."""
     import drjit as dr
 
