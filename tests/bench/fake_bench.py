@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfo bench` in a process of its own with a runner that only waits: python -m tests.bench.fake_bench FOLDER SECONDS."""
+"""`mfo bench` with a runner that only waits: python -m tests.bench.fake_bench FOLDER SECONDS."""
 
 from __future__ import annotations
 
