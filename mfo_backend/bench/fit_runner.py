@@ -18,12 +18,12 @@ from .assets import Assets
 from .busy import BusyMark
 from .judge import Judge, TruePictures
 from .method import METHODS, method_settings, warm_up_settings
-from .new_seeds import NewSeeds
 from .row import Row, Task
 from .row_pictures import picture_file, shown_picture
 from .scenario import SCENARIOS
 from .scene import SHAPE, BenchScene, write_scene
 from .stopwatch import Stopwatch
+from .wrapped_renderer import NewSeeds
 
 
 @dataclass(frozen=True)
