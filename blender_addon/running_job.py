@@ -177,7 +177,7 @@ def _handle(job: RunningJob, event: Event) -> None:
         elif event["event"] == "stage_end":
             line = "{stage}: {loss_start:.3g} to {loss_best:.3g}, {iterations} iterations ({status})"
             add_message(runtime, line.format_map(event), "CHECKMARK")
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
         return  # a newer backend says less or more than we know; its result is what counts
     redraw()
 

@@ -140,7 +140,7 @@ def load_mitsuba_renderer(
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
             scene = mi.load_string(to_text(document), optimize=False, parallel=False)
-        except RuntimeError as error:
+        except (RuntimeError, UnicodeDecodeError) as error:  # a message may hold bytes of a damaged file
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
