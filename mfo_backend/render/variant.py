@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import Any
 
 from ..types.errors import SetupError
+from .plugins import trust_only_mitsuba
 
 CANDIDATES = ("llvm_ad_rgb", "metal_ad_rgb") if sys.platform != "darwin" else ("metal_ad_rgb", "llvm_ad_rgb")
 
@@ -29,7 +28,7 @@ def load_variant(name: str | None = None) -> str:
         raise SetupError(
             f"Mitsuba cannot be imported ({error}): install mitsuba 3.9.1, then run `mfo doctor`."
         ) from None
-    _trust_only_mitsuba(mi)
+    trust_only_mitsuba()
     current = mi.variant()
     if current is not None and "_ad_rgb" in current and name in (None, current):
         return current
@@ -45,11 +44,3 @@ def load_variant(name: str | None = None) -> str:
         else:
             return candidate
     raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")
-
-
-def _trust_only_mitsuba(mi: Any) -> None:
-    """Have plugins taken from Mitsuba's own folder: it looks into the working folder first, and a stranger's
-    ``plugins/diffuse.so`` there would run."""
-    resolver = mi.file_resolver()
-    resolver.clear()
-    resolver.append(str(Path(mi.__file__).parent))
