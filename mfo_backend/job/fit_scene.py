@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from ..metrics.tone_mapping import View
@@ -13,6 +13,11 @@ from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from .job_folder import JobFolder
 from .request import Request, request_to_json
+
+_WITHOUT_LIGHT_PATHS = (
+    "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
+    "limits for one kind of bounce."
+)
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,7 @@ def fit_scene(
             model=request.fit.model,
             parameters=request.fit.parameters,
             materials=request_materials(folder, request),
+            light_paths=request.light_paths,
         )
 
     if request.fit.preset == "paper":
@@ -90,7 +96,10 @@ def fit_scene(
     outcome = recover_material(
         renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
     )
-    return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
+    result = outcome.result
+    if request.light_paths is not None and result.model == "mitsuba_principled":
+        result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
+    return JobOutcome(result, outcome.start_image, outcome.result_image, variant)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
