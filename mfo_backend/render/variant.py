@@ -44,3 +44,10 @@ def load_variant(name: str | None = None) -> str:
         else:
             return candidate
     raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")
+
+
+def use_threads(count: int) -> None:
+    """Limit the threads of this process' kernels, for several processes on one machine; choose the variant before."""
+    import drjit as dr
+
+    dr.set_thread_count(count)
