@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from .backend_python import EXTENSION_ROOT, backend_environment
+from .process_group import KILL, TERMINATE, own_group, signal_group
 
 LOG = "backend.log"
 Event = dict[str, Any]
@@ -88,7 +89,7 @@ class JobProcess:
                 stderr=log,
                 cwd=root,  # not the job folder: `-m` imports from here, and a job may come from a stranger
                 env=backend_environment(root),
-                **_own_group(),
+                **own_group(),
             )
         self._reader = threading.Thread(target=self._read, name="mfo-reader", daemon=True)
         self._reader.start()
@@ -130,7 +131,7 @@ class JobProcess:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(grace)
             if self._process.poll() is None:
-                self._signal(_KILL)
+                signal_group(self.pid, KILL)
                 self._process.wait()
             self._reader.join(PIPE_GRACE)
             self._end()
@@ -206,22 +207,11 @@ class JobProcess:
 
     def _stop_after(self, seconds: float) -> None:
         now = time.monotonic()
-        self._deadlines = [(now + seconds, signal.SIGTERM), (now + seconds + TERMINATE_GRACE, _KILL)]
+        self._deadlines = [(now + seconds, TERMINATE), (now + seconds + TERMINATE_GRACE, KILL)]
 
     def _escalate(self) -> None:
         if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self._process.poll() is None:
-            self._signal(self._deadlines.pop(0)[1])
-
-    def _signal(self, number: int) -> None:
-        """Signal the whole group, so that what the backend started ends with it."""
-        with contextlib.suppress(OSError):
-            if os.name == "nt":
-                subprocess.run(["taskkill", "/T", "/F", "/PID", str(self.pid)], capture_output=True, check=False)
-            else:
-                os.killpg(self.pid, number)
-
-
-_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has no SIGKILL; taskkill /F is one anyway
+            signal_group(self.pid, self._deadlines.pop(0)[1])
 
 
 def log_tail(path: Path, lines: int = 40) -> str:
@@ -242,12 +232,6 @@ def _lines(stream: IO[bytes]) -> Iterator[bytes]:
             if not skipping and line.endswith(b"\n"):
                 yield line
             skipping = not line.endswith(b"\n")
-
-
-def _own_group() -> dict[str, Any]:
-    if os.name == "nt":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
-    return {"start_new_session": True}
 
 
 def _signal_name(number: int) -> str:
