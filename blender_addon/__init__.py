@@ -7,7 +7,7 @@ import atexit
 
 import bpy
 
-from . import handlers, panel, preferences, previews, properties, running_job
+from . import backend_state, handlers, panel, preferences, previews, properties, running_job
 from .operators import CLASSES as OPERATORS
 from .versions import is_module
 
@@ -21,6 +21,7 @@ def register() -> None:
     properties.attach()
     previews.register()
     handlers.register()
+    backend_state.register()
     if is_module():
         atexit.register(unregister)  # what is still registered at its end crashes bpy 4.2 and stops bpy 4.5
 
@@ -29,6 +30,7 @@ def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
     running_job.close()
+    backend_state.close()
     handlers.unregister()
     previews.unregister()
     properties.detach()

@@ -11,9 +11,8 @@ import textwrap
 import bpy
 
 from . import previews
-from .backend_python import is_chosen
+from .backend_section import draw_setup, has_trouble, needs_setup
 from .operators.pictures import job_folder_of
-from .preferences import ADDON_ID, preference
 from .properties import chosen_of
 
 
@@ -68,16 +67,15 @@ class MFO_PT_fit(_Panel, bpy.types.Panel):
         layout.separator()
         if running:
             _draw_progress(layout, runtime)
-        elif not is_chosen(preference(context, "backend_python")) and ADDON_ID in context.preferences.addons:
-            _wrapped(layout, context, "Fits run in a Python of their own that has Mitsuba.", "INFO")
-            layout.operator(
-                "preferences.addon_show", text="Choose Backend Python", icon="PREFERENCES"
-            ).module = ADDON_ID
+        elif needs_setup():
+            draw_setup(layout, width=_letters(context))
         else:
             row = layout.row(align=True)
             row.scale_y = 1.4
             row.operator("mfo.fit", icon="PLAY")
             row.operator("mfo.check", text="", icon="VIEWZOOM")
+            if has_trouble():
+                draw_setup(layout, width=_letters(context))
         if runtime.state in {"DONE", "FAILED"}:
             box = layout.box()
             box.alert = runtime.state == "FAILED"
@@ -182,10 +180,15 @@ def _draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection,
             legend.label(text=words, icon=icon)
 
 
+def _letters(context: bpy.types.Context) -> int:
+    """How many letters a line of the sidebar holds."""
+    scale = context.preferences.system.ui_scale
+    return max(16, int((context.region.width / scale - 75) / 5.8))  # 5.8 px is an average letter at scale 1
+
+
 def _wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
     """A sentence over as many lines as the sidebar needs; labels do not wrap."""
-    scale = context.preferences.system.ui_scale
-    width = max(16, int((context.region.width / scale - 75) / 5.8))  # 5.8 px is an average letter at scale 1
+    width = _letters(context)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for i, line in enumerate(textwrap.wrap(text, width) or [""]):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: fit, cancel, check, apply, revert, look at pictures and report."""
+"""What a user or a script can do: set up the backend, fit, cancel, check, apply, revert, look at pictures."""
 
-from . import apply, fit, pictures
+from . import apply, backend, fit, pictures
 
-CLASSES = (*fit.CLASSES, *apply.CLASSES, *pictures.CLASSES)
+CLASSES = (*fit.CLASSES, *apply.CLASSES, *pictures.CLASSES, *backend.CLASSES)

@@ -11,10 +11,10 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from .. import running_job
-from ..backend_python import BackendPythonError, backend_python
+from ..backend_python import BackendPythonError
 from ..export.job import ExportError, check_export, export_job
 from ..job_process import JobProcess
-from ..preferences import new_job_folder, preference
+from ..preferences import chosen_python, new_job_folder
 from ..properties import chosen_of
 from ..write_back import WriteBackError, principled_node
 
@@ -99,7 +99,7 @@ class MFO_OT_fit(bpy.types.Operator):
         material = _active_material(obj)
         reference = _reference(settings, self.reference)
         try:
-            python = backend_python(bpy.path.abspath(preference(context, "backend_python")))
+            python = chosen_python(context)
         except BackendPythonError as error:
             raise FitError(str(error)) from error
         given = bpy.path.abspath(self.job_folder)
