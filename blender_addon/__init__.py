@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import handlers, panel, preferences, previews, properties, running_job
+from . import comparison, cycles_check, handlers, panel, preferences, preflight, previews, properties, running_job
 from .operators import CLASSES as OPERATORS
+from .panel import menu
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
 
@@ -17,13 +18,18 @@ def register() -> None:
         bpy.utils.register_class(cls)
     properties.attach()
     previews.register()
+    menu.register()
     handlers.register()
 
 
 def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     running_job.close()
+    cycles_check.close()
     handlers.unregister()
+    preflight.reset()
+    comparison.forget()
+    menu.unregister()
     previews.unregister()
     properties.detach()
     for cls in reversed(CLASSES):

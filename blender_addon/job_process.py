@@ -88,7 +88,7 @@ class JobProcess:
                 stderr=log,
                 cwd=root,  # not the job folder: `-m` imports from here, and a job may come from a stranger
                 env=backend_environment(root),
-                **_own_group(),
+                **own_group(),
             )
         self._reader = threading.Thread(target=self._read, name="mfo-reader", daemon=True)
         self._reader.start()
@@ -213,12 +213,7 @@ class JobProcess:
             self._signal(self._deadlines.pop(0)[1])
 
     def _signal(self, number: int) -> None:
-        """Signal the whole group, so that what the backend started ends with it."""
-        with contextlib.suppress(OSError):
-            if os.name == "nt":
-                subprocess.run(["taskkill", "/T", "/F", "/PID", str(self.pid)], capture_output=True, check=False)
-            else:
-                os.killpg(self.pid, number)
+        signal_group(self.pid, number)
 
 
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has no SIGKILL; taskkill /F is one anyway
@@ -244,7 +239,17 @@ def _lines(stream: IO[bytes]) -> Iterator[bytes]:
             skipping = not line.endswith(b"\n")
 
 
-def _own_group() -> dict[str, Any]:
+def signal_group(pid: int, number: int) -> None:
+    """Signal the group of a process made with `own_group`, so that what it started ends with it."""
+    with contextlib.suppress(OSError):
+        if os.name == "nt":
+            subprocess.run(["taskkill", "/T", "/F", "/PID", str(pid)], capture_output=True, check=False)
+        else:
+            os.killpg(pid, number)
+
+
+def own_group() -> dict[str, Any]:
+    """Arguments of `Popen` that give the process a group of its own, which `signal_group` ends as a whole."""
     if os.name == "nt":
         return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}

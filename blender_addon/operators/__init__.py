@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: fit, cancel, check, apply, revert, look at pictures and report."""
+"""What a user or a script can do: check, fit, cancel, apply, revert, go back in the history, look at pictures."""
 
-from . import apply, fit, pictures
+from . import apply, check, cycles, fit, history, pictures
 
-CLASSES = (*fit.CLASSES, *apply.CLASSES, *pictures.CLASSES)
+CLASSES = (
+    *check.CLASSES,
+    *fit.CLASSES,
+    *apply.CLASSES,
+    *history.CLASSES,
+    *cycles.CLASSES,
+    *pictures.CLASSES,
+)
