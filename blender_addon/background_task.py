@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .job_process import log_tail, own_group, signal_group
+from .job_process import log_tail
+from .process_group import KILL, own_group, signal_group
 
 _SAMPLE = re.compile(r"Sample (\d+)/(\d+)")  # as Cycles prints it
-_KILL = 9
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class BackgroundTask:
     def close(self) -> None:
         """Kill the program that runs, with all it started."""
         if self._process is not None:
-            signal_group(self._process.pid, _KILL)
+            signal_group(self._process.pid, KILL)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(2.0)
             self._process = None

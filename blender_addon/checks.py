@@ -88,7 +88,7 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material) -> list[F
             fix = (Fix("all_parameters"),)
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
-    found = [Finding(FINE, f"Material '{material.name}' has a Principled BSDF.")]
+    found = [Finding(FINE, f"'{material.name}' has a Principled BSDF.")]
     if linked:
         sentence = f"{', '.join(linked)} of material '{material.name}' keep what is linked to them and are not fitted."
         found.append(Finding(IGNORED, sentence, tuple(Fix("unlink", name) for name in linked[:3])))

@@ -62,6 +62,11 @@ def move_split(share: float) -> None:
     image.update()
 
 
+def has_split() -> bool:
+    """Whether there is a line that can be moved."""
+    return _halves is not None and SPLIT in bpy.data.images
+
+
 def forget() -> None:
     """Free the pixels kept for `move_split`."""
     global _halves

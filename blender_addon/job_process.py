@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from .backend_python import EXTENSION_ROOT, backend_environment
+from .process_group import KILL, TERMINATE, own_group, signal_group
 
 LOG = "backend.log"
 Event = dict[str, Any]
@@ -130,7 +131,7 @@ class JobProcess:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(grace)
             if self._process.poll() is None:
-                self._signal(_KILL)
+                signal_group(self.pid, KILL)
                 self._process.wait()
             self._reader.join(PIPE_GRACE)
             self._end()
@@ -206,17 +207,11 @@ class JobProcess:
 
     def _stop_after(self, seconds: float) -> None:
         now = time.monotonic()
-        self._deadlines = [(now + seconds, signal.SIGTERM), (now + seconds + TERMINATE_GRACE, _KILL)]
+        self._deadlines = [(now + seconds, TERMINATE), (now + seconds + TERMINATE_GRACE, KILL)]
 
     def _escalate(self) -> None:
         if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self._process.poll() is None:
-            self._signal(self._deadlines.pop(0)[1])
-
-    def _signal(self, number: int) -> None:
-        signal_group(self.pid, number)
-
-
-_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has no SIGKILL; taskkill /F is one anyway
+            signal_group(self.pid, self._deadlines.pop(0)[1])
 
 
 def log_tail(path: Path, lines: int = 40) -> str:
@@ -237,22 +232,6 @@ def _lines(stream: IO[bytes]) -> Iterator[bytes]:
             if not skipping and line.endswith(b"\n"):
                 yield line
             skipping = not line.endswith(b"\n")
-
-
-def signal_group(pid: int, number: int) -> None:
-    """Signal the group of a process made with `own_group`, so that what it started ends with it."""
-    with contextlib.suppress(OSError):
-        if os.name == "nt":
-            subprocess.run(["taskkill", "/T", "/F", "/PID", str(pid)], capture_output=True, check=False)
-        else:
-            os.killpg(pid, number)
-
-
-def own_group() -> dict[str, Any]:
-    """Arguments of `Popen` that give the process a group of its own, which `signal_group` ends as a whole."""
-    if os.name == "nt":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
-    return {"start_new_session": True}
 
 
 def _signal_name(number: int) -> str:

@@ -186,7 +186,7 @@ def _handle(job: RunningJob, event: Event) -> None:
             runtime.fraction = float(event["fraction"])
             if not job.process.cancelling:
                 runtime.progress_text = progress_text(event)
-            runtime.detail = f"{event['stage']}, step {event['iteration']}, error {float(event['best']):.3g}"
+            runtime.detail = f"{event['stage']} · step {event['iteration']} · error {float(event['best']):.3g}"
         elif event["event"] == "preview":
             _show_preview(job, "current", event["path"])
             if "difference" in event:
@@ -202,7 +202,7 @@ def _handle(job: RunningJob, event: Event) -> None:
 def _show_preview(job: RunningJob, name: str, relative: str) -> None:
     path = (job.process.folder / relative).resolve()
     if path.is_relative_to(job.process.folder.resolve()):
-        previews.show(name, path)
+        previews.show(name, path, now=True)
 
 
 def progress_text(event: Event) -> str:

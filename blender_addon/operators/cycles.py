@@ -8,8 +8,8 @@ import bpy
 from bpy.props import StringProperty
 
 from .. import cycles_check, preflight, shown_result
-from ..backend_python import BackendPythonError, backend_python
-from ..preferences import new_job_folder, preference
+from ..preferences import new_job_folder
+from .fit_options import FitError, python_of
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
@@ -45,9 +45,9 @@ class MFO_OT_check_in_cycles(bpy.types.Operator):
         result, material = shown_result.result, shown_result.material()
         assert result is not None
         try:
-            python = backend_python(bpy.path.abspath(preference(context, "backend_python")))
-            cycles_check.check_result(result.folder, material.name if material else result.material_name, python)
-        except (BackendPythonError, OSError) as error:
+            name = material.name if material else result.material_name
+            cycles_check.check_result(result.folder, name, python_of(context))
+        except (FitError, OSError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return _wait_in_background(self, context)

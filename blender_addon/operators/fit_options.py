@@ -6,6 +6,7 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
@@ -73,10 +74,7 @@ class FitOptions:
         settings = context.scene.mfo
         material = _active_material(obj)
         reference = _reference(settings, self.reference)
-        try:
-            python = backend_python(bpy.path.abspath(preference(context, "backend_python")))
-        except BackendPythonError as error:
-            raise FitError(str(error)) from error
+        python = python_of(context)
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
@@ -88,7 +86,7 @@ class FitOptions:
         picture = folder / report.request["reference"]["path"]
         return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
 
-    def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, object]:
+    def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
         model = self.model or settings.model
         parameters: object = self.parameters or settings.parameter_set
         if parameters == "chosen":
@@ -109,6 +107,14 @@ class FitOptions:
         if compared not in ("auto", "hdr", "ldr"):
             raise FitError(f"range is {compared!r}: give 'hdr', 'ldr' or 'auto'.")
         return fit if compared == "auto" else fit | {"range": compared}
+
+
+def python_of(context: bpy.types.Context) -> Path:
+    """The interpreter of the backend; raises `FitError` where there is none."""
+    try:
+        return backend_python(bpy.path.abspath(preference(context, "backend_python")))
+    except BackendPythonError as error:
+        raise FitError(str(error)) from error
 
 
 def target_of(context: bpy.types.Context, name: str) -> bpy.types.Object:

@@ -51,6 +51,8 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
         """Set the sockets from the values in the .blend; the job folder may be gone."""
         material = _material(context)
         entry = history.chosen(material)
+        assert material is not None
+        assert entry is not None  # see poll
         try:
             notes = apply_values(material, history.values_of(entry), Path(entry.job_folder))
         except WriteBackError as error:
@@ -79,8 +81,11 @@ class MFO_OT_show_past(_PastResult, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Read its job folder."""
         material = _material(context)
+        entry = history.chosen(material)
+        assert material is not None
+        assert entry is not None
         try:
-            _show(Path(history.chosen(material).job_folder), material.session_uid)
+            _show(Path(entry.job_folder), material.session_uid)
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, f"{error} Its values are kept here and can be applied.")
             return {"CANCELLED"}
@@ -96,7 +101,9 @@ class MFO_OT_remove_past(_PastResult, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Remove it and mark the one before."""
-        kept = _material(context).mfo
+        material = _material(context)
+        assert material is not None
+        kept = material.mfo
         kept.history.remove(kept.history_index)
         kept.history_index = max(0, min(kept.history_index, len(kept.history) - 1))
         return {"FINISHED"}

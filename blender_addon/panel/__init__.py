@@ -21,7 +21,7 @@ _PLACES = {
 def _panels(place: str) -> list[type]:
     """The panel of one place and its sub-panels."""
     root = f"MFO_PT_{place}"
-    settings = {"bl_idname": root, **_PLACES[place]}
+    settings: dict[str, object] = {"bl_idname": root, **_PLACES[place]}
     if place == "properties":
         settings["bl_options"] = {"DEFAULT_CLOSED"}
     made = [type(root, (reference.Reference, bpy.types.Panel), settings)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import cycles_check, previews
+from .. import comparison, cycles_check, previews
 from .layout import draw_messages, draw_pictures, draw_sentence
 from .result import draw_table
 
@@ -30,7 +30,8 @@ class Compare:
         row = column.row(align=True)
         row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
         row.operator("mfo.show_pictures", text="Split", icon="ARROW_LEFTRIGHT").show = "split"
-        column.prop(runtime, "split", slider=True)
+        if comparison.has_split():
+            column.prop(runtime, "split", slider=True)
         draw_table(layout, runtime.errors, "Error")
         _draw_cycles(layout, context, runtime)
         row = layout.row(align=True)

@@ -14,12 +14,16 @@ _LABELS = {"cycles": "In Cycles", "cycles_difference": "Difference"}
 
 def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
     """A sentence over as many lines as the region needs; labels do not wrap."""
-    scale = context.preferences.system.ui_scale
-    width = max(16, int((context.region.width / scale - 90) / 5.8))  # 5.8 px is an average letter at scale 1
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(text, width) or [""]):
+    for i, line in enumerate(textwrap.wrap(text, letters(context)) or [""]):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
+
+
+def letters(context: bpy.types.Context) -> int:
+    """How many letters a line of the region holds."""
+    scale = context.preferences.system.ui_scale
+    return max(16, int((context.region.width / scale - 90) / 5.8))  # 5.8 px is an average letter at scale 1
 
 
 def draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...], *, clickable: bool = False) -> None:

@@ -37,7 +37,7 @@ class Result:
         row.operator("mfo.apply", text="Apply", icon="CHECKMARK")
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         applied = material is not None and bool(material.mfo.originals)
-        shows_own = applied and material.mfo.shows_original
+        shows_own = material is not None and applied and material.mfo.shows_original
         text = ("A: own values" if shows_own else "B: recovered values") if applied else "A/B"
         column.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         if runtime.has_result:

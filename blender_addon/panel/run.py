@@ -38,7 +38,7 @@ class Run:
             ).module = ADDON_ID
             return
         if running_job.current is not None:
-            _draw_progress(layout, runtime)
+            _draw_progress(layout, context)
         _draw_buttons(layout, context)
         _draw_queue(layout, context)
         if runtime.state in {"DONE", "FAILED"}:
@@ -59,13 +59,16 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
 
 
-def _draw_progress(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup) -> None:
+def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    runtime = context.window_manager.mfo_runtime
     column = layout.column()
     row = column.row(align=True)
     row.scale_y = 1.4
     row.progress(factor=runtime.fraction, type="BAR", text=runtime.progress_text)
     row.operator("mfo.cancel", text="", icon="X")
-    column.label(text=f"{runtime.material}: {runtime.detail}" if runtime.detail else runtime.material, icon="MATERIAL")
+    if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
+        column.label(text=f"Of material {runtime.material}", icon="MATERIAL")
+    column.label(text=runtime.detail)
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:
         draw_pictures(column, shown)

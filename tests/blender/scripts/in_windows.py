@@ -41,7 +41,8 @@ def timed_draw(draw):
 the_tick = running_job._tick
 running_job._tick = lambda: timed(the_tick)
 for cls in panel.CLASSES:
-    cls.draw = timed_draw(cls.draw)
+    if issubclass(cls, bpy.types.Panel):
+        cls.draw = timed_draw(cls.draw)
 
 
 def over():
