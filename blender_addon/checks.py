@@ -6,6 +6,7 @@ The export itself checks more (geometry, lights, visibility): `mfo.check` adds w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,11 +74,11 @@ def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fin
     if not material.is_editable:
         sentence = f"Material '{material.name}' comes from a library: a fit runs, but its values cannot be applied."
         found.append(Finding(IGNORED, sentence, (Fix("make_local"),)))
-    found += _free_values(scene, material)
+    found += _free_values(scene, material, "".join(findings.errors))
     return found
 
 
-def _free_values(scene: bpy.types.Scene, material: bpy.types.Material) -> list[Finding]:
+def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str) -> list[Finding]:
     node = principled_node(material)
     assert node is not None
     linked = [s.name for s in node.inputs if s.name in _FITTED and source_of(s) is not None]
@@ -89,8 +90,9 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material) -> list[F
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
     found = [Finding(FINE, f"'{material.name}' has a Principled BSDF.")]
+    linked = [name for name in linked if f"{name} of material" not in said]
     if linked:
-        sentence = f"{', '.join(linked)} of material '{material.name}' keep what is linked to them and are not fitted."
+        sentence = f"Linked and therefore not fitted: {', '.join(linked)}."
         found.append(Finding(IGNORED, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
     return found
 
@@ -116,16 +118,31 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
 def _reference(scene: bpy.types.Scene) -> list[Finding]:
     settings = scene.mfo
     try:
-        if settings.reference_source == "IMAGE":
-            return [_image_reference(scene, settings)]
-        return [_file_reference(scene, settings)]
+        found = _image_reference(settings) if settings.reference_source == "IMAGE" else _file_reference(settings)
     except ExportError as problem:
         return [Finding(STOPS, str(problem), problem.fixes)]
     except OSError as problem:
         return [Finding(STOPS, f"The reference cannot be read ({problem.strerror or problem}): choose another file.")]
+    problems = []
+    if all(found.size):
+        problems += _refused(refuse_size, found.name, found.size, picture_size(scene.render))
+    words = "scene-linear Rec.709"
+    if not found.is_linear:
+        problems += _refused(needs_table, scene, found.name, settings.bake_view)
+        view = scene.view_settings.view_transform
+        words = f"display colours under the {'baked ' if settings.bake_view and view != 'Standard' else ''}view {view}"
+    return problems or [Finding(FINE, f"Reference: {found.words}, {words}.")]
 
 
-def _file_reference(scene: bpy.types.Scene, settings: bpy.types.PropertyGroup) -> Finding:
+@dataclass(frozen=True)
+class _Picture:
+    name: str
+    size: tuple[int, int]  # width and height, 0 where unknown
+    words: str
+    is_linear: bool
+
+
+def _file_reference(settings: bpy.types.PropertyGroup) -> _Picture:
     if not settings.reference_path:
         raise ExportError("No reference is chosen: give the picture whose material is to be recovered.")
     path = Path(bpy.path.abspath(settings.reference_path))
@@ -135,14 +152,12 @@ def _file_reference(scene: bpy.types.Scene, settings: bpy.types.PropertyGroup) -
     header = read_header(path)
     if header is None:
         raise ExportError(f"The reference {path.name} holds no picture its name promises: choose another file.")
-    if header.width:
-        refuse_size(path.name, (header.width, header.height), picture_size(scene.render))
-    is_linear = path.suffix.lower() in LINEAR_SUFFIXES
     words = f"{header.width} x {header.height}, {header.depth} {header.kind}" if header.width else header.kind
-    return Finding(FINE, f"Reference: {words}, {_encoding(scene, settings, path.name, is_linear)}.")
+    is_linear = path.suffix.lower() in LINEAR_SUFFIXES
+    return _Picture(path.name, (header.width, header.height), words, is_linear)
 
 
-def _image_reference(scene: bpy.types.Scene, settings: bpy.types.PropertyGroup) -> Finding:
+def _image_reference(settings: bpy.types.PropertyGroup) -> _Picture:
     image = settings.reference_image
     if image is None:
         raise ExportError("No reference is chosen: choose an image of this file, or a picture on disk.")
@@ -152,20 +167,18 @@ def _image_reference(scene: bpy.types.Scene, settings: bpy.types.PropertyGroup) 
     except UnreadableImageError as problem:
         fixes = (Fix("colorspace", "sRGB"), Fix("colorspace", "Linear Rec.709")) if "colour" in str(problem) else ()
         raise ExportError(f"The reference '{image.name}' {problem}.", *fixes) from None
-    refuse_size(image.name, tuple(image.size), picture_size(scene.render))
-    is_linear = not holds_display_colours(image)
-    space = "raw numbers taken as" if is_data(image) else image.colorspace_settings.name + ","
-    words = f"{image.size[0]} x {image.size[1]}, {space} {_encoding(scene, settings, image.name, is_linear)}"
-    return Finding(FINE, f"Reference: {words}.")
+    width, height = image.size
+    space = "raw numbers taken as colours" if is_data(image) else image.colorspace_settings.name
+    return _Picture(image.name, (width, height), f"{width} x {height}, {space}", not holds_display_colours(image))
 
 
-def _encoding(scene: bpy.types.Scene, settings: bpy.types.PropertyGroup, name: str, is_linear: bool) -> str:
-    """The colours of a reference in words; raises `ExportError` for a view that cannot be undone."""
-    if is_linear:
-        return "scene-linear Rec.709"
-    if needs_table(scene, name, settings.bake_view):
-        return f"display colours under the baked view {scene.view_settings.view_transform}"
-    return "display colours under the view Standard"
+def _refused(check: Callable[..., object], *arguments: object) -> list[Finding]:
+    """What a check of the export refuses, as lines."""
+    try:
+        check(*arguments)
+    except ExportError as problem:
+        return [Finding(STOPS, str(problem), problem.fixes)]
+    return []
 
 
 def _can_be_fitted(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:

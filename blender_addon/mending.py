@@ -177,7 +177,7 @@ KINDS = {
     "camera": Kind("Use {}", "Make this the scene's camera", _camera),
     "new_camera": Kind("Add Camera", "Add a camera that looks as the viewport does and use it", _new_camera),
     "perspective": Kind("Make Perspective", "Make the scene's camera a perspective one", _perspective),
-    "resolution": Kind("Render {}", "Set the output resolution to the reference's, at 100 %", _resolution),
+    "resolution": Kind("Set Output to {}", "Set the output resolution to the reference's, at 100 %", _resolution),
     "whole_frame": Kind("Whole Frame", "Turn Render Region off", _whole_frame),
     "one_eye": Kind("Turn Off", "Turn stereoscopy off", _one_eye),
     "cycles": Kind("Use Cycles", "Set the render engine to Cycles", _cycles),

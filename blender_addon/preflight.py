@@ -45,6 +45,11 @@ def show_thorough(found: tuple[Finding, ...]) -> None:
     findings, is_thorough = found, True
 
 
+def by_export() -> tuple[Finding, ...]:
+    """What is ignored according to an export, and the quick check does not know: long sentences, rarely news."""
+    return tuple(finding for finding in findings if finding.level == IGNORED and finding not in _quick)
+
+
 def count(level: str) -> int:
     """How many lines have this level."""
     return sum(finding.level == level for finding in findings)

@@ -22,8 +22,6 @@ def _panels(place: str) -> list[type]:
     """The panel of one place and its sub-panels."""
     root = f"MFO_PT_{place}"
     settings: dict[str, object] = {"bl_idname": root, **_PLACES[place]}
-    if place == "properties":
-        settings["bl_options"] = {"DEFAULT_CLOSED"}
     made = [type(root, (reference.Reference, bpy.types.Panel), settings)]
     for body in _BODIES:
         name = f"{root}_{body.__name__.lower()}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import preflight
+from .. import preflight, running_job
 from ..checks import FINE, IGNORED, STOPS, Finding
 from ..mending import KINDS
 from .layout import draw_sentence
@@ -23,12 +23,24 @@ class Check:
         words, icon = preflight.summary()
         self.layout.label(text=words, icon=icon)  # type: ignore[attr-defined]  # from Panel
 
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Hidden while a fit runs: its job has been exported, and the pictures need the room."""
+        return running_job.current is None
+
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the list and the button that reads the whole scene."""
         layout = self.layout  # type: ignore[attr-defined]
+        folded = preflight.by_export()
         column = layout.column()
         for finding in preflight.findings:
-            _draw_finding(column, context, finding)
+            if finding not in folded:
+                _draw_finding(column, context, finding)
+        if folded:
+            header, body = layout.panel("mfo_left_out", default_closed=True)
+            header.label(text=f"Left out by the export ({len(folded)})", icon="INFO")
+            for finding in folded if body else ():
+                _draw_finding(body, context, finding)
         text = "Check Everything Again" if preflight.is_thorough else "Check Everything"
         layout.operator("mfo.check", text=text, icon="VIEWZOOM")
 

@@ -23,9 +23,9 @@ class MFO_UL_history(bpy.types.UIList):
     ) -> None:
         """Draw one result; the one on the material has a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
-        split = layout.split(factor=0.6)
+        split = layout.split(factor=0.5)
         split.label(text=item.name[5:16], icon="CHECKMARK" if applied else "TIME")
-        right = split.split(factor=0.6)
+        right = split.split(factor=0.58)
         right.label(text="cancelled" if item.partial else item.preset)
         right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
 

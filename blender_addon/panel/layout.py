@@ -23,7 +23,7 @@ def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: 
 def letters(context: bpy.types.Context) -> int:
     """How many letters a line of the region holds."""
     scale = context.preferences.system.ui_scale
-    return max(16, int((context.region.width / scale - 90) / 5.8))  # 5.8 px is an average letter at scale 1
+    return max(16, int((context.region.width / scale - 80) / 5.8))  # 5.8 px is an average letter at scale 1
 
 
 def draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...], *, clickable: bool = False) -> None:

@@ -15,10 +15,14 @@ class Parameters:
 
     bl_label = "Values to Fit"
 
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Hidden while a fit runs."""
+        return running_job.current is None
+
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice and, for Chosen, a line for each value."""
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
-        layout.enabled = running_job.current is None
         layout.row().prop(settings, "parameter_set", expand=True)
         if settings.parameter_set != "chosen":
             return

@@ -18,7 +18,7 @@ _CERTAINTY = {
 class Result:
     """Put the values on the material, or take them away."""
 
-    bl_label = "Apply"
+    bl_label = "Result"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
