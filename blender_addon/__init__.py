@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import atexit
+
 import bpy
 
 from . import comparison, cycles_check, handlers, panel, preferences, preflight, previews, properties, running_job
 from .operators import CLASSES as OPERATORS
 from .panel import menu
+from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
 
@@ -20,10 +23,13 @@ def register() -> None:
     previews.register()
     menu.register()
     handlers.register()
+    if is_module():
+        atexit.register(unregister)  # what is still registered at its end crashes bpy 4.2 and stops bpy 4.5
 
 
 def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
+    atexit.unregister(unregister)
     running_job.close()
     cycles_check.close()
     handlers.unregister()

@@ -65,19 +65,18 @@ def socket_to_parameter(socket_name: str) -> str:
 def apply_values(material: bpy.types.Material, values: Mapping[str, Value], folder: Path) -> list[str]:
     """Set the unlinked sockets in `values` (linear Rec.709), keep what they were, return what was skipped and why.
 
-    A second call keeps the originals of the first one, so that `revert_values` always leads to the user's own material.
+    Nothing is set before all of it is known to fit. A second call keeps the originals of the first one, so that
+    `revert_values` always leads to the user's own material.
 
     Raises
     ------
     WriteBackError
-        If the material is read-only or has no Principled node.
+        If the material is read-only, has no Principled node, or a value is none that its socket can hold.
     """
     if not material.is_editable:
         raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
     node, kept = principled_node(material), material.mfo
-    if kept.shows_original:
-        toggle_values(material)  # so that what is kept as the original stays apart from what was applied
-    notes = []
+    notes, changes = [], []
     for name, value in values.items():
         socket = node.inputs.get(name)
         if socket is None:
@@ -85,10 +84,14 @@ def apply_values(material: bpy.types.Material, values: Mapping[str, Value], fold
         elif socket.is_linked:
             notes.append(f"{name} has a link and was left as it is.")
         else:
-            if socket.name not in kept.originals:
-                keep_value(kept.originals, name, socket.default_value)
-            _set(socket, value)
-            keep_value(kept.applied, name, socket.default_value)
+            changes.append((socket, _fitting(socket, value)))
+    if kept.shows_original:
+        toggle_values(material)  # so that what is kept as the original stays apart from what was applied
+    for socket, value in changes:
+        if socket.name not in kept.originals:
+            keep_value(kept.originals, socket.name, socket.default_value)
+        socket.default_value = value
+        keep_value(kept.applied, socket.name, socket.default_value)
     kept.job_folder = str(folder)
     return notes
 
@@ -102,7 +105,7 @@ def toggle_values(material: bpy.types.Material) -> list[str]:
     left, entered = (kept.originals, kept.applied) if kept.shows_original else (kept.applied, kept.originals)
     for value in left:
         socket = node.inputs.get(value.name)
-        if socket is not None:
+        if socket is not None and value.size == len(_numbers(socket)):
             keep_value(left, value.name, socket.default_value)
     kept.shows_original = not kept.shows_original
     return _restore(node, entered)
@@ -138,17 +141,29 @@ def _restore(node: bpy.types.ShaderNode, values: bpy.types.bpy_prop_collection) 
         socket = node.inputs.get(entry.name)
         if socket is None:
             notes.append(f"{entry.name} does not exist any more and was skipped.")
+        elif entry.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
+            notes.append(f"{entry.name} was kept as {entry.size} numbers and could not be set.")
         else:
             socket.default_value = kept_value(entry)
     return notes
 
 
-def _set(socket: bpy.types.NodeSocket, value: Value) -> None:
-    if isinstance(value, (int, float)):
-        socket.default_value = value
-    elif socket.type == "RGBA":
-        matrix = working_space_to_rec709()
-        color = np.array(value[:3]) if matrix is None else np.linalg.solve(matrix, value[:3])
-        socket.default_value = (*color, socket.default_value[3])
-    else:
-        socket.default_value = value
+def _numbers(socket: bpy.types.NodeSocket) -> tuple[float, ...]:
+    value = getattr(socket, "default_value", ())  # a shader socket has none
+    return (value,) if isinstance(value, (int, float)) else tuple(value)
+
+
+def _fitting(socket: bpy.types.NodeSocket, value: Value) -> Value:
+    """The value as the socket takes it: a number, or as many as it has."""
+    held = _numbers(socket)
+    given = value if isinstance(value, tuple) else (value,)
+    is_color = socket.type == "RGBA"
+    if len(given) not in ((3, 4) if is_color else (len(held),)):
+        raise WriteBackError(
+            f"The result has {len(given)} numbers for {socket.name}, which holds {len(held)}: run the fit again."
+        )
+    if not is_color:
+        return given if len(held) > 1 else given[0]
+    matrix = working_space_to_rec709()
+    color = np.array(given[:3]) if matrix is None else np.linalg.solve(matrix, given[:3])
+    return (*map(float, color), held[3])
