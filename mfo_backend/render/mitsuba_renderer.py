@@ -155,7 +155,7 @@ def load_mitsuba_renderer(
     cycles_path.register()
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
-    with _two_threads():
+    with two_threads():
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
             scene = mi.load_string(to_text(document), optimize=False, parallel=False)
@@ -199,7 +199,7 @@ def _opaque(seed: int) -> Any:
 
 
 @contextlib.contextmanager
-def _two_threads() -> Iterator[None]:
+def two_threads() -> Iterator[None]:
     """Mitsuba 3.9.1 waits for ever for an EXR file when its thread pool holds the calling thread alone."""
     import drjit as dr
 
