@@ -7,6 +7,7 @@ import os
 import sys
 
 from ..types.errors import SetupError
+from .plugins import trust_only_mitsuba
 
 CANDIDATES = ("llvm_ad_rgb", "metal_ad_rgb") if sys.platform != "darwin" else ("metal_ad_rgb", "llvm_ad_rgb")
 
@@ -28,6 +29,7 @@ def load_variant(name: str | None = None) -> str:
         raise SetupError(
             f"Mitsuba cannot be imported ({error}): install mitsuba 3.9.1, then run `mfo doctor`."
         ) from None
+    trust_only_mitsuba()
     current = mi.variant()
     if current is not None and "_ad_rgb" in current and name in (None, current):
         return current
