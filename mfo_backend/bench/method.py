@@ -68,7 +68,7 @@ def method_settings(method: str, scenario: Scenario, seed: int) -> FitSettings:
 
     What the paper leaves open (Adam's rate, its schedule, the limit of iterations) is the preset's default.
     """
-    chosen = {"model": "mitsuba_principled", "parameters": scenario.fitted, "seed": seed, "spp": scenario.fit_spp}
+    chosen = {"model": scenario.model, "parameters": scenario.fitted, "seed": seed, "spp": scenario.fit_spp}
     return FitSettings(**chosen, **METHODS[method].settings)
 
 

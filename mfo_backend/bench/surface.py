@@ -22,8 +22,7 @@ from .assets import Assets
 from .judge import Judge
 from .method import METHODS, method_settings
 from .scenario import SCENARIOS
-from .scene import SHAPE, write_scene
-from .scene_text import principled
+from .scene import SHAPE, materials_of, shown_bsdf, write_scene
 from .wrapped_renderer import Watched
 
 
@@ -71,12 +70,13 @@ def measure_surface(
         raise BadInputError("A loss surface needs two different parameters and a scenario that has true values.")
     judge = Judge(scene)
     start = {**judge.true_values(), **{name: scene.start.get(name, 0.0) for name in names}}
-    before = principled("target_bsdf", scene.start, two_sided="spec_trans" not in scene.start)
-    after = principled("target_bsdf", start, two_sided="spec_trans" not in scene.start)
     file = folder / "surface.xml"
-    file.write_text(scene.file.read_text("utf-8").replace(before, after), "utf-8")
+    text = scene.file.read_text("utf-8").replace(shown_bsdf(chosen, scene.start), shown_bsdf(chosen, start))
+    file.write_text(text, "utf-8")
     settings = method_settings(method, chosen, number)
-    renderer = load_mitsuba_renderer(file, SHAPE, model=settings.model, parameters=names, materials={})
+    renderer = load_mitsuba_renderer(
+        file, SHAPE, model=settings.model, parameters=names, materials=materials_of(chosen, start)
+    )
     if (renderer.table.names != names and renderer.table.names != names[::-1]) or renderer.table.length != 2:
         raise BadInputError(f"A loss surface needs two scalar parameters, not {names[0]!r} and {names[1]!r}.")
     names = (renderer.table.names[0], renderer.table.names[1])
