@@ -13,7 +13,6 @@ from mfo_backend.bench.fit_runner import FitRunner
 from mfo_backend.bench.method import method_settings
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.summary import SOLVED_FLIP
-from mfo_backend.types.errors import BadInputError
 
 
 @pytest.fixture(scope="module")

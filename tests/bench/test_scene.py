@@ -96,6 +96,8 @@ def test_methods_are_what_they_are_called(method):
     assert (settings.seed, settings.spp, settings.parameters) == (7, 4, "all")
     if method in ("fast", "balanced"):
         assert settings.preset == method
+    elif method.startswith("lpips"):
+        assert settings.stage_names(Encoding.LINEAR) == ("lpips_alex-hdr" if "pu" in method else "lpips_alex-ldr",)
     elif method in PAPER_METHODS:
         stages = {"mse": ["mse"], "flip": ["flip"], "mfo": ["mse", "flip"]}[method[:-4]]
         assert list(settings.stage_names(Encoding.LINEAR)) == [f"{stage}-{method[-3:]}" for stage in stages]
