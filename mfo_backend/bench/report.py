@@ -180,7 +180,9 @@ def _floor(rows: Sequence[Row]) -> str:
     count = len({row.scene for row in rows})
     plural = "" if count == 1 else "s"
     noise = f"median FLIP of the reference's own noise {number(floor)}, of the start {number(start)}"
-    return f"{count} scene{plural}; {noise}."
+    gaps = [row.gap_flip for row in scenes if row.gap_flip is not None]
+    gap = f"; of our own picture of the true values against Cycles' {number(quantile(gaps, 0.5))}" if gaps else ""
+    return f"{count} scene{plural}; {noise}{gap}."
 
 
 def _table(table: Sequence[Summary]) -> Table:
