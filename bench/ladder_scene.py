@@ -237,9 +237,7 @@ class _Study:
         if name not in self._losses:
             background = self._run(())[0][0].image
             full = loss_in_range(name, "hdr")
-            (self._losses[name],) = stage_losses(
-                [full], self._reference, background, self._mask, self._settings, None
-            )
+            (self._losses[name],) = stage_losses([full], self._reference, background, self._mask, self._settings, None)
         return self._losses[name]
 
 
