@@ -195,7 +195,7 @@ class _Study:
         self._ends: dict[Ladder, tuple[Sequence[Candidate], float, dict[str, int]]] = {(): ((start,), 1.0, {})}
 
     def climb(self, ladder: Ladder) -> tuple[Vector, float, dict[str, int]]:
-        """Values a fit with these stages ends with: the best of start and stages under the last loss and new samples."""
+        """Values a fit with these stages ends with: the best under the last loss on new samples; passes; iterations."""
         candidates, passes, iterations = self._run(ladder)
         loss = self._loss(ladder[-1])
         values = [loss.value(self._verified.image(c.vector, seed=0, spp=0)) for c in candidates]

@@ -69,7 +69,7 @@ def deep_colour(path: Path, most_pixels: int) -> NDArray[np.uint16] | None:
 
 
 def _image_data(data: bytes) -> Iterator[bytes]:
-    """The contents of the IDAT chunks."""
+    """The contents of the IDAT chunks; raises `zlib.error` for one whose checksum is not its own."""
     at = 8
     while at + 8 <= len(data):
         (length,) = struct.unpack(">I", data[at : at + 4])
@@ -77,7 +77,10 @@ def _image_data(data: bytes) -> Iterator[bytes]:
         if kind == b"IEND":
             return
         if kind == b"IDAT":
-            yield data[at + 8 : at + 8 + length]
+            end = at + 8 + length
+            if data[end : end + 4] != struct.pack(">I", zlib.crc32(data[at + 4 : end])):
+                raise zlib.error("checksum")
+            yield data[at + 8 : end]
         at += length + 12
 
 
