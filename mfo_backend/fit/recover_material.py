@@ -14,6 +14,7 @@ from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
 from .fit_recorded import fit_recorded
+from .fit_transmission import fit_transmission
 from .settings import FitSettings
 
 
@@ -32,12 +33,13 @@ def recover_material(
     """
     reason = ""
     if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer):
-        try:
-            return fit_recorded(
-                renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
-            )
-        except UnrecordableError as error:
-            reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
+        # light through the target has no stages for losses of the user's choice
+        fits = (fit_recorded, fit_transmission) if settings.losses is None else (fit_recorded,)
+        for fit in fits:
+            try:
+                return fit(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
+            except UnrecordableError as error:
+                reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
     settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
     notes = (*outcome.result.notes, *([reason] if reason else []))

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
+from .picture_size import Size, check_declared_size
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _CHANNELS = {2: 3, 4: 2, 6: 4}  # colour type to channels: RGB, grey with alpha, RGBA
@@ -25,7 +26,7 @@ _CHANNELS = {2: 3, 4: 2, 6: 4}  # colour type to channels: RGB, grey with alpha,
 _ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 
 
-def deep_colour(path: Path, most_pixels: int) -> NDArray[np.uint16] | None:
+def deep_colour(path: Path, size: Size | None = None) -> NDArray[np.uint16] | None:
     """The picture (height, width, channels) of a PNG file, or None if it has not 16 bits in several channels.
 
     Two channels are grey and alpha, three colour, four colour and alpha.
@@ -33,7 +34,7 @@ def deep_colour(path: Path, most_pixels: int) -> NDArray[np.uint16] | None:
     Raises
     ------
     BadInputError
-        If such a file is damaged or has more than `most_pixels`.
+        If such a file is damaged, too large, or declares another `size` (width, height).
     """
     data = path.read_bytes()
     if data[:8] != _SIGNATURE or data[12:16] != b"IHDR" or len(data) < 33:
@@ -41,8 +42,7 @@ def deep_colour(path: Path, most_pixels: int) -> NDArray[np.uint16] | None:
     width, height, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", data[16:29])
     if depth != 16 or colour not in _CHANNELS:
         return None
-    if width * height > most_pixels:
-        raise BadInputError(f"Image {path.name!r} is {width}x{height}: at most {most_pixels} pixels are read.")
+    check_declared_size(path.name, (width, height), size)
     channels = _CHANNELS[colour]
     passes = [(0, 0, 1, 1)] if not interlaced else _ADAM7
     sizes = [(-(-(width - x) // dx), -(-(height - y) // dy)) for x, y, dx, dy in passes]
@@ -52,7 +52,7 @@ def deep_colour(path: Path, most_pixels: int) -> NDArray[np.uint16] | None:
         raw = zlib.decompressobj().decompress(b"".join(_image_data(data)), expected)
     except (zlib.error, struct.error):
         raw = b""
-    if not width * height or len(raw) < expected:
+    if len(raw) < expected:
         raise BadInputError(f"Image {path.name!r} cannot be read: the file is damaged or not an image.")
     picture = np.empty((height, width, channels), np.uint16)
     start = 0
