@@ -101,6 +101,6 @@ def _unfiltered(kinds: NDArray[np.uint8], coded: NDArray[np.uint8]) -> NDArray[n
         estimate = left + up - corner
         to_left, to_up, to_corner = abs(estimate - left), abs(estimate - up), abs(estimate - corner)
         nearest = np.where((to_left <= to_up) & (to_left <= to_corner), left, np.where(to_up <= to_corner, up, corner))
-        guess = np.choose(kind[y], [0, left, up, (left + up) >> 1, nearest])
+        guess = np.choose(kind[y], np.stack([np.zeros_like(left), left, up, (left + up) >> 1, nearest]))
         out[y + 1, x + 1] = (coded[y, x] + guess) & 0xFF
     return np.ascontiguousarray(out[1:, 1:].astype(np.uint8))
