@@ -58,7 +58,10 @@ def _fuzz(record: Any) -> str:
 
 def _kill(record: Any) -> str:
     a, b = record["blender"], record["backend"]
-    after = ", ".join(f"{count} after '{step}'" for step, count in sorted(a["killed_after"].items()))
+    order = {"none": "starting", "opened": "exporting", "started": "fitting", "fitted": "applying", "applied": "saving",
+             "saved": "done"}  # fmt: skip
+    killed = a["killed_after"]
+    after = ", ".join(f"{killed[step]} while {word}" for step, word in order.items() if step in killed)
     rows = [
         ("moments", a["moments"], b["moments"]),
         ("of them before the end", a["moments"] - a["killed_after"].get("saved", 0), b["killed"]),
@@ -71,7 +74,7 @@ def _kill(record: Any) -> str:
         ("processes left after 12 s", a["orphans"], "-"),
         ("temporary files after the next start", len(a["left_after_next_start"]), len(b["left"])),
     ]
-    return _table(("", "Blender killed", "backend killed"), rows) + f"\nBlender's last announced step: {after}.\n"
+    return _table(("", "Blender killed", "backend killed"), rows) + f"\nBlender was killed {after}.\n"
 
 
 def _limits(record: Any) -> str:
@@ -130,14 +133,16 @@ def memory_plot(record: Any, width: int = 640, height: int = 220) -> str:
 
     def line(values: list[float], top: float, color: str) -> str:
         step = (width - 60) / max(len(values) - 1, 1)
-        points = " ".join(f"{50 + i * step:.1f},{height - 25 - (height - 50) * v / top:.1f}" for i, v in enumerate(values))
+        points = " ".join(
+            f"{50 + i * step:.1f},{height - 25 - (height - 50) * v / top:.1f}" for i, v in enumerate(values)
+        )
         return f'<polyline fill="none" stroke="{color}" stroke-width="1.5" points="{points}"/>'
 
     top, slow = 1.1 * max(megabytes), 1.1 * max(seconds)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" '
         f'font-size="11"><rect width="{width}" height="{height}" fill="white"/>'
-        f'{line(seconds, slow, "#bbbbbb")}{line(megabytes, top, "#1f77b4")}'
+        f"{line(seconds, slow, '#bbbbbb')}{line(megabytes, top, '#1f77b4')}"
         f'<text x="50" y="15">resident memory, 0 to {top:.0f} MB (blue), and seconds of a fit, 0 to {slow:.1f} (grey)'
         f'</text><text x="{width - 70}" y="{height - 8}">fit {len(megabytes)}</text></svg>\n'
     )
