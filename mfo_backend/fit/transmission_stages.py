@@ -98,12 +98,12 @@ class TransmissionFit:
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.table = paths.table
         self._width = self.table.upper - self.table.lower
-        # values besides those of the glass stay as in the scene until the polish
+        # values besides those of the glass stay as in the scene until the polish; without glass none does
         self._extras = np.ones(self.table.length, bool)
         for name in CORE:
             if name in self.table.names:
                 self._extras[self.table.slice_of(name)] = False
-        if self._extras.all():
+        if "transmission_weight" not in self.table.names:
             self._extras[:] = False
 
     def tiles(self, size: int, most: int) -> TileRows:
@@ -141,7 +141,7 @@ class TransmissionFit:
         """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
         moved, where = [], []
         for i, x in enumerate(xs):
-            if self._value(x, "roughness") >= SECANT_BELOW:
+            if self.paths.roughness(x) >= SECANT_BELOW:
                 continue
             for name in GEOMETRIC:
                 if name not in self.table.names:
@@ -157,11 +157,6 @@ class TransmissionFit:
             images = trace(np.array(moved), False)[..., 0]
             for image, (i, k, h) in zip(images, where, strict=True):
                 tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
-
-    def _value(self, x: Vector, name: str) -> float:
-        if name in self.table.names:
-            return float(x[self.table.slice_of(name).start])
-        return float(np.mean(np.array(getattr(self.paths._bsdf, name))))
 
     def scan(self) -> list[tuple[float, Vector]]:
         """Stage `scan`: all nodes of roughness and index with the best other values, best first."""

@@ -96,6 +96,7 @@ def record_paths(
         ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
+        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
         if settings.two_sided or shape.bsdf().class_name() == "TwoSided":
             si = _face_camera(si)
         held = ()
@@ -109,6 +110,12 @@ def record_paths(
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
+        if glow is not None:
+            pixel = rays.pixel[np.array(position)]
+            flat = constant.reshape(-1, 3)
+            dr.eval(glow)
+            for channel in range(3):
+                flat[:, channel] += np.bincount(pixel, glow[channel].numpy(), len(flat))
         merged = _merge(lanes, rays, covered, coverage, constant, settings.held)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")

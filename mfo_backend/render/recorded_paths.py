@@ -135,7 +135,7 @@ class RecordedPaths:
         Share of each covered pixel's filter weight that lies on the target.
     constant
         What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
-        seen in covered pixels; 0 elsewhere.
+        seen in covered pixels, the target's own emission; 0 elsewhere.
     held
         Values that a texture gives the material, by name: one number or colour for each lane.
     """

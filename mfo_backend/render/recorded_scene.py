@@ -51,15 +51,15 @@ class RecordedScene:
     """
 
     def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
-        if renderer.shape.is_emitter():
-            raise UnrecordableError("The target emits light and recorded paths hold reflected light only.")
+        self._integrator = renderer.scene.integrator()
+        if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
+            raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
         self._covered = covered
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
-        self._integrator = renderer.scene.integrator()
         self.needs = self._probe()
 
     def _probe(self) -> SceneNeeds:

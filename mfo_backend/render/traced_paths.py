@@ -94,8 +94,17 @@ class TracedPaths:
         limit = int(getattr(integrator, "max_depth", DEEPEST))
         self._depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         self._hide = bool(getattr(integrator, "hide_emitters", False))
+        if self._hide and renderer.shape.is_emitter():
+            raise UnrecordableError("The target emits light and the integrator hides what does.")
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
+
+    def roughness(self, vector: NDArray[np.float64]) -> float:
+        """Roughness of the material `vector`; 1 where a texture gives it."""
+        if "roughness" in self.table.names:
+            return float(vector[self.table.slice_of("roughness").start])
+        value = self._bsdf.fixed["roughness"]
+        return 1.0 if value is None else float(np.mean(value))
 
     def images(
         self,
