@@ -45,6 +45,7 @@ def recover_material(
             return fit_transmission(
                 renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
             )
+    settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
     notes = (*outcome.result.notes, *([reason] if reason else []))
     return replace(outcome, result=replace(outcome.result, notes=notes))

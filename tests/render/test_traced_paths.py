@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole paths through glass with derivatives. Oracles: Mitsuba's `path` integrator and finite differences."""
+"""Whole paths through glass with derivatives. Oracles: the integrators that render references, and finite differences."""
 
 from __future__ import annotations
 
@@ -8,24 +8,37 @@ import pytest
 
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.errors import UnrecordableError
+from mfo_backend.types.light_paths import LightPaths
 from tests.render.scenes import FLOOR, SKY, write_scene
 
 NAMES = ["base_color", "transmission_weight", "roughness", "ior", "alpha"]
 GLASS = {"base_color": (0.9, 0.6, 0.4), "transmission_weight": 0.8, "roughness": 0.4, "ior": 1.45, "alpha": 0.9}
 
 
-@pytest.fixture(scope="module")
-def glass(tmp_path_factory):
+AS_CYCLES = LightPaths(
+    filter_glossy=1.0, clamp_indirect=0.7, diffuse_bounces=2, glossy_bounces=2, transmission_bounces=3
+)
+
+
+def traced(folder, light_paths=None):
     materials = {"target_bsdf": {"name": "Glass", "distribution": "MULTI_GGX", "sockets": {}}}
-    path = write_scene(tmp_path_factory.mktemp("scene"), SKY + FLOOR, size=16, depth=8)
-    renderer = load_renderer(path, "target", model="blender_principled", parameters=NAMES, materials=materials)
+    path = write_scene(folder, SKY + FLOOR, size=16, depth=8)
+    renderer = load_renderer(
+        path, "target", model="blender_principled", parameters=NAMES, materials=materials, light_paths=light_paths
+    )
     from mfo_backend.render.traced_paths import TracedPaths
 
     return renderer, TracedPaths(renderer), np.flatnonzero(renderer.target_mask().ravel())
 
 
-def test_the_picture_is_that_of_mitsubas_path_tracer(glass):
-    renderer, paths, pixels = glass
+@pytest.fixture(scope="module")
+def glass(tmp_path_factory):
+    return traced(tmp_path_factory.mktemp("scene"))
+
+
+@pytest.mark.parametrize("light_paths", [None, AS_CYCLES], ids=["path", "cycles_path"])
+def test_the_picture_is_that_of_the_path_tracer(tmp_path, light_paths):
+    renderer, paths, pixels = traced(tmp_path, light_paths)
     x = renderer.table.pack(GLASS)
     got = paths.images(x[None], pixels, seed=1, samples=1024, jacobian=False)[0, :, :, 0]
     expected = renderer.image(x, seed=7, spp=1024).reshape(-1, 3)[pixels]
@@ -35,15 +48,17 @@ def test_the_picture_is_that_of_mitsubas_path_tracer(glass):
 
 def test_derivatives_are_those_of_the_mean_picture(glass):
     renderer, paths, pixels = glass
-    x = renderer.table.pack(GLASS)
+    # in the middle of a cell of the albedo tables, whose slope jumps at the nodes; the step stays in the cell
+    x = renderer.table.pack({**GLASS, "roughness": 6.5 / 15.0})
     columns = paths.images(x[None], pixels, seed=1, samples=2048, jacobian=True)[0].mean(axis=0)[:, 1:]
     for k in range(renderer.table.length):
         h = np.zeros_like(x)
-        h[k] = 0.06
+        h[k] = 0.03
         down, up = paths.images(np.stack([x - h, x + h]), pixels, seed=2, samples=2048, jacobian=False)[..., 0]
-        secant = (up - down).mean(axis=0) / 0.12
-        # noise of the secants, whose paths may take another lobe, and 0.06 squared times the third derivative
-        np.testing.assert_allclose(columns[:, k], secant, rtol=0.05, atol=0.012)
+        secant = (up - down).mean(axis=0) / 0.06
+        # the index has heavy tails: the slope of the Fresnel term has no bound at total reflection
+        noise = 0.03 if k == renderer.table.slice_of("ior").start else 0.015
+        np.testing.assert_allclose(columns[:, k], secant, rtol=0.05, atol=noise)
 
 
 def test_a_path_keeps_its_random_numbers(glass):
