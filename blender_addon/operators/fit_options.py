@@ -17,7 +17,7 @@ from ..export.job import ExportError, export_job
 from ..export.read_material import principled_node as find_principled
 from ..fit_queue import PreparedFit
 from ..preferences import new_job_folder, preference
-from ..properties import chosen_of
+from ..properties import chosen_of, crossed_limits
 from ..write_back import WriteBackError, principled_node
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
@@ -103,6 +103,12 @@ class FitOptions:
             "parameters": parameters,
             "max_iterations": self.max_iterations or settings.max_iterations,
         }
+        chosen = {bound.name: [bound.lower, bound.upper] for bound in settings.bounds if bound.name in parameters}
+        if settings.parameter_set == "chosen" and not self.parameters and chosen:
+            if crossed_limits(settings):
+                name = crossed_limits(settings)[0]
+                raise FitError(f"The limits of {name} leave nothing: the least must be below the most.")
+            fit["bounds"] = chosen
         compared = self.range or settings.range
         if compared not in ("auto", "hdr", "ldr"):
             raise FitError(f"range is {compared!r}: give 'hdr', 'ldr' or 'auto'.")

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from ..metrics.tone_mapping import View
 from ..types.event import Listener
 from ..types.image import Image, Pixels
+from ..types.parameter_bounds import narrowed
 from ..types.result import FitResult
 from .job_folder import JobFolder
 from .request import Request, request_to_json
@@ -73,13 +74,16 @@ def fit_scene(
 
     def load() -> tuple[str, Renderer]:
         variant = load_variant()
-        return variant, load_renderer(
+        renderer = load_renderer(
             folder.root / request.scene,
             request.target.shape_id,
             model=request.fit.model,
             parameters=request.fit.parameters,
             materials=request_materials(folder, request),
         )
+        renderer.table = narrowed(renderer.table, request.fit.bounds)
+        renderer.start = renderer.table.clip(renderer.start)
+        return variant, renderer
 
     if request.fit.preset == "paper":
         thread = NativeThread(should_stop)
