@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .. import running_job
+from .. import fit_queue, running_job
 from ..backend_python import BackendPythonError, backend_python
 from ..export.job import ExportError, export_job
 from ..export.read_material import principled_node as find_principled
@@ -60,6 +60,7 @@ class FitOptions:
 
     def start(self, fit: PreparedFit) -> None:
         """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
+        fit_queue.begin()
         try:
             running_job.start(fit, timer=not self.blocks() and not bpy.app.background)
         except OSError as error:

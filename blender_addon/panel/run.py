@@ -9,7 +9,7 @@ from .. import fit_queue, previews, running_job
 from ..backend_python import is_chosen
 from ..operators.fit_options import selected_targets
 from ..preferences import ADDON_ID, preference
-from .layout import draw_messages, draw_pictures, draw_sentence
+from .layout import draw_pictures, draw_sentence
 
 
 class Run:
@@ -45,8 +45,9 @@ class Run:
             box = layout.box()
             box.alert = runtime.state == "FAILED"
             draw_sentence(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
-            if runtime.state == "FAILED" and runtime.messages and not runtime.has_result:
-                draw_messages(box, context, runtime)
+            for message in runtime.messages if runtime.state == "FAILED" else ():
+                if message.icon == "ERROR":  # the others are notes of the export
+                    draw_sentence(box, context, message.name, message.icon)
 
 
 def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
