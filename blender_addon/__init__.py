@@ -7,7 +7,18 @@ import atexit
 
 import bpy
 
-from . import comparison, cycles_check, handlers, panel, preferences, preflight, previews, properties, running_job
+from . import (
+    backend_state,
+    comparison,
+    cycles_check,
+    handlers,
+    panel,
+    preferences,
+    preflight,
+    previews,
+    properties,
+    running_job,
+)
 from .operators import CLASSES as OPERATORS
 from .panel import menu
 from .versions import is_module
@@ -23,6 +34,7 @@ def register() -> None:
     previews.register()
     menu.register()
     handlers.register()
+    backend_state.register()
     if is_module():
         atexit.register(unregister)  # what is still registered at its end crashes bpy 4.2 and stops bpy 4.5
 
@@ -31,6 +43,7 @@ def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
     running_job.close()
+    backend_state.close()
     cycles_check.close()
     handlers.unregister()
     preflight.reset()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: check, fit, cancel, apply, revert, go back in the history, look at pictures."""
+"""What a user or a script can do: set up the backend, check, fit, cancel, apply, revert, go back, look at pictures."""
 
-from . import apply, check, cycles, fit, history, pictures
+from . import apply, backend, check, cycles, fit, history, pictures
 
 CLASSES = (
     *check.CLASSES,
@@ -10,4 +10,5 @@ CLASSES = (
     *history.CLASSES,
     *cycles.CLASSES,
     *pictures.CLASSES,
+    *backend.CLASSES,
 )

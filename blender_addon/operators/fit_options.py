@@ -12,11 +12,11 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from .. import fit_queue, running_job
-from ..backend_python import BackendPythonError, backend_python
+from ..backend_python import BackendPythonError
 from ..export.job import ExportError, export_job
 from ..export.read_material import principled_node as find_principled
 from ..fit_queue import PreparedFit
-from ..preferences import new_job_folder, preference
+from ..preferences import chosen_python, new_job_folder
 from ..properties import chosen_of, crossed_limits
 from ..write_back import WriteBackError, principled_node
 
@@ -119,7 +119,7 @@ class FitOptions:
 def python_of(context: bpy.types.Context) -> Path:
     """The interpreter of the backend; raises `FitError` where there is none."""
     try:
-        return backend_python(bpy.path.abspath(preference(context, "backend_python")))
+        return chosen_python(context)
     except BackendPythonError as error:
         raise FitError(str(error)) from error
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 import bpy
 
 from .. import fit_queue, previews, running_job
-from ..backend_python import is_chosen
+from ..backend_section import draw_setup, has_trouble, needs_setup
 from ..operators.fit_options import selected_targets
-from ..preferences import ADDON_ID, preference
-from .layout import draw_pictures, draw_sentence
+from .layout import draw_pictures, draw_sentence, letters
 
 
 class Run:
@@ -31,16 +30,15 @@ class Run:
             body.prop(settings, "range")
             body.prop(settings, "bake_view")
             body.prop(settings, "max_iterations")
-        if not is_chosen(preference(context, "backend_python")) and ADDON_ID in context.preferences.addons:
-            draw_sentence(layout, context, "Fits run in a Python of their own that has Mitsuba.", "INFO")
-            layout.operator(
-                "preferences.addon_show", text="Choose Backend Python", icon="PREFERENCES"
-            ).module = ADDON_ID
-            return
         if running_job.current is not None:
             _draw_progress(layout, context)
+        elif needs_setup():
+            draw_setup(layout, width=letters(context))
+            return
         _draw_buttons(layout, context)
         _draw_queue(layout, context)
+        if has_trouble():
+            draw_setup(layout, width=letters(context))
         if runtime.state in {"DONE", "FAILED"}:
             box = layout.box()
             box.alert = runtime.state == "FAILED"
