@@ -79,11 +79,22 @@ class FitOptions:
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
+        windows, chosen = context.window_manager, self._fit(settings)
+        windows.progress_begin(0.0, 100.0)  # a number beside the pointer, while nothing else can be drawn
         try:
-            bake_view = self.bake_view or settings.bake_view
-            report = export_job(context, obj, folder, reference=reference, fit=self._fit(settings), bake_view=bake_view)
+            report = export_job(
+                context,
+                obj,
+                folder,
+                reference=reference,
+                fit=chosen,
+                bake_view=self.bake_view or settings.bake_view,
+                tell=lambda share: windows.progress_update(100.0 * share),
+            )
         except ExportError as error:
             raise FitError(str(error)) from error
+        finally:
+            windows.progress_end()
         picture = folder / report.request["reference"]["path"]
         return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
 
