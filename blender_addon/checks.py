@@ -109,8 +109,9 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
         findings.error(f"{sentence}: remove the override.", Fix("no_override"))
     found = list(from_export(findings))
     if scene.render.engine != "CYCLES":
-        sentence = f"The render engine is {scene.render.engine.removeprefix('BLENDER_').title()}; the fit reproduces "
-        found.append(Finding(IGNORED, sentence + "what Cycles shows.", (Fix("cycles"),)))
+        engine = scene.render.engine.removeprefix("BLENDER_").replace("_", " ").title()
+        sentence = f"The render engine is {engine}; the fit reproduces what Cycles shows."
+        found.append(Finding(IGNORED, sentence, (Fix("cycles"),)))
     if not findings.errors:
         width, height = picture_size(scene.render)
         found.append(Finding(FINE, f"Camera '{scene.camera.name}', {width} x {height} pixels."))
