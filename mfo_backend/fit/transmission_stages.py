@@ -111,7 +111,14 @@ class TransmissionFit:
         return TileRows.of(self.reference, self.mask, size, self.clipped, most)
 
     def halves(
-        self, tiles: TileRows, xs: Vector, *, seed: int, samples: int, jacobian: bool = True, near: bool = False,
+        self,
+        tiles: TileRows,
+        xs: Vector,
+        *,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        near: bool = False,
         moving: bool = True,
     ) -> list[Samples]:
         """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
