@@ -15,7 +15,6 @@ import time
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from .backend_python import EXTENSION_ROOT, backend_environment
 from .process_group import KILL, TERMINATE, own_group, signal_group
