@@ -60,7 +60,7 @@ def test_problems_are_named_with_their_cure(tmp_path: Path) -> None:
     verdict = verdict_of(python)
     assert not verdict.works
     assert verdict.problems == [
-        f"{python} lacks mitsuba, scipy: install the backend, or choose another Python.",
+        "Its Python lacks mitsuba, scipy: install the backend, or choose another Python.",
         "LLVM: no library found. Install libllvm19.",
     ]
 

@@ -55,16 +55,20 @@ def until(condition, seconds):
         yield 0.05
 
 
-def show_panel_and_preferences():
+def show_panel():
     screen = bpy.context.window_manager.windows[0].screen
     area = next(a for a in screen.areas if a.type == "VIEW_3D")
     area.spaces.active.show_region_ui = True
-    next(a for a in screen.areas if a.type == "DOPESHEET_EDITOR").type = "PREFERENCES"
     yield 0.5
     next(r for r in area.regions if r.type == "UI").active_panel_category = "Material Fit"
-    bpy.context.preferences.active_section = "ADDONS"
+    area.tag_redraw()
+    yield 1.5
+
+
+def show_preferences():
     bpy.data.window_managers[0].addon_search = "Material Fit"
     bpy.ops.preferences.addon_expand(module=addon_id)
+    bpy.ops.screen.userpref_show(section="ADDONS")
     yield 1.5
 
 
@@ -79,7 +83,7 @@ def start():
 
 
 def story():
-    yield from show_panel_and_preferences()
+    yield from show_panel()
     yield from until(lambda: state.current.name == "NOT_INSTALLED", 10)
     yield 0.5
     shot("setup_1_not_installed")
@@ -88,6 +92,7 @@ def story():
     yield from until(lambda: state.current.step == "Making the environment", 30)
     yield 0.5
     shot("setup_2_installing")
+    yield from show_preferences()
     assert bpy.ops.mfo.cancel_install() == {"FINISHED"}
     yield from until(lambda: state.current.name == "NOT_INSTALLED", 20)
     assert not list(state.backend_root().glob("env-*"))
