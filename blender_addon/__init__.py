@@ -7,8 +7,20 @@ import atexit
 
 import bpy
 
-from . import backend_state, handlers, panel, preferences, previews, properties, running_job
+from . import (
+    backend_state,
+    comparison,
+    cycles_check,
+    handlers,
+    panel,
+    preferences,
+    preflight,
+    previews,
+    properties,
+    running_job,
+)
 from .operators import CLASSES as OPERATORS
+from .panel import menu
 from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
@@ -20,6 +32,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     properties.attach()
     previews.register()
+    menu.register()
     handlers.register()
     backend_state.register()
     if is_module():
@@ -30,8 +43,12 @@ def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
     running_job.close()
+    cycles_check.close()
     backend_state.close()
     handlers.unregister()
+    preflight.reset()
+    comparison.forget()
+    menu.unregister()
     previews.unregister()
     properties.detach()
     for cls in reversed(CLASSES):

@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: set up the backend, fit, cancel, check, apply, revert, look at pictures."""
+"""What a user or a script can do: set up, check, fit, cancel, apply, revert, go back in the history, look at pictures."""
 
-from . import apply, backend, fit, pictures
+from . import apply, backend, check, cycles, fit, history, pictures
 
-CLASSES = (*fit.CLASSES, *apply.CLASSES, *pictures.CLASSES, *backend.CLASSES)
+CLASSES = (
+    *check.CLASSES,
+    *fit.CLASSES,
+    *apply.CLASSES,
+    *history.CLASSES,
+    *cycles.CLASSES,
+    *pictures.CLASSES,
+    *backend.CLASSES,
+)

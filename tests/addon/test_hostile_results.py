@@ -88,4 +88,4 @@ def test_events_with_wrong_values_are_passed_over(scene: SimpleNamespace, tmp_pa
     from blender_addon import running_job
 
     process = SimpleNamespace(folder=tmp_path, cancelling=False)
-    running_job._handle(running_job.RunningJob(process, "Glaze", 0, (), True), event)
+    running_job._handle(running_job.RunningJob(process, None), event)
