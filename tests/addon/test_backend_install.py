@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BASE = getattr(sys, "_base_executable", sys.executable)
 
 
-def finished(install: BackendInstall, seconds: float = 60) -> BackendInstall:
+def finished(install: BackendInstall, seconds: float = 240) -> BackendInstall:
     end = time.monotonic() + seconds
     while install.outcome is None:
         assert time.monotonic() < end, install.lines
