@@ -43,8 +43,8 @@ def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
     running_job.close()
-    cycles_check.close()
     backend_state.close()
+    cycles_check.close()
     handlers.unregister()
     preflight.reset()
     comparison.forget()

@@ -121,6 +121,7 @@ def _request(
     request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
     if picture is not None and picture.view is not None:
         request["view"]["lut"] = picture.view.request()
+    request["light_paths"] = data.settings.light_paths
     request["materials"] = {
         identifier: _material(material, files)
         for identifier, material in data.materials.items()

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,7 @@ from .visibility import check_visible
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
 DEFAULT_SPP = 64
+BOUNCES = ("diffuse", "glossy", "transmission")
 
 
 def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
@@ -75,26 +78,27 @@ def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings
         return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
     if cycles.sample_clamp_direct > 0.0:
         findings.note("Cycles clamps direct light; the fit does not.")
-    _note_limits(cycles, findings)
+    light_paths = _read_light_paths(cycles, findings)
     # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
-    bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces))
-    return RenderSettings(pixel_filter, bounces + 2, scene.render.film_transparent, cycles.film_exposure, DEFAULT_SPP)
+    depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
+    exposure = cycles.film_exposure
+    return RenderSettings(pixel_filter, depth, scene.render.film_transparent, exposure, DEFAULT_SPP, light_paths)
 
 
-def _note_limits(cycles: bpy.types.PropertyGroup, findings: Findings) -> None:
-    """List the settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
-    used = []
-    if cycles.blur_glossy > 0.0 and cycles.max_bounces > 0:
-        used.append(f"Filter Glossy ({cycles.blur_glossy:.3g})")
+def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
+    """The settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
     if cycles.sample_clamp_indirect > 0.0:
-        used.append(f"clamping of indirect light ({cycles.sample_clamp_indirect:.3g})")
-    bounces = {kind: getattr(cycles, f"{kind}_bounces") for kind in ("diffuse", "glossy", "transmission")}
-    most = min(max(bounces.values()), cycles.max_bounces)
-    used += [f"limit of {count} {kind} bounces" for kind, count in bounces.items() if count < most]
+        findings.note(
+            f"Clamping of indirect light ({cycles.sample_clamp_indirect:.3g}) works on single samples, and those of "
+            "the fit are not Cycles': how much light it takes away may differ."
+        )
     if not (cycles.caustics_reflective and cycles.caustics_refractive):
-        used.append("removal of caustics")
-    if used:
-        findings.note(f"Left out of the fit: Cycles' {', '.join(used)}. They change indirect light only.")
+        findings.note("Cycles removes caustics; the fit does not.")
+    return {
+        "filter_glossy": cycles.blur_glossy,
+        "clamp_indirect": cycles.sample_clamp_indirect * cycles.film_exposure,
+        **{f"{kind}_bounces": getattr(cycles, f"{kind}_bounces") for kind in BOUNCES},
+    }
 
 
 class _Walk:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: set up, check, fit, cancel, apply, revert, go back in history, look at pictures."""
+"""What a user or a script can do: set up the backend, check, fit, cancel, apply, revert, go back, look at pictures."""
 
 from . import apply, backend, check, cycles, fit, history, pictures
 

@@ -39,6 +39,8 @@ class Run:
             _draw_progress(layout, context)
         _draw_buttons(layout, context)
         _draw_queue(layout, context)
+        if has_trouble():
+            draw_setup(layout, width=letters(context))
         if runtime.state in {"DONE", "FAILED"}:
             box = layout.box()
             box.alert = runtime.state == "FAILED"

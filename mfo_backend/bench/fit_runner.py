@@ -12,6 +12,7 @@ from typing import Any
 from ..fit.fit_material import FitOutcome
 from ..fit.settings import FitSettings
 from ..job.atomic_file import write_atomically
+from ..types.image import Pixels
 from ..types.status import Status
 from .assets import Assets
 from .busy import BusyMark
@@ -36,7 +37,8 @@ class _Measured:
 
 
 class FitRunner:
-    """Writes scenes into `folder`, fits and judges. All methods of a scene start from the same material and seed.
+    """Writes scenes into `folder`, fits and judges. All methods of a scene start from the same material and seed, the
+    number of the scene; references and the judge have seeds far from it. Pictures go to `pictures`, if that is given.
 
     Raises
     ------
@@ -44,7 +46,9 @@ class FitRunner:
         If Mitsuba or LLVM is missing.
     """
 
-    def __init__(self, folder: Path, size: int, assets: Assets, *, threads: int = 0) -> None:
+    def __init__(
+        self, folder: Path, size: int, assets: Assets, pictures: Path | None = None, *, threads: int = 0
+    ) -> None:
         from ..render.llvm import configure_llvm, needs_llvm
 
         if needs_llvm():
@@ -59,19 +63,16 @@ class FitRunner:
             use_threads(threads)
         self._folder = folder
         self._assets = assets
+        self._kept_at = pictures
         self._warm: set[tuple[str, str]] = set()
         self._at: tuple[str, int] | None = None
         self._scene: BenchScene
         self._judge: Judge
 
-    def seed(self, task: Task) -> int:
-        """The number of the scene; references and the judge have seeds far from it."""
-        return task.scene
-
     def __call__(self, task: Task, should_stop: Callable[[], bool], pictures: TruePictures | None = None) -> Row:
         """Fit, then judge; a cancelled fit is not judged. `pictures` are those of the scene, if they are there."""
         self._open(task, pictures)
-        settings = method_settings(task.method, self._scene.scenario, self.seed(task))
+        settings = method_settings(task.method, self._scene.scenario, task.scene)
         warm_up = 0.0
         if (task.scenario, task.method) not in self._warm:
             began = time.monotonic()
@@ -125,7 +126,7 @@ class FitRunner:
             "scenario": task.scenario,
             "scene": task.scene,
             "method": task.method,
-            "seed": self.seed(task),
+            "seed": task.scene,
             "size": self.size,
             "status": result.status.value,
             "object": scene.object,
@@ -177,7 +178,9 @@ class FitRunner:
             notes=list(result.notes),
         )
 
-    def _keep_picture(self, task: Task, pixels: Any) -> None:
-        path = picture_file(self._folder.parent, task)
+    def _keep_picture(self, task: Task, pixels: Pixels) -> None:
+        if self._kept_at is None:
+            return
+        path = picture_file(self._kept_at, task)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, shown_picture(pixels, self._judge.pictures.truth[0], self._judge.pictures.mask))

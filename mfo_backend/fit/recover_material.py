@@ -14,6 +14,7 @@ from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
 from .fit_recorded import fit_recorded
+from .fit_transmission import fit_transmission
 from .settings import FitSettings
 
 
@@ -34,6 +35,12 @@ def recover_material(
     if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer):
         try:
             return fit_recorded(
+                renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
+            )
+        except UnrecordableError:
+            pass
+        try:
+            return fit_transmission(
                 renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
             )
         except UnrecordableError as error:

@@ -69,7 +69,7 @@ class RecordedScene:
         depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
-        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided)
+        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths)
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, 2, (note,))
@@ -90,7 +90,9 @@ class RecordedScene:
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
-        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, self.model.two_sided)
+        settings = RecordSettings(
+            grid, seed, self.needs.depth, proposal, hide, stride, self.model.two_sided, self.renderer.light_paths
+        )
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
