@@ -30,12 +30,9 @@ def shown_messages() -> set[tuple[str, str]]:
                 found.update(_of_call(node))
             elif isinstance(node, ast.Assign) and any(_name(t).endswith("_ITEMS") for t in node.targets):
                 found.update(_of_items(node.value))
-            elif (
-                isinstance(node, ast.Assign)
-                and _name(node.targets[0]) == "_TITLES"
-                and isinstance(node.value, ast.Dict)
-            ):
-                found.update(pair for value in node.value.values for pair in _texts("*", value))
+            elif isinstance(node, ast.Assign) and _name(node.targets[0]) == "_TITLES":
+                titles = node.value.values if isinstance(node.value, ast.Dict) else []
+                found.update(pair for title in titles for pair in _texts("*", title))
     return {(context, text) for context, text in found if any(letter.isalpha() for letter in text)}
 
 

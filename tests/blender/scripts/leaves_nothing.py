@@ -43,5 +43,7 @@ package.unregister()
 package.register()
 addon_utils.disable(addon_id)
 assert not leftovers(), leftovers()
+timers = [package.running_job._tick, package.backend_state._tick, package.backend_state._first_look]
+assert not any(map(bpy.app.timers.is_registered, timers))
 assert not {"mitsuba", "drjit", "OpenEXR", "scipy"} & set(sys.modules)
 print("ALL GOOD", "with German" if has_german else "without German")
