@@ -93,9 +93,9 @@ def test_kernels_hold_only_the_lobes_in_use(plugin: Any, name: str, share: float
     assert operations(loaded(MATERIALS[name])) < share * every
 
 
-# For the same lobes as Mitsuba's C++ plugin; measured 1.04 and 1.70. At 1.74 the time was 2.1 times Mitsuba's, at 1.70
-# it is 1.9 times (kernel_cost.py)
-@pytest.mark.parametrize(("name", "most"), [("plain dielectric", 1.1), ("all that both have", 1.72)])
+# For the same lobes as Mitsuba's C++ plugin; measured 0.99 and 1.55. At 1.74 the time was 2.1 times Mitsuba's, at 1.55
+# it is 1.8 times (kernel_cost.py)
+@pytest.mark.parametrize(("name", "most"), [("plain dielectric", 1.05), ("all that both have", 1.6)])
 def test_a_step_takes_no_more_operations_than_promised(plugin: Any, name: str, most: float) -> None:
     ours, theirs = PAIRS[name]
     arguments = inputs(256)
