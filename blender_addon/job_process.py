@@ -7,27 +7,24 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
 
 from .backend_python import EXTENSION_ROOT, backend_environment
+from .process_group import KILL, TERMINATE, own_group, signal_group
+from .progress_lines import Event, read_events
 
 LOG = "backend.log"
-Event = dict[str, Any]
 
 CANCEL_GRACE = 5.0  # seconds from the cancel command to SIGTERM; the backend promises to need one
 TERMINATE_GRACE = 3.0  # seconds from SIGTERM to SIGKILL
 PIPE_GRACE = 1.0  # seconds a dead process' pipe may stay open (a grandchild can hold it) before we stop reading
-LINE_LIMIT = 1 << 20  # bytes; a longer line is no event of ours
 QUEUE_LIMIT = 1000  # events besides progress and preview, of which only the newest is kept
 
 _LAST_EVENTS = ("finished", "failed")
@@ -88,7 +85,7 @@ class JobProcess:
                 stderr=log,
                 cwd=root,  # not the job folder: `-m` imports from here, and a job may come from a stranger
                 env=backend_environment(root),
-                **_own_group(),
+                **own_group(),
             )
         self._reader = threading.Thread(target=self._read, name="mfo-reader", daemon=True)
         self._reader.start()
@@ -130,7 +127,7 @@ class JobProcess:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(grace)
             if self._process.poll() is None:
-                self._signal(_KILL)
+                signal_group(self.pid, KILL)
                 self._process.wait()
             self._reader.join(PIPE_GRACE)
             self._end()
@@ -138,13 +135,7 @@ class JobProcess:
     def _read(self) -> None:
         stdout = self._process.stdout
         assert stdout is not None
-        for line in _lines(stdout):
-            try:
-                event = json.loads(line)
-            except ValueError:
-                continue  # a library printed something, or a line was cut by the process' death
-            if not isinstance(event, dict) or not isinstance(event.get("event"), str):
-                continue
+        for event in read_events(stdout):
             with self._lock:
                 if event["event"] in _COALESCED:
                     self._newest[event["event"]] = event
@@ -206,22 +197,11 @@ class JobProcess:
 
     def _stop_after(self, seconds: float) -> None:
         now = time.monotonic()
-        self._deadlines = [(now + seconds, signal.SIGTERM), (now + seconds + TERMINATE_GRACE, _KILL)]
+        self._deadlines = [(now + seconds, TERMINATE), (now + seconds + TERMINATE_GRACE, KILL)]
 
     def _escalate(self) -> None:
         if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self._process.poll() is None:
-            self._signal(self._deadlines.pop(0)[1])
-
-    def _signal(self, number: int) -> None:
-        """Signal the whole group, so that what the backend started ends with it."""
-        with contextlib.suppress(OSError):
-            if os.name == "nt":
-                subprocess.run(["taskkill", "/T", "/F", "/PID", str(self.pid)], capture_output=True, check=False)
-            else:
-                os.killpg(self.pid, number)
-
-
-_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has no SIGKILL; taskkill /F is one anyway
+            signal_group(self.pid, self._deadlines.pop(0)[1])
 
 
 def log_tail(path: Path, lines: int = 40) -> str:
@@ -232,22 +212,6 @@ def log_tail(path: Path, lines: int = 40) -> str:
             return "\n".join(file.read().decode("utf-8", "replace").splitlines()[-lines:])
     except OSError:
         return ""
-
-
-def _lines(stream: IO[bytes]) -> Iterator[bytes]:
-    """Complete lines of at most LINE_LIMIT bytes; the rest of a longer one is skipped."""
-    skipping = False
-    with contextlib.suppress(OSError, ValueError):  # the pipe was closed under us
-        while line := stream.readline(LINE_LIMIT):
-            if not skipping and line.endswith(b"\n"):
-                yield line
-            skipping = not line.endswith(b"\n")
-
-
-def _own_group() -> dict[str, Any]:
-    if os.name == "nt":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
-    return {"start_new_session": True}
 
 
 def _signal_name(number: int) -> str:

@@ -13,6 +13,7 @@ _collection: Any = None
 _shown: dict[str, str] = {}
 _serial = 0
 _SWATCH = 16  # pixels
+_SMALL = 300_000  # bytes of a PNG that is read within some milliseconds
 
 
 def register() -> None:
@@ -30,14 +31,19 @@ def unregister() -> None:
         _collection = None
 
 
-def show(name: str, path: Path) -> None:
-    """Make the picture at `path` the icon called `name`, replacing an earlier one."""
+def show(name: str, path: Path, *, now: bool = False) -> None:
+    """Make the picture at `path` the icon called `name`, replacing an earlier one.
+
+    Blender loads it after its first draw and shows an empty place meanwhile; with `now` a small one is loaded at once.
+    """
     global _serial
     if _collection is None or bpy.app.background or not path.is_file():
         return
     _serial += 1
     key = f"{name} {_serial}"  # a new key each time: Blender keeps the picture of a known one
-    _collection.load(key, str(path), "IMAGE")
+    picture = _collection.load(key, str(path), "IMAGE")
+    if now and path.stat().st_size < _SMALL:
+        _ = picture.image_size[0]  # asking loads it
     old = _shown.get(name)
     _shown[name] = key
     if old is not None:

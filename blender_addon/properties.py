@@ -17,6 +17,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import comparison
+
 # name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance
 _PARAMETERS = (
     ("base_color", "Base Color", "Colour of the diffuse or metallic surface"),
@@ -146,6 +148,10 @@ class MFO_PG_row(bpy.types.PropertyGroup):
     certainty: StringProperty()  # level in result.json, empty where unknown
 
 
+def _split_moved(runtime: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    comparison.move_split(runtime.split)
+
+
 class MFO_PG_runtime(bpy.types.PropertyGroup):
     """State of the current fit for the panel; set from `running_job`, reset when a file is loaded."""
 
@@ -159,24 +165,51 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
     progress_text: StringProperty()
     detail: StringProperty()
     has_result: BoolProperty()
-    checked: BoolProperty()  # the messages come from a check, not from the fit
+    split: FloatProperty(
+        name="Split",
+        description="How much of the picture in the Image Editor is the reference; the rest is the result",
+        min=0.0,
+        max=1.0,
+        default=0.5,
+        subtype="FACTOR",
+        update=_split_moved,
+        options={"SKIP_SAVE"},
+    )
+    cycles_text: StringProperty()  # how far the check in Cycles is, or what it found
+    cycles_flip: FloatProperty(default=-1.0)
     messages: CollectionProperty(type=MFO_PG_message)
     values: CollectionProperty(type=MFO_PG_row)
     errors: CollectionProperty(type=MFO_PG_row)
 
 
 class MFO_PG_socket_value(bpy.types.PropertyGroup):
-    """The value a socket had before `mfo.apply`: socket name in `name`, `size` numbers of `value`."""
+    """The value of a socket: its name in `name`, `size` numbers of `value`, and in a history how sure it is."""
 
     size: IntProperty(default=1, min=1, max=4)
     value: FloatVectorProperty(size=4, precision=6)
+    certainty: StringProperty()
+
+
+class MFO_PG_past_result(bpy.types.PropertyGroup):
+    """One result of a material: date and time in `name`, values as linear Rec.709; `flip` is -1 where unknown."""
+
+    job_folder: StringProperty(subtype="DIR_PATH")
+    preset: StringProperty()
+    flip_before: FloatProperty(default=-1.0)
+    flip: FloatProperty(default=-1.0)
+    partial: BoolProperty()
+    values: CollectionProperty(type=MFO_PG_socket_value)
 
 
 class MFO_PG_material(bpy.types.PropertyGroup):
-    """What was applied to a material and what it was before."""
+    """What was applied to a material, what it was before (both as the sockets hold it), and the results it had."""
 
     job_folder: StringProperty(subtype="DIR_PATH")
     originals: CollectionProperty(type=MFO_PG_socket_value)
+    applied: CollectionProperty(type=MFO_PG_socket_value)
+    shows_original: BoolProperty()  # A of A/B: the sockets hold `originals`, not `applied`
+    history: CollectionProperty(type=MFO_PG_past_result)
+    history_index: IntProperty(name="Result", description="One of the results this material had", options=set())
 
 
 CLASSES = (
@@ -185,6 +218,7 @@ CLASSES = (
     MFO_PG_row,
     MFO_PG_runtime,
     MFO_PG_socket_value,
+    MFO_PG_past_result,
     MFO_PG_material,
 )
 

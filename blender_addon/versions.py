@@ -98,6 +98,16 @@ def overrides_of(view_layer: bpy.types.ViewLayer) -> list[str]:
     return [owner.name for owner in owners if owner is not None]
 
 
+def is_modal_operator_running() -> bool:
+    """Whether a drag or another modal operator runs in some window; never, where Blender does not tell."""
+    return any(getattr(window, "modal_operators", ()) for window in bpy.context.window_manager.windows)
+
+
+def is_module() -> bool:
+    """Whether Blender is a module of this Python, not a program."""
+    return not bpy.app.binary_path
+
+
 def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Return the shading normal of every face corner, custom normals included, (corners, 3)."""
     normals = np.empty(len(mesh.loops) * 3, dtype=np.float32)

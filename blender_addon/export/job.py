@@ -21,7 +21,7 @@ from .scene_file import SceneFiles, scene_files
 
 SCHEMA_VERSION = 1
 
-__all__ = ["ExportError", "ExportReport", "check_export", "export_job"]
+__all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job"]
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,17 @@ def export_job(
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:
     """Return the errors and the notes an export would give, without writing anything."""
+    findings = export_findings(context, obj)
+    return findings.errors, findings.notes
+
+
+def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findings:
+    """Return what an export would say, with what could be done about it, without writing anything."""
     findings = Findings()
     data = read_scene(context, obj, findings)
     if data is not None:
         scene_files(data, findings)
-    return findings.errors, findings.notes
+    return findings
 
 
 def _request(

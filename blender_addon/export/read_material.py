@@ -7,7 +7,7 @@ import bpy
 
 from ..versions import PRINCIPLED, active_output, default_surface_is_principled, node_tree_of
 from .color_space import to_rec709
-from .findings import Findings
+from .findings import Findings, Fix
 from .material_model import Material, Socket, grey
 from .shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 
@@ -48,12 +48,14 @@ def principled_node(material: bpy.types.Material | None) -> bpy.types.Node | Non
 def read_target(material: bpy.types.Material | None, owner: str, slot: int, findings: Findings) -> Material | None:
     """Return the material to fit, or None with an error in `findings`."""
     if material is None:
-        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.")
+        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
+                       Fix("new_material"))  # fmt: skip
         return None
     node = principled_node(material)
     if node is None:
         findings.error(
-            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly."
+            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly.",
+            Fix("principled"),
         )
         return None
     _note_volume(material, findings)
@@ -103,7 +105,8 @@ def _read_principled(
             source = source_of(socket)
             sockets[socket.name] = Socket(plain_value(socket), source is not None)
             if source is not None and not (socket.name == "Tangent" and _is_uv_tangent(source.node)):
-                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+                fixes = (Fix("unlink", socket.name),) if is_target else ()
+                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.", *fixes)
             continue
         sockets[socket.name] = _read(socket, material.name, is_target, findings)
     method = getattr(node, "subsurface_method", "RANDOM_WALK")
@@ -133,7 +136,8 @@ def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings
         if is_target:
             findings.error(
                 f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported: unlink it "
-                "or use an image texture."
+                "or use an image texture.",
+                Fix("unlink", socket.name),
             )
         else:
             findings.note(

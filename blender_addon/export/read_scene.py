@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..versions import cycles_settings, has_compositor, overrides_of
-from .findings import Findings
+from .findings import Findings, Fix
 from .material_model import Material
 from .mesh_arrays import CornerMesh, joined, world_mesh
 from .ply_file import TriangleMesh
@@ -39,7 +39,8 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
     if overrides_of(view_layer):
         findings.error(
             f"View layer '{view_layer.name}' replaces materials or the world by '{overrides_of(view_layer)[0]}': "
-            "remove the override."
+            "remove the override.",
+            Fix("no_override"),
         )
         return None
     if has_compositor(scene):
@@ -57,7 +58,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run()
         if data.target is None:
             if target.name_full not in rendered_objects(view_layer):
-                findings.error(f"Object '{target.name}' is hidden in the render: show it.")
+                findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
             else:
                 findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
             return None

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .method import METHODS
 from .row import Row
 from .summary import error_of, quantile
 from .svg_axes import COLOURS, SvgAxes, around
+
+_ORDER = tuple(METHODS)
 
 
 def time_to_quality(rows: Sequence[Row], target: float) -> str:
@@ -18,12 +21,16 @@ def time_to_quality(rows: Sequence[Row], target: float) -> str:
     A run counts from its end on; one that raises or ends above the target never does, so its curve stays below 100 %.
     Empty if no run has ended.
     """
+    return _reached(rows, target, "seconds of the fit")
+
+
+def _reached(rows: Sequence[Row], target: float, x_name: str) -> str:
     times = [row.seconds for row in rows if row.seconds]
     if not times:
         return ""
     axes = SvgAxes(
-        f"Share of scenes with FLIP at most {target:g} over time",
-        "seconds of the fit",
+        f"Share of scenes with FLIP at most {target:g}",
+        x_name,
         f"scenes with FLIP ≤ {target:g}",
         around(times),
         (0.0, 1.0),
@@ -37,6 +44,12 @@ def time_to_quality(rows: Sequence[Row], target: float) -> str:
         axes.line(points, _colour(method))
     axes.legend([(method, _colour(method)) for method, _ in _by_method(rows)])
     return axes.svg()
+
+
+def data_profile(rows: Sequence[Row], target: float) -> str:
+    """As `time_to_quality`, over passes, which do not depend on the machine."""
+    counted = [replace(row, seconds=row.passes) for row in rows]
+    return _reached(counted, target, "passes (pictures at full size; an Adam step counts 3)")
 
 
 def pareto(rows: Sequence[Row]) -> str:
@@ -72,11 +85,10 @@ def pareto(rows: Sequence[Row]) -> str:
 
 
 def _by_method(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
-    names = sorted({row.method for row in rows}, key=lambda name: METHODS.index(name) if name in METHODS else 99)
+    names = sorted({row.method for row in rows}, key=lambda name: _ORDER.index(name) if name in _ORDER else 99)
     return [(name, [row for row in rows if row.method == name]) for name in names]
 
 
 def _colour(method: str) -> str:
     """A method has the same colour in every plot; ours come first."""
-    order = [*reversed(METHODS)]
-    return COLOURS[order.index(method) % len(COLOURS)] if method in order else COLOURS[-1]
+    return COLOURS[_ORDER.index(method) % len(COLOURS)] if method in _ORDER else COLOURS[-1]

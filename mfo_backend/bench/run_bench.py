@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from ..types.errors import MfoError
 from ..types.status import Status
+from .method import is_quick
 from .row import Row, Task
 from .row_file import RowFile
 
@@ -23,18 +24,21 @@ class Runner(Protocol):
         """The row, its status `cancelled` where it was asked to stop before the end."""
         ...
 
-    def seed(self, task: Task) -> int:
-        """The seed of the task's fit."""
-        ...
-
 
 def all_tasks(scenarios: Iterable[str], methods: Sequence[str], scenes: int) -> list[Task]:
-    """Scene by scene, so that a bench that ends early has about as many scenes everywhere.
+    """Quick methods first, then scene by scene, so that a bench that ends early has as many scenes everywhere.
 
     A scene's methods follow each other: what else the machine does then disturbs them alike.
     """
     names = list(scenarios)
-    return [Task(scenario, scene, method) for scene in range(scenes) for scenario in names for method in methods]
+    rounds = [[m for m in methods if is_quick(m)], [m for m in methods if not is_quick(m)]]
+    return [
+        Task(scenario, scene, method)
+        for chosen in rounds
+        for scene in range(scenes)
+        for scenario in names
+        for method in chosen
+    ]
 
 
 def run_bench(
@@ -57,11 +61,7 @@ def run_bench(
             continue
         if should_stop():
             return False
-        try:
-            row = runner(task, should_stop)
-        except Exception as error:
-            log(traceback.format_exc())
-            row = _failed(task, runner, error)
+        row = measured_row(task, lambda task=task: runner(task, should_stop), runner.size, log)
         if row.status == Status.CANCELLED.value or (row.error and should_stop()):
             return False
         row = replace(row, machine=dict(machine))
@@ -70,7 +70,19 @@ def run_bench(
     return True
 
 
-def _failed(task: Task, runner: Runner, error: Exception) -> Row:
+def measured_row(
+    task: Task, measure: Callable[[], Row], size: int, log: Callable[[str], None] = lambda text: None
+) -> Row:
+    """The row of a task, or one with the error that was raised."""
+    try:
+        return measure()
+    except Exception as error:
+        log(traceback.format_exc())
+        return failed_row(task, size, error)
+
+
+def failed_row(task: Task, size: int, error: BaseException) -> Row:
+    """The row of a task that raised."""
     status = error.status if isinstance(error, MfoError) else Status.FAILED
     words = " ".join(str(error).split())
     sentence = words if isinstance(error, MfoError) else f"{type(error).__name__}: {words}"
@@ -78,8 +90,8 @@ def _failed(task: Task, runner: Runner, error: Exception) -> Row:
         scenario=task.scenario,
         scene=task.scene,
         method=task.method,
-        seed=runner.seed(task),
-        size=runner.size,
+        seed=task.scene,
+        size=size,
         status=status.value,
         error=sentence[:400],
     )

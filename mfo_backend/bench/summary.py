@@ -21,7 +21,7 @@ class Summary:
 
     `solved` and `close` count runs with a mean FLIP of at most 0.02 and 0.05. `seconds` are of runs that did not
     raise: median and 90th percentile. `seconds_per_solved` is the time of all runs over the number solved.
-    `flip` holds the quartiles of all runs.
+    `flip` holds the quartiles of all runs, `relit_flip` the median under all lights no fit saw, `jod` mean and minimum.
     """
 
     scenario: str
@@ -36,6 +36,8 @@ class Summary:
     flip: tuple[float, float, float]
     relative_rmse: float
     relit_relative_rmse: float
+    relit_flip: float
+    jod: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ def comparable(rows: Iterable[Row]) -> Comparable:
         methods.setdefault(row.scenario, set()).add(row.method)
         present.setdefault((row.scenario, row.scene), set()).add(row.method)
     kept = [row for row in rows if present[row.scenario, row.scene] == methods[row.scenario]]
-    kept.sort(key=lambda row: (_place(row.scenario, tuple(SCENARIOS)), row.scene, _place(row.method, METHODS)))
+    kept.sort(key=lambda row: (_place(row.scenario, tuple(SCENARIOS)), row.scene, _place(row.method, tuple(METHODS))))
     return Comparable(tuple(kept), len(rows) - len(kept))
 
 
@@ -64,7 +66,7 @@ def summaries(rows: Iterable[Row]) -> list[Summary]:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.scenario, row.method), []).append(row)
-    order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], METHODS)))
+    order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], tuple(METHODS))))
     return [_summary(scenario, method, groups[scenario, method]) for scenario, method in order]
 
 
@@ -89,6 +91,7 @@ def error_of(value: float | None) -> float:
 def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
     seconds = [row.seconds for row in rows if row.seconds is not None]
     flips = [error_of(row.flip) for row in rows]
+    jods = [row.jod for row in rows if row.jod is not None]
     solved = sum(flip <= SOLVED_FLIP for flip in flips)
     return Summary(
         scenario=scenario,
@@ -103,6 +106,8 @@ def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
         flip=(quantile(flips, 0.25), quantile(flips, 0.5), quantile(flips, 0.75)),
         relative_rmse=quantile([error_of(row.relative_rmse) for row in rows], 0.5),
         relit_relative_rmse=quantile([error_of(row.relit_relative_rmse) for row in rows], 0.5),
+        relit_flip=quantile([flip for row in rows for flip in (row.relit_flips or [math.inf])], 0.5),
+        jod=(sum(jods) / len(jods), min(jods)) if jods else (math.nan, math.nan),
     )
 
 

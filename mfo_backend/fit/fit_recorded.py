@@ -10,10 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.baked_view import HALF_LEVEL, BakedView
-from ..metrics.itp import Itp
 from ..metrics.pixel_check import check_finite
-from ..metrics.pu21 import Pu21
-from ..metrics.response import OnDisplay, Response, displayed_by, nits_per_unit
 from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..types.certainty import Certainty, Level
@@ -23,16 +20,17 @@ from ..types.result import FitResult
 from ..types.status import Status
 from .course import Course
 from .displayed_residual import DisplayedResidual
+from .finishing import finishing_residuals
 from .fit_material import FitOutcome
 from .recorded_stages import MakeResidual, Problem, RecordedFit, RecordedPlan, Vector
-from .residuals import CensoredResidual, RelativeResidual, ResponseResidual, log_residual, residual_rows
+from .residuals import CensoredResidual, RelativeResidual, log_residual, residual_rows
 from .settings import FitSettings
 from .stages import Candidate
 from .uncertainty import certainties, standard_deviations
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 
 STAGES = ("scan", "start", "refine")
-_CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
+CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
 
@@ -51,7 +49,7 @@ def fit_recorded(
 
     Parameters and errors are those of `fit_material`. The result is the best of the scene's own values and the end of
     every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the log difference
-    of tiles for `fast`, by true FLIP for `balanced`.
+    of tiles for `fast`, by true FLIP for `balanced`, by the last of the losses where the settings name them.
 
     Raises
     ------
@@ -72,13 +70,13 @@ def fit_recorded(
         if reference.encoding is Encoding.SRGB
         else DisplayView.for_scene(reference.pixels, mask)
     )
-    light = _linear(reference, view)
+    light = linear_pixels(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))
-    perceptual = _perceptual(ldr, light, mask, view) if settings.preset == "balanced" else {}
-    names = (*STAGES, *perceptual)
+    finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
+    names = (*STAGES, *finishing)
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
-    clipped = _clipped(reference, view)
+    clipped = clipped_pixels(reference, view)
     fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped)
 
     compressed = _censored(log_residual, reference, view)
@@ -91,17 +89,18 @@ def fit_recorded(
         solution, last = fit.refine(found, _censored(make, reference, view))
         found, certainty = _keep_unseen(fit, last, solution.x, notes)
         candidates.append(found)
-        for name, response in perceptual.items():
-            polished = fit.polish(name, last.groups, lambda target, r=response: ResponseResidual(r, target), found)
-            candidates.append(polished.x)
+        for name, finish in finishing.items():
+            # named losses are a ladder, each from the one before; the preset's own are alternatives
+            begin = found if settings.losses is None else candidates[-1]
+            candidates.append(fit.polish(name, last.groups, finish, begin).x)
     else:
         candidates.append(found)
 
     seed = settings.seed ^ VERIFY_STREAM
-    spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
+    spp = min(CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
     pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
     listener(Preview(pictures[-1].image))
-    best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(perceptual), ldr, compressed)))
+    best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(finishing), ldr, compressed)))
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     message = status.sentence
     if best == 0:
@@ -123,7 +122,7 @@ def fit_recorded(
     return FitOutcome(result, pictures[0].image, pictures[best].image)
 
 
-def _linear(reference: Image, view: View) -> Pixels:
+def linear_pixels(reference: Image, view: View) -> Pixels:
     """Scene-linear values of a reference; those above a display's white are lost."""
     if reference.encoding is Encoding.LINEAR:
         return np.maximum(reference.pixels, 0.0)
@@ -131,7 +130,7 @@ def _linear(reference: Image, view: View) -> Pixels:
     return view.linear(reference.pixels)
 
 
-def _clipped(reference: Image, view: View) -> Pixels | None:
+def clipped_pixels(reference: Image, view: View) -> Pixels | None:
     """1 where only a lower bound of the radiance is known, else 0; None for a linear reference."""
     if reference.encoding is Encoding.LINEAR:
         return None
@@ -148,14 +147,6 @@ def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:
     assert isinstance(view, DisplayView)
     limit = 2.0**-view.exposure_ev
     return lambda target: CensoredResidual(make(target), target, limit)
-
-
-def _perceptual(ldr: bool, light: Pixels, mask: NDArray[np.bool_], view: View) -> dict[str, Response]:
-    """The responses of the perceptual stages by name."""
-    if ldr:
-        return {"display": displayed_by(view), "itp": OnDisplay(view, Itp(100.0))}
-    nits = nits_per_unit(light, mask)
-    return {"itp": Itp(nits), "pu21": Pu21(nits)}
 
 
 def _keep_unseen(
@@ -200,7 +191,8 @@ def _judge(
 ) -> list[float]:
     """An error for each picture."""
     if perceptual:
-        name = "flip-ldr" if ldr else "flip-hdr"
+        names = None if settings.losses is None else settings.stage_names(reference.encoding)
+        name = names[-1] if names else "flip-ldr" if ldr else "flip-hdr"
         loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
         return [loss.value(picture.image) for picture in pictures]
     groups = fit.paths.tile_groups()

@@ -14,6 +14,7 @@ from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
 from .fit_recorded import fit_recorded
+from .fit_transmission import fit_transmission
 from .settings import FitSettings
 
 
@@ -36,8 +37,15 @@ def recover_material(
             return fit_recorded(
                 renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
             )
+        except UnrecordableError:
+            pass
+        try:
+            return fit_transmission(
+                renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
+            )
         except UnrecordableError as error:
             reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
+    settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
     notes = (*outcome.result.notes, *([reason] if reason else []))
     return replace(outcome, result=replace(outcome.result, notes=notes))

@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 
 from ..render.renderer import Interrupted
-from ..report.picture import displayed_linear, png_bytes
+from ..report.live_pictures import LivePictures
 from ..scene.image_file import check_reference, read_image
 from ..types.errors import MfoError
 from ..types.event import Event, Progress
@@ -60,7 +60,8 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> t
     reference, notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     folder.require_space(bytes_needed(request))
-    events.attach(folder, lambda pixels: png_bytes(displayed_linear(pixels, view)))
+    small = LivePictures(reference, view)
+    events.attach(folder, small.current, small.difference)
 
     def listener(event: Event) -> None:
         if isinstance(event, Progress):
@@ -82,7 +83,8 @@ def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[st
     BadInputError
         If it cannot be read, has another size than the scene, is all black or holds NaN or infinite pixels.
     """
-    image = read_image(folder.file(request.reference, what="request.json: reference.path"))
+    path = folder.file(request.reference, what="request.json: reference.path")
+    image = read_image(path, (request.width, request.height))
     return check_reference(Image(image.pixels, request.encoding, image.alpha), request.width, request.height)
 
 

@@ -197,7 +197,8 @@ def _add_glass(
     stack |= {
         "glass": w * weight * gain.scale,
         "glass_alpha": dr.maximum(dr.square(roughness), 1e-6),
-        "glass_ior": n,
+        # at exactly 1 the half vector of refraction has no length and its density is infinite
+        "glass_ior": dr.select(dr.abs(n - 1) < 1e-4, 1 + 1e-4, n),
         "glass_fresnel": DielectricTerm(f0, n, film.seen_from_inside(inside, ior) if film else None),
         "glass_colour": colour,
     }

@@ -17,6 +17,7 @@ from ..types.errors import BadInputError
 from ..types.image import Pixels
 from ..types.light_paths import LightPaths
 from .material_model import material_model
+from .plugins import check_plugins
 from .prepared_material import Materials, PreparedMaterial
 from .renderer import Pullback, Vector
 from .variant import load_variant
@@ -139,6 +140,7 @@ def load_mitsuba_renderer(
     if model == "auto":
         model = "blender_principled" if target.bsdf_id in materials else "mitsuba_principled"
     prepare = material_model(model)
+    check_plugins(document, scene_xml.name)
     prepare_for_fit(document)
     material = prepare(document, target, parameters, materials)
     # only Blender's model knows how to blur its lobes
@@ -153,11 +155,11 @@ def load_mitsuba_renderer(
     cycles_path.register()
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
-    with _two_threads():
+    with two_threads():
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
             scene = mi.load_string(to_text(document), optimize=False, parallel=False)
-        except RuntimeError as error:
+        except (RuntimeError, UnicodeDecodeError) as error:  # a message may hold bytes of a damaged file
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
@@ -197,7 +199,7 @@ def _opaque(seed: int) -> Any:
 
 
 @contextlib.contextmanager
-def _two_threads() -> Iterator[None]:
+def two_threads() -> Iterator[None]:
     """Mitsuba 3.9.1 waits for ever for an EXR file when its thread pool holds the calling thread alone."""
     import drjit as dr
 

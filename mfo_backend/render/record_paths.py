@@ -86,7 +86,7 @@ def record_paths(
         ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        if settings.two_sided or shape.bsdf().class_name() == "TwoSided":
+        if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
             si = _face_camera(si)
         dr.eval(si, position, filter_weight)
         lanes = _delta_lights(scene, si, position, filter_weight)
@@ -112,8 +112,8 @@ def indirect_share(
             RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths),
             allow_dark=True,
         )
-        sums = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) for p in (direct, everything)]
-    return (sums[1] - sums[0]) / max(sums[0], 1e-30)
+        lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
+    return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
 
 def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:

@@ -108,6 +108,22 @@ def test_a_target_out_of_sight_is_refused(tmp_path):
         RecordedScene(renderer, 1).record(renderer.start, grid=2, seed=0, near=False)
 
 
+def test_the_back_of_a_two_sided_material_is_lit(tmp_path):
+    # a sphere with its normals turned inside is the same picture
+    images = []
+    for shape in ("", '<boolean name="flip_normals" value="true"/>'):
+        renderer = load_renderer(
+            write_scene(tmp_path, POINT, shape=shape), "target", model="mitsuba_principled", parameters=NAMES
+        )
+        from mfo_backend.render.recorded_scene import RecordedScene
+
+        scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+        paths = scene.record(renderer.start, grid=2, seed=3, near=False)
+        images.append(scene.evaluator(paths, paths.tile_groups())(renderer.start)[:, :, 0])
+    assert images[0].max() > 0.1
+    np.testing.assert_allclose(images[1], images[0], rtol=1e-4, atol=1e-6)  # float32 of another frame
+
+
 def test_a_texture_is_refused(tmp_path):
     texture = """<texture type="checkerboard" name="clearcoat"/>"""
     renderer = load_renderer(
