@@ -12,6 +12,7 @@ from pathlib import Path
 from ..job.atomic_file import write_atomically
 from .findings import ablations, calibration, stage_gains, time_parts
 from .gallery import gallery
+from .hard_section import hard_section
 from .method import METHODS
 from .paper_tables import paper_tables
 from .plots import data_profile, pareto, time_to_quality
@@ -81,6 +82,7 @@ def write_report(folder: Path, *, notes: Sequence[str] = ()) -> str:
     for title, table in (
         ("What each stage gains", stage_gains(rows)),
         ("Ablations", ablations(rows)),
+        ("Hard cases", hard_section(folder)),
         ("How well the predicted standard deviations hold", calibration(rows)),
         ("Where the time goes: median seconds", time_parts(rows)),
         ("What raised", _raised(rows)),
