@@ -10,7 +10,7 @@ if sys.version_info < (3, 10):  # before anything that an older Python cannot ev
     )
     sys.exit(3)
 
-from .cli.main import main
+from .cli.main import main  # noqa: E402
 
 if __name__ == "__main__":
     sys.exit(main())
