@@ -85,6 +85,7 @@ def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[
     for future in futures.values():
         future.add_done_callback(ended.put)
     left, alive = len(futures), time.monotonic()
+    lost: list[Any] = []  # whose result was on a worker that died: Dask computes them again
     while left and not should_stop():
         try:
             future = ended.get(timeout=POLL_SECONDS)
@@ -95,10 +96,14 @@ def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[
                 raise SetupError(
                     "No Dask worker is left: start workers, then the same command goes on where it was."
                 ) from None
+            again, lost = lost, []
+            for future in again:
+                ended.put(future)
             continue
-        if future.status not in ("finished", "error"):  # nothing came of it, and it is nobody's error
-            raise SetupError(
-                f"The Dask scheduler gave up ({future.status}): start it, then the same command goes on where it was."
-            )
+        if future.status in ("lost", "pending"):
+            lost.append(future)
+            continue
+        if future.status == "cancelled":  # nothing came of it, and it is nobody's error
+            raise SetupError("The Dask scheduler is gone: start it, then the same command goes on where it was.")
         left -= 1
         yield keys[future.key], future

@@ -114,6 +114,17 @@ def test_a_scheduler_that_is_lost_makes_no_row():
         next(as_they_come(None, {TASKS[0]: Dropped()}, lambda: False))
 
 
+def test_a_result_that_is_lost_is_waited_for():
+    class Populated:
+        def scheduler_info(self):
+            waited.status = "finished"
+            return {"workers": {"one": {}}}
+
+    waited = Dropped()
+    waited.status = "lost"
+    assert list(as_they_come(Populated(), {TASKS[0]: waited}, lambda: False)) == [(TASKS[0], waited)]
+
+
 def test_without_workers_it_ends(monkeypatch):
     class Empty:
         def scheduler_info(self):
