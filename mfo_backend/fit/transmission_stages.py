@@ -111,7 +111,14 @@ class TransmissionFit:
         return TileRows.of(self.reference, self.mask, size, self.clipped, most)
 
     def halves(
-        self, tiles: TileRows, xs: Vector, *, seed: int, samples: int, jacobian: bool = True, near: bool = False,
+        self,
+        tiles: TileRows,
+        xs: Vector,
+        *,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        near: bool = False,
         moving: bool = True,
     ) -> list[Samples]:
         """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
@@ -180,6 +187,7 @@ class TransmissionFit:
             frozen = self._extras.copy()
             for name in held:
                 frozen[table.slice_of(name)] = True
+            equations: list[NormalEquations] = []
             for turn in range(plan.scan_steps + 1):
                 rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
                 equations = [_two_half(*pair) for pair in rows]
