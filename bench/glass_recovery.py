@@ -124,7 +124,7 @@ def summary(rows: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--size", type=int, default=128)

@@ -41,10 +41,11 @@ def recover_material(
             )
         except UnrecordableError as error:
             reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
-        with contextlib.suppress(UnrecordableError):
-            return fit_transmission(
-                renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
-            )
+        if settings.losses is None:  # its stages know no losses of the user's choice
+            with contextlib.suppress(UnrecordableError):
+                return fit_transmission(
+                    renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
+                )
     settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
     notes = (*outcome.result.notes, *([reason] if reason else []))

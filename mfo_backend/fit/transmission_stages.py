@@ -55,7 +55,7 @@ class TransmissionPlan:
     polish_samples: int = 8
     polish_steps: int = 24
     guard_samples: int = 16
-    enough: float = 0.006
+    enough: float = 0.003
 
 
 @dataclass
