@@ -4,6 +4,8 @@
 Light that enters the target meets its material several times, so there is no single recorded direction. Here a path is
 traced with the material itself and carries the derivative of its throughput by every free value (detached: the path
 stays where it is). Emitters are sampled at every vertex and weighted by the power heuristic, as Mitsuba's `path` does.
+Filter Glossy and the clamping of indirect light are Cycles', as in `cycles_path`, without its limits for one kind of
+bounce.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -26,7 +28,9 @@ from ..material.layers import layer_stack
 from ..material.lobe_sampling import NAMES, lobe_choice, pdf, sample
 from ..material.principled_plugin import BlenderPrincipled
 from ..types.errors import UnrecordableError
+from ..types.light_paths import LightPaths
 from ..types.parameter import ParameterTable
+from .cycles_path import CERTAIN, clamp_factor, least_alpha
 from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import _through_filter
 
@@ -93,6 +97,7 @@ class TracedPaths:
         integrator = scene.integrator()
         limit = int(getattr(integrator, "max_depth", DEEPEST))
         self._depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
+        self._light_paths = renderer.light_paths or LightPaths()
         self._hide = bool(getattr(integrator, "hide_emitters", False))
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
@@ -179,13 +184,17 @@ class TracedPaths:
             "before": dr.zeros(mi.Interaction3f, dr.width(offset)),
             "density": mi.Float(1.0),
             "delta": mi.Bool(True),
+            "least": mi.Float(CERTAIN),
             "depth": mi.UInt32(0),
             "active": mi.Bool(True),
         }
 
+        clamp = self._light_paths.clamp_indirect
+
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
             si = scene.ray_intersect(ray, active)
+            si.duv_dx = mi.Point2f(least_alpha(self._light_paths.filter_glossy, s["least"]), 0)
             emitter = si.emitter(scene, active)
             ds = mi.DirectionSample3f(scene, si, s["before"])
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
@@ -193,6 +202,7 @@ class TracedPaths:
             if self._hide:
                 seen = dr.select(depth == 0, 0.0, seen)
             emission = mi.Color3f(emitter.eval(si, active)) * seen
+            emission *= clamp_factor(clamp, beta[0] * emission, depth >= 2)
             total = [t + b * dr.select(active, emission, 0.0) for t, b in zip(total, beta, strict=True)]
             active = active & si.is_valid() & (depth + 1 < self._depth)
             # light sampled from here
@@ -217,6 +227,7 @@ class TracedPaths:
                 null = dr.select(off, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), null)
             weight = value * dr.select(ds.delta, 1.0, _power(ds.pdf, pdf_light))
             weight = dr.select(lit, weight, 0.0)
+            weight *= clamp_factor(clamp, beta[0] * f_light[0] * weight, depth >= 1)
             total[0] += beta[0] * f_light[0] * weight
             for k in range(directions):
                 total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight
@@ -233,6 +244,7 @@ class TracedPaths:
                 "before": mi.Interaction3f(si),
                 "density": pdf_next,
                 "delta": mi.Bool(null),
+                "least": dr.select(null | ~usable, s["least"], dr.minimum(s["least"], pdf_next)),
                 "depth": depth + 1,
                 "active": active,
             }
@@ -251,6 +263,7 @@ class TracedPaths:
         for p in self.table:
             parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
         layers = layer_stack(parameters, si.wi, plugin.lobes, plugin.model)
+        layers = layers.blurred(si.duv_dx.x) if plugin.filtered else layers
         choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha)
         only = plugin.reachable_only
         drawn, lobe, valid = sample(layers, choice, u1, u2)
