@@ -188,6 +188,7 @@ def main() -> None:
     parser.add_argument("--judge", default=sys.executable, metavar="PYTHON", help="a Python with ColorVideoVDP")
     parser.add_argument("--only", nargs="*", metavar="SEED/LIGHT", help="print the rows of these scenes alone")
     parser.add_argument("--out", type=Path, help="keep the scenes here, and do not repeat those that are there")
+    parser.add_argument("--kept", action="store_true", help="write the table of the scenes in OUT, measure no others")
     chosen = parser.parse_args()
     effort = Effort(chosen.size, chosen.samples, chosen.judge_samples)
     scenes = [(seed, light) for seed, light in SCENES if not chosen.only or f"{seed}/{light}" in chosen.only]
@@ -196,6 +197,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         for seed, light in scenes:
             folder = (chosen.out or Path(temporary)).absolute() / str(seed)
+            if chosen.kept and _kept(folder) is None:
+                rows.append(f"| {seed} | {light} | not measured |")
+                continue
             try:
                 found.append(_kept(folder) or recover(seed, light, folder, effort, chosen.judge))
             except RuntimeError as error:
