@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -157,7 +158,7 @@ def test_derivative_on_a_bound_is_the_finite_difference_inwards(name: str) -> No
             rows.append(value(view, light, {**values, name: changed}))
             if k == 0:
                 found = derivatives(view, light, {**values, name: changed})[name][component]
-        first, second = ((b - a) * inwards / step for a, b in zip(rows[:-1], rows[1:], strict=True))
+        first, second = ((b - a) * inwards / step for a, b in itertools.pairwise(rows))
         difference = 1.5 * first - 0.5 * second  # of second order at the bound itself
         scale = np.abs(difference) + 1e-3 * np.abs(rows[0]) + 1e-9
         smooth = np.abs(first - second) < 2e-3 * scale
