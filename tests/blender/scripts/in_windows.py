@@ -4,6 +4,7 @@
 Pictures of the screen go to the folder MFO_SCREENSHOTS, where ImageMagick's `import` can take them.
 """
 
+import functools
 import importlib
 import json
 import os
@@ -24,16 +25,16 @@ running_job, panel, preflight, fit_queue, handlers, cycles_check, shown_result =
     for name in ("running_job", "panel", "preflight", "fit_queue", "handlers", "cycles_check", "shown_result")
 )
 LONGEST_STALL = 0.05  # seconds
-spent: list[tuple[float, str]] = []
+spent: list[tuple[float, float, str]] = []  # wall seconds, seconds of this thread's processor time, name
 bpy.context.preferences.view.show_splash = False
 
 
 def timed(name, function, *arguments):
-    began = time.perf_counter()
+    began, worked = time.perf_counter(), time.thread_time()
     try:
         return function(*arguments)
     finally:
-        spent.append((time.perf_counter() - began, name))
+        spent.append((time.perf_counter() - began, time.thread_time() - worked, name))
 
 
 def timed_draw(cls):
@@ -46,6 +47,8 @@ the_tick, the_check, the_cycles_tick = running_job._tick, preflight._run, cycles
 running_job._tick = lambda: timed("tick", the_tick)
 preflight._run = lambda: timed("check", the_check)
 cycles_check._tick = lambda: timed("cycles", the_cycles_tick)
+for part in (running_job.step, running_job._record_as_undo_step, running_job._start_next):  # of the tick
+    setattr(running_job, part.__name__, functools.partial(timed, part.__name__, part))
 for cls in panel.CLASSES:
     if issubclass(cls, bpy.types.Panel):
         cls.draw = timed_draw(cls)
@@ -173,6 +176,8 @@ def check_and_mend():
     assert preflight.is_thorough
     yield from shot("02_check_ready")
     bpy.context.scene.mfo.parameter_set = "chosen"
+    do(bpy.ops.mfo.limit_value, name="roughness")
+    yield 2.0  # the longest list of all
     yield from shot("03_values_chosen")
     bpy.context.scene.mfo.parameter_set = "all"
 
@@ -329,9 +334,11 @@ def story():
     assert not bpy.ops.mfo.toggle.poll()
     yield from queue()
     yield from survive()
-    stall, name = max(spent)
-    assert stall < LONGEST_STALL, f"{name} took {stall * 1000:.1f} ms"
-    print(f"ALL GOOD, longest stall {stall * 1000:.1f} ms ({name}) in {len(spent)} calls", flush=True)
+    slowest = [f"{name} {wall * 1e3:.1f} ({work * 1e3:.1f})" for wall, work, name in sorted(spent)[:-9:-1]]
+    print("ms of wall (processor) time:", ", ".join(slowest), flush=True)
+    stall = max(spent)[0]
+    assert stall < LONGEST_STALL, f"{stall * 1000:.1f} ms"
+    print(f"ALL GOOD, longest stall {stall * 1000:.1f} ms in {len(spent)} calls", flush=True)
 
 
 steps = story()
