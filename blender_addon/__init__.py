@@ -18,6 +18,7 @@ from . import (
     previews,
     properties,
     running_job,
+    translations,
 )
 from .operators import CLASSES as OPERATORS
 from .panel import menu
@@ -34,6 +35,7 @@ def register() -> None:
     previews.register()
     menu.register()
     handlers.register()
+    translations.register()
     backend_state.register()
     if is_module():
         atexit.register(unregister)  # what is still registered at its end crashes bpy 4.2 and stops bpy 4.5
@@ -49,6 +51,7 @@ def unregister() -> None:
     preflight.reset()
     comparison.forget()
     menu.unregister()
+    translations.unregister()
     previews.unregister()
     properties.detach()
     for cls in reversed(CLASSES):

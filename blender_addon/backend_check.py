@@ -102,15 +102,23 @@ def _read(code: int, out: str, err: str, python: Path) -> Verdict:
     line = next((line for line in reversed(out.splitlines()) if line.startswith("{")), "")
     try:
         checks = {check["name"]: check for check in json.loads(line)["checks"]}
-        problems = [
-            f"{c['name']}: {c['found']}. {c['cure']}".strip() for c in checks.values() if c["state"] == "problem"
-        ]
+        problems = _problems([check for check in checks.values() if check["state"] == "problem"])
     except (ValueError, KeyError, TypeError):
         last = next((text.strip() for text in reversed(err.splitlines()) if text.strip()), f"exit code {code}")
         return Verdict(False, f"{python} does not run the backend: {last}")
     if problems:
         return Verdict(False, "The backend is installed but cannot run.", problems)
     return Verdict(True, _summary({name: check["found"] for name, check in checks.items()}))
+
+
+def _problems(checks: list[dict[str, str]]) -> list[str]:
+    """A line for each problem with its cure; missing packages are one."""
+    missing = [check["name"] for check in checks if check["found"] == "not installed"]
+    others = [c for c in checks if c["name"] not in missing and not (missing and c["name"] == "Mitsuba variant")]
+    lines = [f"{check['name']}: {check['found']}. {check['cure']}".strip() for check in others]
+    if missing:
+        lines.insert(0, f"Its Python lacks {', '.join(missing)}: install the backend, or choose another Python.")
+    return lines
 
 
 def _summary(found: dict[str, str]) -> str:

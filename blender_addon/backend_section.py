@@ -54,9 +54,11 @@ def draw_setup(layout: bpy.types.UILayout, *, width: int) -> None:
         _wrapped(box, state.sentence, width)
     for problem in state.problems:
         _wrapped(box, problem, width)
+    if state.name != "READY":
+        row = box.row()
+        row.scale_y = 1.2
+        row.operator("mfo.install_backend", text="Install Again" if state.has_folder else "Install", icon="IMPORT")
     row = box.row(align=True)
-    text = "Install Again" if state.has_folder else "Install"
-    row.operator("mfo.install_backend", text=text, icon="IMPORT")
     if state.python:
         row.operator("mfo.test_backend", text="Test", icon="FILE_REFRESH")
     if state.has_folder:

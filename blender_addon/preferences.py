@@ -53,12 +53,13 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """The state of the backend, the paths, and a line where the variable wins over the first."""
         from .backend_section import draw_setup  # it imports this module
 
         layout = self.layout
-        draw_setup(layout, width=90)
+        letters = int((context.region.width / context.preferences.system.ui_scale - 140) / 5.8)
+        draw_setup(layout, width=max(16, letters))
         layout.use_property_split = True
         layout.prop(self, "base_python")
         layout.prop(self, "wheels")

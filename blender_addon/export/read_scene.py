@@ -161,6 +161,14 @@ class _Walk:
         slots = np.clip(mesh.slots, 0, last)
         for slot in np.unique(slots):
             piece = world_mesh(mesh, slots == slot, matrix)
+            left_out = int((slots == slot).sum()) - len(piece.triangles)
+            if left_out:
+                self.findings.note(
+                    f"Object '{item.name}' has {left_out} triangles with corners at NaN, infinite or absurdly far "
+                    "positions; they are left out."
+                )
+            if not len(piece.triangles):
+                continue
             if is_target and slot == self.slot:
                 self.target_pieces.append((piece, mesh.is_closed))
                 continue

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BASE = getattr(sys, "_base_executable", sys.executable)
 
 
-def finished(install: BackendInstall, seconds: float = 60) -> BackendInstall:
+def finished(install: BackendInstall, seconds: float = 240) -> BackendInstall:
     end = time.monotonic() + seconds
     while install.outcome is None:
         assert time.monotonic() < end, install.lines
@@ -99,7 +99,10 @@ def test_cancel_ends_the_whole_group_and_removes_the_environment(folder: Path, w
     assert (outcome.status, outcome.sentence) == ("cancelled", "Cancelled; nothing was installed.")
     assert not list(folder.glob("env-*"))
     assert install.pid is not None
-    assert not group_lives(install.pid)
+    end = time.monotonic() + 5  # the system may take a moment to bury what was killed
+    while group_lives(install.pid):
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
