@@ -34,7 +34,9 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("ladder.jsonl"))
     parser.add_argument("--doc", type=str, default=str(ROOT / "docs" / "ladder.md"))
     arguments = parser.parse_args()
-    rows = [json.loads(line) for line in arguments.rows.read_text("utf-8").splitlines()] if arguments.rows.exists() else []
+    rows = (
+        [json.loads(line) for line in arguments.rows.read_text("utf-8").splitlines()] if arguments.rows.exists() else []
+    )
     done = {row["scene"] for row in rows}
     missing = [number for number in range(arguments.scenes) if number not in done]
     if missing:

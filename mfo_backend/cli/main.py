@@ -23,6 +23,8 @@ COMMANDS = {
     "fit": "fit a material of a Mitsuba scene to a reference picture",
     "blend": "fit a material of a .blend file to a reference picture",
     "compare": "measure the difference between two pictures",
+    "judge": "measure a picture against the reference of a job",
+    "batch": "run many job folders, several at a time or on a cluster",
     "bench": "measure speed against error on random scenes",
     "run": "run a job folder (what the Blender add-on starts)",
 }

@@ -83,19 +83,22 @@ class Course:
 
         def watched(x: Vector) -> NormalEquations:
             equations = residuals(x)
-            loss = float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf
-            if not stage.curve:
-                stage.loss_start = loss
-            stage.loss_best = min(stage.loss_best, loss)
-            now = time.monotonic()
-            seconds = now - self._began
-            stage.curve.append(CurvePoint(len(stage.curve) + 1, loss, stage.loss_best, seconds, self._renderer.passes))
-            if now - self._told > _QUIET_SECONDS:
-                self._told = now
-                self._tell(stage, loss, seconds)
+            self.note(stage, float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf)
             return equations
 
         return watched
+
+    def note(self, stage: Stage, loss: float) -> None:
+        """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard."""
+        if not stage.curve:
+            stage.loss_start = loss
+        stage.loss_best = min(stage.loss_best, loss)
+        now = time.monotonic()
+        seconds = now - self._began
+        stage.curve.append(CurvePoint(len(stage.curve) + 1, loss, stage.loss_best, seconds, self._renderer.passes))
+        if now - self._told > _QUIET_SECONDS:
+            self._told = now
+            self._tell(stage, loss, seconds)
 
     def _tell(self, stage: Stage, loss: float, seconds: float) -> None:
         index = self.names.index(stage.name)

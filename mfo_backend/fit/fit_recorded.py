@@ -30,7 +30,7 @@ from .uncertainty import certainties, standard_deviations
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 
 STAGES = ("scan", "start", "refine")
-_CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
+CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
 
@@ -70,13 +70,13 @@ def fit_recorded(
         if reference.encoding is Encoding.SRGB
         else DisplayView.for_scene(reference.pixels, mask)
     )
-    light = _linear(reference, view)
+    light = linear_pixels(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
     names = (*STAGES, *finishing)
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
-    clipped = _clipped(reference, view)
+    clipped = clipped_pixels(reference, view)
     fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped)
 
     compressed = _censored(log_residual, reference, view)
@@ -97,7 +97,7 @@ def fit_recorded(
         candidates.append(found)
 
     seed = settings.seed ^ VERIFY_STREAM
-    spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
+    spp = min(CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
     pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
     listener(Preview(pictures[-1].image))
     best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(finishing), ldr, compressed)))
@@ -122,7 +122,7 @@ def fit_recorded(
     return FitOutcome(result, pictures[0].image, pictures[best].image)
 
 
-def _linear(reference: Image, view: View) -> Pixels:
+def linear_pixels(reference: Image, view: View) -> Pixels:
     """Scene-linear values of a reference; those above a display's white are lost."""
     if reference.encoding is Encoding.LINEAR:
         return np.maximum(reference.pixels, 0.0)
@@ -130,7 +130,7 @@ def _linear(reference: Image, view: View) -> Pixels:
     return view.linear(reference.pixels)
 
 
-def _clipped(reference: Image, view: View) -> Pixels | None:
+def clipped_pixels(reference: Image, view: View) -> Pixels | None:
     """1 where only a lower bound of the radiance is known, else 0; None for a linear reference."""
     if reference.encoding is Encoding.LINEAR:
         return None

@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 
 from ..render.renderer import Interrupted
-from ..report.picture import displayed_linear, png_bytes
+from ..report.live_pictures import LivePictures
 from ..scene.image_file import check_reference, read_image
 from ..types.errors import MfoError
 from ..types.event import Event, Progress
@@ -64,7 +64,8 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> t
     reference, notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     folder.require_space(bytes_needed(request))
-    events.attach(folder, lambda pixels: png_bytes(displayed_linear(pixels, view)))
+    small = LivePictures(reference, view)
+    events.attach(folder, small.current, small.difference)
 
     def listener(event: Event) -> None:
         if isinstance(event, Progress):

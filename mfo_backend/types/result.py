@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .certainty import Certainty
+from .model_gap import ModelGap
 from .parameter import Value
 from .status import Status
 
@@ -41,7 +42,7 @@ class FitResult:
 
     `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
     well the picture determines each value, where the preset finds out; `notes` are sentences on what was left out or
-    kept.
+    kept. `model_gap` is None where it could not be measured.
     """
 
     status: Status
@@ -56,3 +57,4 @@ class FitResult:
     passes: float
     certainty: dict[str, Certainty] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    model_gap: ModelGap | None = None

@@ -48,7 +48,7 @@ def test_equals_the_path_traced_picture(tmp_path, lights, depth, rfilter, grid, 
     error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
     assert error < tolerance
     np.testing.assert_allclose(
-        got.sum(axis=0), expected.sum(axis=0), rtol=0.3 * tolerance
+        got.sum(axis=0), expected.sum(axis=0), rtol=0.5 * tolerance
     )  # noise averages out, bias would not
 
 
