@@ -74,7 +74,9 @@ def backend(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
 
     job = export(folder, size)
     request = json.loads((job / "request.json").read_text())
-    cache = Path(os.environ.get("DRJIT_CACHE_DIR", Path.home() / ".drjit"))
+    cache = folder / "kernels"  # nobody else's
+    cache.mkdir()
+    os.environ["DRJIT_CACHE_DIR"] = str(cache)
     rows = []
     for index in range(fits):
         request["fit"] |= {
@@ -94,7 +96,7 @@ def backend(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
                 "megabytes": pages * 4096 / 1e6,
                 "files": len(os.listdir("/proc/self/fd")),
                 "threads": len(os.listdir("/proc/self/task")),
-                "kernels": len(list(cache.glob("*"))) if cache.is_dir() else 0,
+                "kernels": len(list(cache.rglob("*"))),
             }
         )
         if index == fits - 1 or index % 20 == 19:
