@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,11 +42,12 @@ def export_job(
     reference: Path | bpy.types.Image | None,
     fit: dict[str, Any],
     bake_view: bool = False,
+    tell: Callable[[float], None] = lambda share: None,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
     With `bake_view` a display picture is taken under any view of the scene, whose table goes into the job; else one
-    that cannot be undone by a formula is refused.
+    that cannot be undone by a formula is refused. `tell` gets the share of the work that is done, from 0 to 1.
 
     Raises
     ------
@@ -53,7 +55,8 @@ def export_job(
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
     findings = Findings()
-    data = read_scene(context, obj, findings)
+    tell(0.0)
+    data = read_scene(context, obj, findings, lambda share: tell(0.8 * share))
     findings.raise_first()
     assert data is not None
     picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height), bake_view=bake_view)
@@ -64,6 +67,7 @@ def export_job(
         )
     files = scene_files(data, findings)
     request = _request(context, obj, data, files, picture, fit, findings)
+    tell(0.9)
     with new_job_folder(Path(folder)) as partial:
         files.write(partial)
         if picture is not None:
@@ -71,6 +75,7 @@ def export_job(
         (partial / "request.json").write_text(
             json.dumps(request, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
         )
+    tell(1.0)
     return ExportReport(Path(folder), request, tuple(findings.notes))
 
 

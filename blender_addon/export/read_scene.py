@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -29,8 +30,13 @@ DEFAULT_SPP = 64
 BOUNCES = ("diffuse", "glossy", "transmission")
 
 
-def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
-    """Return the scene as the render would see it, or None with errors in `findings`."""
+def read_scene(
+    context: bpy.types.Context,
+    target: bpy.types.Object,
+    findings: Findings,
+    tell: Callable[[float], None] = lambda share: None,
+) -> SceneData | None:
+    """Return the scene as the render would see it, or None with errors in `findings`; `tell` gets the share done."""
     scene, view_layer = context.scene, context.view_layer
     if target is None or target.type not in MESH_TYPES:
         what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
@@ -47,6 +53,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         findings.note("Compositing nodes are left out: a reference that went through them holds more than the render.")
     with render_state(view_layer, scene):
         depsgraph = context.evaluated_depsgraph_get()
+        tell(0.1)
         camera = read_camera(scene, depsgraph, findings)
         settings = _read_settings(scene, findings)
         slot = target.active_material_index
@@ -55,7 +62,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         if camera is None or material is None:
             return None
         data = SceneData(camera, settings, read_world(scene, settings.exposure, findings))
-        _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run()
+        _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run(tell)
         if data.target is None:
             if target.name_full not in rendered_objects(view_layer):
                 findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
@@ -64,6 +71,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
             return None
         if not data.world.is_lit and not data.lights and not data.emitting:
             findings.error("The scene has no light: add a light or give the world a colour.")
+        tell(0.9)
         check_visible(data, target, scene, depsgraph, findings)
     return data
 
@@ -121,8 +129,10 @@ class _Walk:
         data.materials[TARGET_BSDF] = material
         self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
 
-    def run(self) -> None:
-        for instance in self.depsgraph.object_instances:
+    def run(self, tell: Callable[[float], None]) -> None:
+        count = len(self.depsgraph.object_instances)
+        for index, instance in enumerate(self.depsgraph.object_instances):
+            tell(0.1 + 0.8 * index / count)
             item = instance.object
             if not self._is_rendered(instance, item):
                 continue

@@ -78,11 +78,18 @@ class FitOptions:
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
+        fit, bake_view = self._fit(settings), self.bake_view or settings.bake_view
+        manager = context.window_manager
+        manager.progress_begin(0.0, 100.0)  # a number at the mouse; nothing else is drawn before the operator returns
         try:
-            bake_view = self.bake_view or settings.bake_view
-            report = export_job(context, obj, folder, reference=reference, fit=self._fit(settings), bake_view=bake_view)
+            report = export_job(
+                context, obj, folder, reference=reference, fit=fit, bake_view=bake_view,
+                tell=lambda share: manager.progress_update(100.0 * share),
+            )  # fmt: skip
         except ExportError as error:
             raise FitError(str(error)) from error
+        finally:
+            manager.progress_end()
         picture = folder / report.request["reference"]["path"]
         return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
 

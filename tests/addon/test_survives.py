@@ -96,8 +96,19 @@ def test_a_disk_that_is_full_when_the_backend_starts(scene: SimpleNamespace, mon
     assert not Path(scene.job).exists()
 
 
+def test_two_blenders_choose_two_folders(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.preferences import new_job_folder
+
+    context, first = scene.bpy.context, os.getpid()
+    names = set()
+    for pid in (first, first + 1):
+        monkeypatch.setattr(os, "getpid", lambda pid=pid: pid)
+        names.add(new_job_folder(context, "Glaze").name[20:])  # after the time
+    assert names == {f"Glaze_{first}", f"Glaze_{first + 1}"}
+
+
 def test_two_blenders_at_once(scene: SimpleNamespace, tmp_path: Path) -> None:
-    """Same second, same material, same default folder: two jobs, two results."""
+    """Same material, same default folder, about the same time: two jobs, two results."""
     png(tmp_path / "reference.png", (180, 60, 40), WIDTH, HEIGHT)
     start = time.time() + 8  # both have started by then, even on a busy machine most of the time
     code = (
