@@ -251,7 +251,7 @@ def lock() -> int:
     options = ["--universal", "--generate-hashes", *quiet]
     compile_lock = [python, "-m", "uv", "pip", "compile", "pyproject.toml", *options]
     run(*compile_lock, "--python-version", "3.10", "-o", "requirements/backend.lock")
-    run(*compile_lock, "--python-version", "3.11", "--group", "dev", "--extra", "plots", "-o", "requirements/dev.lock")
+    run(*compile_lock, "--python-version", "3.11", "--group", "dev", "-o", "requirements/dev.lock")
     return 0
 
 

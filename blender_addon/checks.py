@@ -21,7 +21,7 @@ from .export.reference import LINEAR_SUFFIXES, holds_display_colours, needs_tabl
 from .export.render_state import rendered_objects
 from .export.shader_graph import source_of
 from .picture_header import read_header
-from .properties import SOCKET_ITEMS
+from .properties import SOCKET_ITEMS, crossed_limits
 from .versions import overrides_of
 
 FINE, IGNORED, STOPS = "fine", "ignored", "stops"
@@ -83,13 +83,15 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
     assert node is not None
     linked = [s.name for s in node.inputs if s.name in _FITTED and source_of(s) is not None]
     settings = scene.mfo
+    found = [Finding(FINE, f"'{material.name}' has a Principled BSDF.")]
     if settings.parameter_set == "chosen" and settings.model == "blender_principled":
         chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets}
         if not chosen - set(linked):
             fix = (Fix("all_parameters"),)
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
-    found = [Finding(FINE, f"'{material.name}' has a Principled BSDF.")]
+        for name in crossed_limits(settings):
+            found.append(Finding(STOPS, f"The limits of {name} leave nothing: the least must be below the most."))
     linked = [name for name in linked if f"{name} of material" not in said]
     if linked:
         sentence = f"Linked and therefore not fitted: {', '.join(linked)}."
@@ -107,8 +109,9 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
         findings.error(f"{sentence}: remove the override.", Fix("no_override"))
     found = list(from_export(findings))
     if scene.render.engine != "CYCLES":
-        sentence = f"The render engine is {scene.render.engine.removeprefix('BLENDER_').title()}; the fit reproduces "
-        found.append(Finding(IGNORED, sentence + "what Cycles shows.", (Fix("cycles"),)))
+        engine = scene.render.engine.removeprefix("BLENDER_").replace("_", " ").title()
+        sentence = f"The render engine is {engine}; the fit reproduces what Cycles shows."
+        found.append(Finding(IGNORED, sentence, (Fix("cycles"),)))
     if not findings.errors:
         width, height = picture_size(scene.render)
         found.append(Finding(FINE, f"Camera '{scene.camera.name}', {width} x {height} pixels."))

@@ -46,6 +46,12 @@ def add(fit: PreparedFit) -> None:
     waiting.append(fit)
 
 
+def begin() -> None:
+    """A fit starts that did not wait: what is told of an earlier queue is old."""
+    if not _running:
+        finished.clear()
+
+
 def take() -> PreparedFit | None:
     """The next fit, no longer waiting; None if there is none."""
     global _running

@@ -124,6 +124,8 @@ def render(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
+    from .versions import can_denoise
+
     scene = bpy.context.scene
     if scene.camera is None:
         raise HeadlessError(f"The scene of {chosen.file} has no camera: add one.")
@@ -131,6 +133,8 @@ def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
     if chosen.samples:
         scene.cycles.samples, scene.cycles.seed = chosen.samples, chosen.seed
         scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    elif not can_denoise():
+        scene.cycles.use_denoising = False
     scene.render.use_compositing = scene.render.use_sequencer = False
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # Blender 5.0

@@ -170,10 +170,9 @@ class JobProcess:
             )
         if code < 0:
             name = _signal_name(-code)
-            cause = (
-                "The backend was killed; the memory may have run out" if name == "SIGKILL" else "The backend crashed"
-            )
-            cause += f" ({name})"
+            # native code that gets no memory ends in a segmentation fault (Dr.Jit 1.5.0, Embree 3)
+            ended = "was killed" if name == "SIGKILL" else "crashed"
+            cause = f"The backend {ended} ({name}); the memory may have run out, so try a lower resolution"
         else:
             cause = _EXIT_SENTENCES.get(code, f"The backend ended with the unknown exit code {code}")
         tail = log_tail(self.folder / LOG)

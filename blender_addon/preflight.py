@@ -103,4 +103,5 @@ def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
         (render.use_multiview, view.view_transform, view.look, view.use_curve_mapping),
         (settings.reference_source, settings.reference_path, getattr(settings.reference_image, "name", "")),
         (settings.bake_view, settings.parameter_set, settings.model, frozenset(settings.sockets)),
+        [(bound.name, bound.lower, bound.upper) for bound in settings.bounds],
     )

@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy.utils.previews
+import numpy as np
+
+from .export.png_file import write_png
 
 _collection: Any = None
 _shown: dict[str, str] = {}
 _serial = 0
+_is_warm = False
 _SWATCH = 16  # pixels
 _SMALL = 300_000  # bytes of a PNG that is read within some milliseconds
 
@@ -29,6 +34,21 @@ def unregister() -> None:
     if _collection is not None:
         bpy.utils.previews.remove(_collection)
         _collection = None
+
+
+def warm_up() -> None:
+    """Load a picture of one pixel: the first picture of a session costs Blender some 50 ms more than any other.
+
+    An operator can afford them, the timer that shows the pictures of a running fit cannot.
+    """
+    global _is_warm
+    if _collection is None or bpy.app.background or _is_warm:
+        return
+    _is_warm = True
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pixel.png"
+        write_png(path, np.zeros((1, 1, 3), np.uint8))
+        show("pixel", path, now=True)
 
 
 def show(name: str, path: Path, *, now: bool = False) -> None:

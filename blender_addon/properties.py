@@ -66,8 +66,19 @@ PRESET_ITEMS = (
 )
 
 
+# where a bound starts when it is switched on; elsewhere 0 to 1
+_RANGES = {"ior": (1.0, 3.0), "coat_ior": (1.0, 3.0), "thin_film_ior": (1.0, 3.0), "thin_film_thickness": (0.0, 1000.0)}
+
+
 def _has_pixels(_self: object, image: bpy.types.Image) -> bool:
     return image.source in {"FILE", "GENERATED"} and not image.name.startswith("Material Fit ")
+
+
+class MFO_PG_bound(bpy.types.PropertyGroup):
+    """Limits of one value during a fit, of every channel of a colour; the parameter's name in `name`."""
+
+    lower: FloatProperty(name="Least", description="The fit goes no lower", precision=3, step=1)
+    upper: FloatProperty(name="Most", description="The fit goes no higher", precision=3, step=1, default=1.0)
 
 
 class MFO_PG_settings(bpy.types.PropertyGroup):
@@ -114,6 +125,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         options={"ENUM_FLAG"},
         default=SOCKETS_START,
     )
+    bounds: CollectionProperty(type=MFO_PG_bound)
     model: EnumProperty(name="Model", description="Material model to fit", items=MODEL_ITEMS)
     range: EnumProperty(
         name="Range",
@@ -213,6 +225,7 @@ class MFO_PG_material(bpy.types.PropertyGroup):
 
 
 CLASSES = (
+    MFO_PG_bound,
     MFO_PG_settings,
     MFO_PG_message,
     MFO_PG_row,
@@ -221,6 +234,24 @@ CLASSES = (
     MFO_PG_past_result,
     MFO_PG_material,
 )
+
+
+def toggle_bound(settings: bpy.types.PropertyGroup, name: str) -> None:
+    """Give the value `name` limits of its own, or take them away."""
+    index = settings.bounds.find(name)
+    if index >= 0:
+        settings.bounds.remove(index)
+        return
+    bound = settings.bounds.add()
+    bound.name = name
+    bound.lower, bound.upper = _RANGES.get(name, (0.0, 1.0))
+
+
+def crossed_limits(settings: bpy.types.PropertyGroup) -> list[str]:
+    """Labels of the chosen values whose least is not below their most."""
+    labels = {key: label for key, label, *_ in SOCKET_ITEMS}
+    crossed = (bound.name for bound in settings.bounds if not bound.lower < bound.upper)
+    return [labels[name] for name in crossed if name in settings.sockets and name in labels]
 
 
 def chosen_of(model: str) -> str:

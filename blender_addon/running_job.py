@@ -59,6 +59,7 @@ def start(fit: PreparedFit, *, timer: bool) -> None:
     shown_result.clear(runtime)
     runtime.state, runtime.material, runtime.job_folder = "RUNNING", fit.material_name, str(fit.folder)
     runtime.progress_text = "Starting"
+    previews.warm_up()
     previews.show("reference", fit.reference)
     for note in fit.notes:
         add_message(runtime, note, "INFO")

@@ -42,12 +42,13 @@ def export_job(
     reference: Path | bpy.types.Image | None,
     fit: dict[str, Any],
     bake_view: bool = False,
-    tell: Callable[[float], None] = lambda share: None,
+    tell: Callable[[float], None] = lambda _share: None,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
     With `bake_view` a display picture is taken under any view of the scene, whose table goes into the job; else one
-    that cannot be undone by a formula is refused. `tell` gets the share of the work that is done, from 0 to 1.
+    that cannot be undone by a formula is refused. `tell` gets the share that is done, of work that a million triangles
+    make some seconds long.
 
     Raises
     ------
@@ -55,10 +56,10 @@ def export_job(
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
     findings = Findings()
-    tell(0.0)
-    data = read_scene(context, obj, findings, lambda share: tell(0.8 * share))
+    data = read_scene(context, obj, findings)
     findings.raise_first()
     assert data is not None
+    tell(0.4)
     picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height), bake_view=bake_view)
     if picture is not None and picture.view is not None:
         findings.note(
@@ -66,16 +67,16 @@ def export_job(
             "scene has it now: the reference must have been rendered with the same look, exposure, gamma and curves."
         )
     files = scene_files(data, findings)
+    tell(0.5)
     request = _request(context, obj, data, files, picture, fit, findings)
-    tell(0.9)
     with new_job_folder(Path(folder)) as partial:
         files.write(partial)
+        tell(0.9)
         if picture is not None:
             picture.write(partial)
         (partial / "request.json").write_text(
             json.dumps(request, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
         )
-    tell(1.0)
     return ExportReport(Path(folder), request, tuple(findings.notes))
 
 

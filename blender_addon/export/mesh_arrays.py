@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .ply_file import TriangleMesh
 
+FARTHEST = 1e18  # metres; the square of a distance must fit into a float32
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, near 2**64 over the golden ratio (Knuth, TAOCP 3, 6.4)
 
 
@@ -28,8 +29,9 @@ class CornerMesh:
 def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:
     """Return the triangles selected by `slots` (triangles,) moved by the 4x4 `matrix`, equal corners shared.
 
-    Normals move with the inverse transpose. A mirroring matrix turns the winding around, so that the side a normal
-    points to stays the outside, as in Cycles.
+    Triangles with a corner at NaN or farther than FARTHEST are left out. Normals move with the inverse
+    transpose. A mirroring matrix turns the winding around, so that the side a normal points to stays the outside, as in
+    Cycles.
     """
     # sharing comes first: the corners are six times as many as the vertices of a smooth mesh
     parts = (mesh.positions, mesh.normals, mesh.uvs)
@@ -42,13 +44,19 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     )
     if mirrored:
         cofactor = -cofactor
-    positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
-    normals = rows[:, 3:6].astype(np.float64) @ cofactor.T
-    lengths = np.linalg.norm(normals, axis=1)
-    normals /= np.maximum(lengths, 1e-20)[:, None]
+    with np.errstate(invalid="ignore", over="ignore"):
+        positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
+        held = (np.abs(positions) < FARTHEST).all(axis=1)  # False for NaN
+        if not held.all():
+            rows, index = _shared(rows[index[np.repeat(held[index].reshape(-1, 3).all(axis=1), 3)]])
+            positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
+        normals = rows[:, 3:6].astype(np.float64) @ cofactor.T
+        lengths = np.linalg.norm(normals, axis=1)
+    without = ~(lengths > 1e-20)  # True for NaN
+    normals = np.where(without[:, None], 0.0, normals) / np.where(without, 1.0, lengths)[:, None]
     # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
-    rows = np.concatenate([positions, normals, rows[:, 6:] * (1.0, -1.0) + (0.0, 1.0)], axis=1).astype(np.float32)
-    without = lengths <= 1e-20
+    uvs = np.nan_to_num(rows[:, 6:], posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
+    rows = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
     if without.any():  # such a corner takes the normal of its triangle
         rows, without = rows[index], without[index]
         rows[without, 3:6] = _face_normals(positions[index].reshape(-1, 3, 3), mirrored)[without]
@@ -93,7 +101,7 @@ def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.
         hashes = (hashes ^ pairs[:, column]) * _FACTOR
         hashes ^= hashes >> np.uint64(32)
     _, first, index = np.unique(hashes, return_index=True, return_inverse=True)
-    if (rows[first][index] == rows).all():
+    if (pairs[first][index] == pairs).all():  # as bits, since NaN is not equal to itself
         return rows[first], index
     _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)  # two rows had one hash
     return rows[first], index.reshape(-1)

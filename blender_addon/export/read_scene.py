@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -30,13 +29,8 @@ DEFAULT_SPP = 64
 BOUNCES = ("diffuse", "glossy", "transmission")
 
 
-def read_scene(
-    context: bpy.types.Context,
-    target: bpy.types.Object,
-    findings: Findings,
-    tell: Callable[[float], None] = lambda share: None,
-) -> SceneData | None:
-    """Return the scene as the render would see it, or None with errors in `findings`; `tell` gets the share done."""
+def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
+    """Return the scene as the render would see it, or None with errors in `findings`."""
     scene, view_layer = context.scene, context.view_layer
     if target is None or target.type not in MESH_TYPES:
         what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
@@ -53,7 +47,6 @@ def read_scene(
         findings.note("Compositing nodes are left out: a reference that went through them holds more than the render.")
     with render_state(view_layer, scene):
         depsgraph = context.evaluated_depsgraph_get()
-        tell(0.1)
         camera = read_camera(scene, depsgraph, findings)
         settings = _read_settings(scene, findings)
         slot = target.active_material_index
@@ -62,7 +55,7 @@ def read_scene(
         if camera is None or material is None:
             return None
         data = SceneData(camera, settings, read_world(scene, settings.exposure, findings))
-        _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run(tell)
+        _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run()
         if data.target is None:
             if target.name_full not in rendered_objects(view_layer):
                 findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
@@ -71,7 +64,6 @@ def read_scene(
             return None
         if not data.world.is_lit and not data.lights and not data.emitting:
             findings.error("The scene has no light: add a light or give the world a colour.")
-        tell(0.9)
         check_visible(data, target, scene, depsgraph, findings)
     return data
 
@@ -129,10 +121,8 @@ class _Walk:
         data.materials[TARGET_BSDF] = material
         self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
 
-    def run(self, tell: Callable[[float], None]) -> None:
-        count = len(self.depsgraph.object_instances)
-        for index, instance in enumerate(self.depsgraph.object_instances):
-            tell(0.1 + 0.8 * index / count)
+    def run(self) -> None:
+        for instance in self.depsgraph.object_instances:
             item = instance.object
             if not self._is_rendered(instance, item):
                 continue
@@ -171,6 +161,14 @@ class _Walk:
         slots = np.clip(mesh.slots, 0, last)
         for slot in np.unique(slots):
             piece = world_mesh(mesh, slots == slot, matrix)
+            left_out = int((slots == slot).sum()) - len(piece.triangles)
+            if left_out:
+                self.findings.note(
+                    f"Object '{item.name}' has {left_out} triangles with corners at NaN, infinite or absurdly far "
+                    "positions; they are left out."
+                )
+            if not len(piece.triangles):
+                continue
             if is_target and slot == self.slot:
                 self.target_pieces.append((piece, mesh.is_closed))
                 continue

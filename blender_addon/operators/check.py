@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`mfo.check` and the buttons that mend what it finds."""
+"""`mfo.check`, the buttons that mend what it finds, and the limits of values."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
@@ -13,6 +13,7 @@ from .. import preflight, running_job
 from ..checks import from_export, in_order, quick_check
 from ..export.job import ExportError, export_findings
 from ..mending import KINDS, MendingError
+from ..properties import toggle_bound
 
 _BUTTON = {"HIDDEN", "SKIP_SAVE"}
 
@@ -73,6 +74,21 @@ class MFO_OT_mend(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MFO_OT_limit_value(bpy.types.Operator):
+    """Give this value limits that the fit keeps, or take them away"""
+
+    bl_idname = "mfo.limit_value"
+    bl_label = "Limit Value"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    name: StringProperty(options=_BUTTON)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Switch the limits."""
+        toggle_bound(context.scene.mfo, self.name)
+        return {"FINISHED"}
+
+
 def thorough_check(context: bpy.types.Context) -> None:
     """Make the quick check and add what an export would say."""
     scene, view_layer = context.scene, context.view_layer
@@ -85,4 +101,4 @@ def thorough_check(context: bpy.types.Context) -> None:
     preflight.show_thorough(in_order(found))
 
 
-CLASSES = (MFO_OT_check, MFO_OT_mend)
+CLASSES = (MFO_OT_check, MFO_OT_mend, MFO_OT_limit_value)

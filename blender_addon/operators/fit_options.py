@@ -11,13 +11,13 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .. import running_job
+from .. import fit_queue, running_job
 from ..backend_python import BackendPythonError
 from ..export.job import ExportError, export_job
 from ..export.read_material import principled_node as find_principled
 from ..fit_queue import PreparedFit
 from ..preferences import chosen_python, new_job_folder
-from ..properties import chosen_of
+from ..properties import chosen_of, crossed_limits
 from ..write_back import WriteBackError, principled_node
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
@@ -60,6 +60,7 @@ class FitOptions:
 
     def start(self, fit: PreparedFit) -> None:
         """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
+        fit_queue.begin()
         try:
             running_job.start(fit, timer=not self.blocks() and not bpy.app.background)
         except OSError as error:
@@ -78,18 +79,22 @@ class FitOptions:
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
-        fit, bake_view = self._fit(settings), self.bake_view or settings.bake_view
-        manager = context.window_manager
-        manager.progress_begin(0.0, 100.0)  # a number at the mouse; nothing else is drawn before the operator returns
+        windows, chosen = context.window_manager, self._fit(settings)
+        windows.progress_begin(0.0, 100.0)  # a number beside the pointer, while nothing else can be drawn
         try:
             report = export_job(
-                context, obj, folder, reference=reference, fit=fit, bake_view=bake_view,
-                tell=lambda share: manager.progress_update(100.0 * share),
-            )  # fmt: skip
+                context,
+                obj,
+                folder,
+                reference=reference,
+                fit=chosen,
+                bake_view=self.bake_view or settings.bake_view,
+                tell=lambda share: windows.progress_update(100.0 * share),
+            )
         except ExportError as error:
             raise FitError(str(error)) from error
         finally:
-            manager.progress_end()
+            windows.progress_end()
         picture = folder / report.request["reference"]["path"]
         return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
 
@@ -110,6 +115,12 @@ class FitOptions:
             "parameters": parameters,
             "max_iterations": self.max_iterations or settings.max_iterations,
         }
+        chosen = {bound.name: [bound.lower, bound.upper] for bound in settings.bounds if bound.name in parameters}
+        if settings.parameter_set == "chosen" and not self.parameters and chosen:
+            if crossed_limits(settings):
+                name = crossed_limits(settings)[0]
+                raise FitError(f"The limits of {name} leave nothing: the least must be below the most.")
+            fit["bounds"] = chosen
         compared = self.range or settings.range
         if compared not in ("auto", "hdr", "ldr"):
             raise FitError(f"range is {compared!r}: give 'hdr', 'ldr' or 'auto'.")

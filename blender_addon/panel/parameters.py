@@ -54,3 +54,11 @@ def _draw_value(
         value.label(text="linked")
     elif socket is not None:
         value.prop(socket, "default_value", text="")
+    if is_linked or key not in settings.sockets:
+        return
+    bound = settings.bounds.get(key)
+    value.operator("mfo.limit_value", text="", icon="NOCURVE", depress=bound is not None).name = key
+    if bound is not None:
+        limits = layout.row(align=True)
+        limits.prop(bound, "lower")
+        limits.prop(bound, "upper")

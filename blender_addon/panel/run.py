@@ -8,7 +8,7 @@ import bpy
 from .. import fit_queue, previews, running_job
 from ..backend_section import draw_setup, has_trouble, needs_setup
 from ..operators.fit_options import selected_targets
-from .layout import draw_messages, draw_pictures, draw_sentence, letters
+from .layout import draw_pictures, draw_sentence, letters
 
 
 class Run:
@@ -30,13 +30,11 @@ class Run:
             body.prop(settings, "range")
             body.prop(settings, "bake_view")
             body.prop(settings, "max_iterations")
-        if needs_setup():
-            draw_setup(layout, width=letters(context))
-            return
-        if has_trouble():
-            draw_setup(layout, width=letters(context))
         if running_job.current is not None:
             _draw_progress(layout, context)
+        elif needs_setup():
+            draw_setup(layout, width=letters(context))
+            return
         _draw_buttons(layout, context)
         _draw_queue(layout, context)
         if has_trouble():
@@ -45,8 +43,9 @@ class Run:
             box = layout.box()
             box.alert = runtime.state == "FAILED"
             draw_sentence(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
-            if runtime.state == "FAILED" and runtime.messages and not runtime.has_result:
-                draw_messages(box, context, runtime)
+            for message in runtime.messages if runtime.state == "FAILED" else ():
+                if message.icon == "ERROR":  # the others are notes of the export
+                    draw_sentence(box, context, message.name, message.icon)
 
 
 def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -12,18 +12,19 @@ from typing import Any
 from ..fit.fit_material import FitOutcome
 from ..fit.settings import FitSettings
 from ..job.atomic_file import write_atomically
+from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from ..types.status import Status
 from .assets import Assets
 from .busy import BusyMark
 from .judge import Judge, TruePictures
 from .method import METHODS, method_settings, warm_up_settings
-from .new_seeds import NewSeeds
 from .row import Row, Task
 from .row_pictures import picture_file, shown_picture
 from .scenario import SCENARIOS
 from .scene import SHAPE, BenchScene, write_scene
 from .stopwatch import Stopwatch
+from .wrapped_renderer import NewSeeds
 
 
 @dataclass(frozen=True)
@@ -102,22 +103,30 @@ class FitRunner:
     def _fit(self, task: Task, settings: FitSettings, should_stop: Callable[[], bool]) -> _Measured:
         from ..fit.fit_material import fit_material
         from ..fit.fit_recorded import fit_recorded
+        from ..fit.fit_transmission import fit_transmission
         from ..render.mitsuba_renderer import load_mitsuba_renderer
 
         began, method = time.monotonic(), METHODS[task.method]
         # a renderer of its own for every fit: passes count from 0 and nothing is left over from the fit before
         renderer = load_mitsuba_renderer(
-            self._scene.file, SHAPE, model=settings.model, parameters=settings.parameters, materials={}
+            self._scene.file,
+            SHAPE,
+            model=settings.model,
+            parameters=settings.parameters,
+            materials=self._scene.materials,
         )
         loaded, watch, busy = time.monotonic() - began, Stopwatch(), BusyMark.now()
         common: dict[str, Any] = {"listener": lambda event: None, "should_stop": should_stop}
         with watch.watching():
-            # not `recover_material`: a preset that hands a scene over to another has not fitted it
+            # not `recover_material`: a preset that hands a scene over to the preset `paper` has not fitted it
             if settings.preset == "paper":
                 seen = NewSeeds(renderer, settings.seed) if method.new_seeds else renderer
                 outcome = fit_material(seen, self._judge.reference, settings, **common)
             else:
-                outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
+                try:
+                    outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
+                except UnrecordableError:
+                    outcome = fit_transmission(renderer, self._judge.reference, settings, **common)
         return _Measured(outcome, loaded, watch.parts, busy.others())
 
     def _row(self, task: Task, measured: _Measured, warm_up: float) -> Row:

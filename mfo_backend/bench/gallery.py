@@ -15,10 +15,10 @@ from .summary import error_of
 
 def best_median_worst(rows: Sequence[Row]) -> list[tuple[str, Row]]:
     """Three rows of one method by FLIP; those that raised have no picture and are not among them."""
-    ordered = sorted((row for row in rows if not row.error), key=lambda row: error_of(row.flip))
+    ordered = sorted((row for row in rows if row.flip is not None), key=lambda row: error_of(row.flip))
     if not ordered:
         return []
-    return [("best", ordered[0]), ("median", ordered[len(ordered) // 2]), ("worst", ordered[-1])]
+    return [("best", ordered[0]), ("median", ordered[(len(ordered) - 1) // 2]), ("worst", ordered[-1])]
 
 
 def gallery(pictures: Path, rows: Sequence[Row], methods: Sequence[str]) -> str:

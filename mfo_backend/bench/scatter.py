@@ -58,7 +58,8 @@ class FitRecipe:
             raise SetupError(f"This worker has other {' and '.join(differing)}: give every worker the same MFO_DATA.")
         kept = Path(self.pictures) if Path(self.pictures).is_dir() else None
         runner = FitRunner(Path(tempfile.mkdtemp(prefix="mfo-bench-")), self.size, assets, kept, threads=self.threads)
-        return runner, machine_facts(runner.variant)
+        facts = machine_facts(runner.variant)
+        return runner, facts | ({"threads": self.threads} if self.threads else {})
 
 
 _RUNNERS: dict[Any, tuple[Any, dict[str, Any]]] = {}  # of this process
@@ -119,8 +120,6 @@ def run_scattered(
 
 
 def _reason(future: Any) -> BaseException:
-    if future.status != "error":
-        return RuntimeError(f"Dask gave this task up ({future.status}).")
     error = future.exception()
     if type(error).__name__ == "KilledWorker":
         return RuntimeError("Every worker that tried this task has died.")

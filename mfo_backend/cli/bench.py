@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from ..bench.assets import Assets
-from ..bench.method import DEFAULT_METHODS, METHODS
+from ..bench.method import DEFAULT_METHODS, METHODS, missing_for
 from ..bench.report import write_report
 from ..bench.row import Row
 from ..bench.row_file import RowFile, keep_setup
@@ -22,6 +22,7 @@ from ..job.progress_bar import terminal_columns
 from ..job.stop import StopSignal
 from ..types.errors import BadInputError
 from ..types.status import Status
+from .bench_surface import add_surface_parser
 from .cluster_options import add_cluster_options
 
 
@@ -33,19 +34,19 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
         description="Fit random scenes with several methods. An interrupted bench goes on where it stopped.",
     )
     parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="again for more (default: all)")
-    parser.add_argument(
-        "--method", action="append", choices=tuple(METHODS), help="again for more (default: all but the ablations)"
-    )
+    standing = "again for more (default: all that can run here, without the ablations)"
+    parser.add_argument("--method", action="append", choices=tuple(METHODS), help=standing)
     parser.add_argument("--scenes", type=_positive, default=20, metavar="N", help="scenes of each scenario (20)")
     parser.add_argument("--size", type=_positive, default=128, metavar="PIXELS", help="width and height (128)")
     parser.add_argument("--out", type=Path, default=Path("mfo-bench"), metavar="DIR", help="folder (mfo-bench)")
     add_cluster_options(parser)
     parser.set_defaults(func=run)
-    actions = parser.add_subparsers(dest="action", metavar="[report DIR]")
+    actions = parser.add_subparsers(dest="action", metavar="[report DIR | surface]")
     report = actions.add_parser("report", help="print and write the report of a bench folder")
     report.add_argument("folder", type=Path, metavar="DIR", help="folder of a bench")
     report.add_argument("--note", action="append", default=[], help="a remark for the report, such as a busy machine")
     report.set_defaults(func=run_report)
+    add_surface_parser(actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -74,7 +75,8 @@ def work(arguments: argparse.Namespace, bench: Callable[..., bool]) -> int:
     from tqdm import tqdm
 
     file = RowFile(arguments.out)
-    tasks = all_tasks(arguments.scenario or SCENARIOS, arguments.method or DEFAULT_METHODS, arguments.scenes)
+    methods = arguments.method or [m for m in DEFAULT_METHODS if can_run(m)]
+    tasks = all_tasks(arguments.scenario or SCENARIOS, methods, arguments.scenes)
     stop = StopSignal()
     with file.only_writer(), stop.watching():
         done = {row.key for row in file.read()}
@@ -94,6 +96,14 @@ def work(arguments: argparse.Namespace, bench: Callable[..., bool]) -> int:
         print("mfo: stopped; the same command goes on where it was.", file=sys.stderr)
         return Status.CANCELLED.exit_code
     return 0
+
+
+def can_run(method: str) -> bool:
+    """Whether this machine has all a method needs; says on stderr what is missing."""
+    missing = missing_for(method)
+    if missing:
+        print(f"mfo: without {method}: {missing}", file=sys.stderr)
+    return not missing
 
 
 def _log(folder: Path, text: str) -> None:

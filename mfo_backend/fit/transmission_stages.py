@@ -98,13 +98,27 @@ class TransmissionFit:
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.table = paths.table
         self._width = self.table.upper - self.table.lower
+        # values besides those of the glass stay as in the scene until the polish; without glass none does
+        self._extras = np.ones(self.table.length, bool)
+        for name in CORE:
+            if name in self.table.names:
+                self._extras[self.table.slice_of(name)] = False
+        if "transmission_weight" not in self.table.names:
+            self._extras[:] = False
 
     def tiles(self, size: int, most: int) -> TileRows:
         """Tiles of the reference."""
         return TileRows.of(self.reference, self.mask, size, self.clipped, most)
 
     def halves(
-        self, tiles: TileRows, xs: Vector, *, seed: int, samples: int, jacobian: bool = True, near: bool = False,
+        self,
+        tiles: TileRows,
+        xs: Vector,
+        *,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        near: bool = False,
         moving: bool = True,
     ) -> list[Samples]:
         """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
@@ -134,7 +148,7 @@ class TransmissionFit:
         """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
         moved, where = [], []
         for i, x in enumerate(xs):
-            if self._value(x, "roughness") >= SECANT_BELOW:
+            if self.paths.roughness(x) >= SECANT_BELOW:
                 continue
             for name in GEOMETRIC:
                 if name not in self.table.names:
@@ -150,11 +164,6 @@ class TransmissionFit:
             images = trace(np.array(moved), False)[..., 0]
             for image, (i, k, h) in zip(images, where, strict=True):
                 tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
-
-    def _value(self, x: Vector, name: str) -> float:
-        if name in self.table.names:
-            return float(x[self.table.slice_of(name).start])
-        return float(np.mean(np.array(getattr(self.paths._bsdf, name))))
 
     def scan(self) -> list[tuple[float, Vector]]:
         """Stage `scan`: all nodes of roughness and index with the best other values, best first."""
@@ -175,7 +184,7 @@ class TransmissionFit:
                     x[table.slice_of(name)] = value
                 xs.append(x)
             xs = table.clip(np.array(xs))
-            frozen = np.zeros(table.length, bool)
+            frozen = self._extras.copy()
             for name in held:
                 frozen[table.slice_of(name)] = True
             for turn in range(plan.scan_steps + 1):
@@ -224,7 +233,7 @@ class TransmissionFit:
 
     def _damped(self, runner: Runner) -> Vector:
         assert runner.equations is not None
-        return self._step(runner.equations, runner.x, runner.damping, TRUST)
+        return self._step(runner.equations, runner.x, runner.damping, TRUST, self._extras)
 
     def _accept(self, runner: Runner, x: Vector, equations: NormalEquations) -> None:
         if not equations.finite:
@@ -241,22 +250,25 @@ class TransmissionFit:
         Where the picture does not determine some values, a second end follows, fitted with those as in the scene.
         """
         with self.course.stage("polish") as stage:
-            ends = [self._pool(stage, start, np.zeros(self.table.length, bool))]
+            core = start
+            if self._extras.any():
+                core = self._pool(stage, start, self._extras, stream=50).x
+            ends = [self._pool(stage, core, np.zeros(self.table.length, bool), stream=10)]
             unseen = self._unseen(ends[0])
             if unseen.any() and not unseen.all() and not self.course.should_stop():
                 kept = np.where(unseen, self.table.clip(self.start), ends[0].x)
-                ends.append(self._pool(stage, kept, unseen))
+                ends.append(self._pool(stage, kept, unseen, stream=100))
             stage.vector = ends[-1].x
         return ends
 
-    def _pool(self, stage: Stage, start: Vector, frozen: NDArray[np.bool_]) -> Polished:
+    def _pool(self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int) -> Polished:
         plan, columns = self.plan, 1 + self.table.length
         x, variance, floor = start.copy(), np.diag(self._width**2), 0.0
         equations, noise = None, variance
         single = self.tiles(1, plan.polish_pixels)
         tiles, pool = single, CrossProducts(3, columns)
         for turn in range(plan.polish_steps):
-            seed = self._seed((50 if frozen.any() else 10) + turn)
+            seed = self._seed(stream + turn)
             if turn == 0:
                 (table,) = self._tables(single, x[None], seed, plan.polish_samples, True, True, True)
                 halves = np.split(table, 2)
@@ -331,7 +343,7 @@ class TransmissionFit:
         """The first candidate, unless another is better by two standard errors on paths that none has seen."""
         tiles = self.tiles(4, self.plan.polish_pixels)
         rows = self.halves(
-            tiles, np.array(candidates), seed=self._seed(99), samples=self.plan.guard_samples, jacobian=False
+            tiles, np.array(candidates), seed=self._seed(999), samples=self.plan.guard_samples, jacobian=False
         )
         if self.course.should_stop():
             return 0

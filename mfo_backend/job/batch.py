@@ -86,5 +86,5 @@ def run_there(jobs: Sequence[str], client: Any, should_stop: Callable[[], bool])
         if future.status == "finished":
             yield future.result()
         else:
-            yield JobEnd(job, Status.FAILED.value, f"Dask gave this job up ({future.status}).", 0.0)
+            yield JobEnd(job, Status.FAILED.value, f"Dask gave this job up: {future.exception()}", 0.0)
     client.cancel([*left.values()])

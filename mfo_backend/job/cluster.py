@@ -47,7 +47,13 @@ def open_client(scheduler: str | None, workers: int) -> Iterator[Any]:
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise SetupError(f"Dask cannot be imported ({error}): install distributed (the extra `cluster`).") from None
-    for name in ("distributed", "distributed.worker", "distributed.nanny", "distributed.scheduler"):
+    for name in (
+        "distributed",
+        "distributed.client",
+        "distributed.worker",
+        "distributed.nanny",
+        "distributed.scheduler",
+    ):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # a lost worker is told once, by us
     if scheduler is None:
         quiet: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
@@ -72,7 +78,7 @@ def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[
     Raises
     ------
     SetupError
-        If there has been no worker for two minutes.
+        If there has been no worker for two minutes, or the scheduler is gone.
     """
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
     keys = {future.key: name for name, future in futures.items()}
@@ -90,5 +96,9 @@ def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[
                     "No Dask worker is left: start workers, then the same command goes on where it was."
                 ) from None
             continue
+        if future.status not in ("finished", "error"):  # nothing came of it, and it is nobody's error
+            raise SetupError(
+                f"The Dask scheduler gave up ({future.status}): start it, then the same command goes on where it was."
+            )
         left -= 1
         yield keys[future.key], future

@@ -12,6 +12,7 @@ from ..metrics.tone_mapping import View
 from ..types.event import Listener
 from ..types.image import Image, Pixels
 from ..types.model_gap import ModelGap
+from ..types.parameter_bounds import narrowed
 from ..types.result import FitResult
 from .job_folder import JobFolder
 from .request import Request, request_to_json
@@ -86,7 +87,7 @@ def fit_scene(
 
     def load() -> tuple[str, Renderer]:
         variant = load_variant()
-        return variant, load_renderer(
+        renderer = load_renderer(
             folder.root / request.scene,
             request.target.shape_id,
             model=request.fit.model,
@@ -94,6 +95,9 @@ def fit_scene(
             materials=request_materials(folder, request),
             light_paths=request.light_paths,
         )
+        renderer.table = narrowed(renderer.table, request.fit.bounds)
+        renderer.start = renderer.table.clip(renderer.start)
+        return variant, renderer
 
     if request.fit.preset == "paper":
         thread = NativeThread(should_stop)

@@ -193,7 +193,7 @@ def _add_glass(
     n = dr.select(inside, dr.rcp(ior), ior)
     f0 = saturate(normal_incidence(ior) * p["specular_tint"])
     colour = root(base)
-    gain = _compensation(glass_albedo(roughness, mu, n) if model.multiple_scattering else None, colour)
+    gain = _compensation(glass_albedo(roughness, mu, n, ior) if model.multiple_scattering else None, colour)
     stack |= {
         "glass": w * weight * gain.scale,
         "glass_alpha": dr.maximum(dr.square(roughness), 1e-6),

@@ -87,7 +87,10 @@ class BlenderPrincipled(mi.BSDF):
         self.m_flags = flags
         # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
         above = mi.Vector3f(0, 0, 1)
-        evaluate(layer_stack({}, above, self.lobes, self.model), above)
+        for index in (mi.Float(1.5), dr.opaque(mi.Float, 1.5)):  # known and unknown ones read other tables
+            indices = {"ior": index, "coat_ior": index, "specular_ior_level": index}
+            evaluate(layer_stack(indices, above, self.lobes, self.model), above)
+            evaluate(layer_stack({"ior": index, "coat_ior": index}, above, self.lobes, self.model), above)
 
     def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Show every value; those of lobes that are left out too, so that a caller can set them."""

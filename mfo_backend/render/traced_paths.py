@@ -3,7 +3,8 @@
 
 Light that enters the target meets its material several times, so there is no single recorded direction. Here a path is
 traced with the material itself and carries the derivative of its throughput by every free value (detached: the path
-stays where it is). Emitters are sampled at every vertex and weighted by the power heuristic, as Mitsuba's `path` does.
+stays where it is). Emitters are sampled at every vertex, as by Mitsuba's `path`, or by
+`cycles_path` with its Filter Glossy, clamping and limits of bounces where the scene asks for it.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -32,6 +33,12 @@ from .primary_rays import _through_filter
 
 MOST_LANES = 1 << 18  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
+_DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmission)
+_TRANSMITS = (
+    int(mi.BSDFFlags.GlossyTransmission)
+    | int(mi.BSDFFlags.DeltaTransmission)
+    | int(mi.BSDFFlags.DiffuseTransmission)
+)
 DEEPEST = 32  # path length of a scene without a limit
 
 
@@ -94,8 +101,18 @@ class TracedPaths:
         limit = int(getattr(integrator, "max_depth", DEEPEST))
         self._depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         self._hide = bool(getattr(integrator, "hide_emitters", False))
+        if self._hide and renderer.shape.is_emitter():
+            raise UnrecordableError("The target emits light and the integrator hides what does.")
+        self._light_paths = renderer.light_paths
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
+
+    def roughness(self, vector: NDArray[np.float64]) -> float:
+        """Roughness of the material `vector`; 1 where a texture gives it."""
+        if "roughness" in self.table.names:
+            return float(vector[self.table.slice_of("roughness").start])
+        value = self._bsdf.fixed["roughness"]
+        return 1.0 if value is None else float(np.mean(value))
 
     def images(
         self,
@@ -180,28 +197,37 @@ class TracedPaths:
             "density": mi.Float(1.0),
             "delta": mi.Bool(True),
             "depth": mi.UInt32(0),
+            "left": mi.UInt32(self._depth),
             "active": mi.Bool(True),
         }
+        if self._light_paths is not None:
+            # the least density so far, and bounces of each kind
+            state |= {"least": mi.Float(1e30), "bounces": [mi.UInt32(0) for _ in range(3)]}
 
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
             si = scene.ray_intersect(ray, active)
+            blur = self._blur(s)
+            if blur is not None:
+                si.duv_dx = mi.Point2f(blur, 0.0)
             emitter = si.emitter(scene, active)
             ds = mi.DirectionSample3f(scene, si, s["before"])
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
-            seen = dr.select(s["delta"], 1.0, _power(s["density"], light))
+            seen = dr.select(s["delta"], 1.0, self._share(s["density"], light))
             if self._hide:
                 seen = dr.select(depth == 0, 0.0, seen)
             emission = mi.Color3f(emitter.eval(si, active)) * seen
-            total = [t + b * dr.select(active, emission, 0.0) for t, b in zip(total, beta, strict=True)]
-            active = active & si.is_valid() & (depth + 1 < self._depth)
+            emission = dr.select(active, emission, 0.0)
+            emission *= self._clamp(beta[0] * emission, depth >= 2)
+            total = [t + b * emission for t, b in zip(total, beta, strict=True)]
+            active = active & si.is_valid() & (s["left"] > 1)
             # light sampled from here
             ds, value = scene.sample_emitter_direction(si, rng.pair(2 + 3 * depth), True, active)
             wo = si.to_local(ds.d)
             lit = active & (ds.pdf > 0.0)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
             on = active & (si.bsdf() == mi.BSDFPtr(self._bsdf)) if self._others else active
-            f_light, pdf_light, f_next, pdf_next, local, null = self._at_target(
+            f_light, pdf_light, f_next, pdf_next, local, kind = self._at_target(
                 si, wo, u1, u2, on, theta, offset, directions
             )
             if self._others:
@@ -214,9 +240,10 @@ class TracedPaths:
                 f_next[0] = dr.select(off, mi.Color3f(w) * bs.pdf, f_next[0])
                 pdf_next = dr.select(off, bs.pdf, pdf_next)
                 local = dr.select(off, bs.wo, local)
-                null = dr.select(off, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), null)
-            weight = value * dr.select(ds.delta, 1.0, _power(ds.pdf, pdf_light))
+                kind = dr.select(off, bs.sampled_type, kind)
+            weight = value * dr.select(ds.delta, 1.0, self._share(ds.pdf, pdf_light))
             weight = dr.select(lit, weight, 0.0)
+            weight *= self._clamp(beta[0] * f_light[0] * weight, depth >= 1)
             total[0] += beta[0] * f_light[0] * weight
             for k in range(directions):
                 total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight
@@ -226,19 +253,59 @@ class TracedPaths:
             for k in range(directions):
                 new.append((beta[1 + k] * f_next[0] + beta[0] * f_next[1 + k]) * inverse)
             active = usable & (dr.max(new[0]) > 1e-5)
-            return {
+            after = {
                 "ray": si.spawn_ray(si.to_world(local)),
                 "beta": new,
                 "total": total,
                 "before": mi.Interaction3f(si),
                 "density": pdf_next,
-                "delta": mi.Bool(null),
+                "delta": mi.has_flag(kind, mi.BSDFFlags.Delta),
                 "depth": depth + 1,
+                "left": s["left"] - 1,
                 "active": active,
             }
+            return after | self._counted(s, kind, pdf_next, after["left"])
 
         (state,) = dr.while_loop((state,), lambda s: s["active"], lambda s: (body(s),), label="traced paths")
         return state["total"]
+
+    def _blur(self, state: dict[str, Any]) -> mi.Float | None:
+        """The least alpha of the microfacet lobes by Filter Glossy."""
+        if self._light_paths is None or self._light_paths.filter_glossy <= 0.0:
+            return None
+        return 0.5 * dr.safe_sqrt(1.0 - state["least"] / self._light_paths.filter_glossy)
+
+    def _share(self, a: mi.Float, b: mi.Float) -> mi.Float:
+        """Weight of a sample of density `a` that another technique finds with `b` (Veach 1995), as the picture has it.
+
+        `path` takes the power heuristic and `cycles_path` the balance heuristic; where samples are clamped it matters.
+        """
+        if self._light_paths is None:
+            a, b = dr.square(a), dr.square(b)
+        return dr.select(a > 0.0, a / (a + b), 0.0)
+
+    def _clamp(self, sample: mi.Color3f, indirect: mi.Bool) -> mi.Float | float:
+        """What to scale a sample by whose channels add up to more than Cycles allows."""
+        if self._light_paths is None or self._light_paths.clamp_indirect <= 0.0:
+            return 1.0
+        total, limit = dr.sum(dr.abs(sample)), 3.0 * self._light_paths.clamp_indirect
+        return dr.select(indirect & (total > limit), limit / total, 1.0)
+
+    def _counted(self, state: dict[str, Any], kind: mi.UInt32, density: mi.Float, left: mi.UInt32) -> dict[str, Any]:
+        """Bounces of each kind and the least density after a bounce; a straight passage is none."""
+        if self._light_paths is None:
+            return {}
+        counts = ~mi.has_flag(kind, mi.BSDFFlags.Null)
+        through, diffuse = (kind & _TRANSMITS) != 0, (kind & _DIFFUSE) != 0
+        of_kind = (diffuse & ~through, ~diffuse & ~through, through)
+        limits = self._light_paths
+        most = (limits.diffuse_bounces, limits.glossy_bounces, limits.transmission_bounces)
+        bounces = [b + dr.select(counts & k, mi.UInt32(1), mi.UInt32(0)) for b, k in zip(state["bounces"], of_kind, strict=True)]
+        done = mi.Bool(False)
+        for count, limit in zip(bounces, most, strict=True):
+            done |= count > limit
+        least = dr.select(counts & (density > 0.0), dr.minimum(state["least"], density), state["least"])
+        return {"least": least, "bounces": bounces, "left": dr.select(done, dr.minimum(left, 1), left)}
 
     def _at_target(self, si, wo, u1, u2, on, theta, offset, directions):
         """Value and derivatives of the BSDF towards `wo` and towards a direction drawn from it, with densities."""
@@ -251,6 +318,8 @@ class TracedPaths:
         for p in self.table:
             parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
         layers = layer_stack(parameters, si.wi, plugin.lobes, plugin.model)
+        if plugin.filtered:
+            layers = layers.blurred(si.duv_dx.x)
         choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha)
         only = plugin.reachable_only
         drawn, lobe, valid = sample(layers, choice, u1, u2)
@@ -259,11 +328,15 @@ class TracedPaths:
         pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
         f_next = mi.Color3f(evaluate(layers, drawn, reachable_only=only))
         pdf_next = dr.detach(pdf(layers, choice, drawn, reachable_only=only))
-        null = mi.Bool(False)
+        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
+        through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
+        kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
         if choice["transparent"] is not None:
             null = lobe == NAMES.index("transparent")
             f_next = dr.select(null, mi.Color3f(layers.transparency), f_next)
             pdf_next = dr.select(null, dr.detach(choice["transparent"]), pdf_next)
+            kind = dr.select(null, mi.UInt32(+mi.BSDFFlags.Null), kind)
         pdf_next = dr.select(valid & on, pdf_next, 0.0)
         light, following = [dr.detach(f_light)], [dr.detach(f_next)]
         for entry in self._tangents.entries[:directions]:
@@ -277,7 +350,7 @@ class TracedPaths:
             dr.clear_grad(f_next)
         light = [dr.select(on, c, 0.0) for c in light]
         following = [dr.select(on, c, 0.0) for c in following]
-        return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), null
+        return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), kind
 
 
 @dataclass(frozen=True)
@@ -296,8 +369,3 @@ class PathRandom:
         """Two numbers in [0, 1) (D. Wheeler and R. Needham, TEA, 1994, as a hash)."""
         x, y = mi.sample_tea_32(self.a, self.b + mi.UInt32(place) * 0x9E3779B9, 5)
         return mi.Point2f(mi.Float(x >> 8), mi.Float(y >> 8)) * 2.0**-24
-
-
-def _power(a: mi.Float, b: mi.Float) -> mi.Float:
-    """The power heuristic (Veach 1995)."""
-    return dr.select(a > 0.0, dr.square(a) / (dr.square(a) + dr.square(b)), 0.0)

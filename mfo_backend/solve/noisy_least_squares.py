@@ -94,14 +94,25 @@ class SafeMatrix:
     def __init__(self, equations: NormalEquations, width: Vector) -> None:
         hessian = equations.hessian * np.outer(width, width)
         diagonal = np.diag(hessian)
+        self._blind = diagonal <= 1e-6 * max(float(diagonal.max()), 1e-12)
+        self._width = width
         self.scale: Vector = np.sqrt(np.maximum(diagonal, 1e-4 * max(float(diagonal.max()), 1e-12))) / width
         values, self.vectors = np.linalg.eigh(equations.hessian / np.outer(self.scale, self.scale))
         self.values = np.maximum(values, self.FLOOR)
 
     def covariance(self, noise: Vector) -> Vector:
-        """Covariance (k, k) of the solution: the sandwich H^-1 noise H^-1 (P. Huber 1967; H. White 1980)."""
+        """Covariance (k, k) of the solution: the sandwich H^-1 noise H^-1 (P. Huber 1967; H. White 1980).
+
+        A column without effect may lie anywhere in its width, and none is less sure than that.
+        """
         inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
-        return inverse @ noise @ inverse
+        result = inverse @ noise @ inverse
+        sd = np.sqrt(np.maximum(np.diag(result), 1e-300))
+        shrink = np.minimum(self._width / sd, 1.0)
+        result *= np.outer(shrink, shrink)
+        result[self._blind] = result[:, self._blind] = 0.0
+        result[self._blind, self._blind] = self._width[self._blind] ** 2
+        return result
 
     def expected_error(self, noise: Vector) -> float:
         """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""

@@ -209,3 +209,15 @@ def test_every_fix_has_a_button() -> None:
     root = Path(__file__).resolve().parents[2] / "blender_addon"
     named = {name for path in root.rglob("*.py") for name in re.findall(r'Fix\(\s*"(\w+)"', path.read_text("utf-8"))}
     assert named == set(KINDS)
+
+
+def test_an_export_tells_how_far_it_is(scene: SimpleNamespace) -> None:
+    from blender_addon.export.job import export_job
+
+    shares: list[float] = []
+    bpy = scene.bpy
+    reference = Path(scene.reference)
+    export_job(bpy.context, bpy.data.objects["Väse"], Path(scene.job), reference=reference, fit={}, tell=shares.append)
+    assert len(shares) >= 3
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < shares[-1] < 1.0

@@ -17,8 +17,8 @@ from mfo_backend.bench.row import Task
 from mfo_backend.bench.row_file import RowFile
 from mfo_backend.bench.run_bench import all_tasks, run_bench
 from mfo_backend.bench.scatter import run_scattered
-from mfo_backend.job.cluster import open_client
-from mfo_backend.types.errors import BadInputError
+from mfo_backend.job.cluster import as_they_come, open_client
+from mfo_backend.types.errors import BadInputError, SetupError
 from tests.bench.rows import FakeRecipe, NotingRunner
 
 TASKS = all_tasks(["base", "noise"], ["mfo-hdr", "fast"], 3)
@@ -91,6 +91,32 @@ def test_no_scheduler_is_said_in_one_sentence(monkeypatch):
     with pytest.raises(BadInputError, match="No Dask scheduler answers"), open_client("tcp://127.0.0.1:1", 0):
         pass
     assert time.monotonic() - began < 10
+
+
+class Dropped:
+    """A future whose scheduler has gone."""
+
+    key, status = "row", "cancelled"
+
+    def add_done_callback(self, call):
+        call(self)
+
+
+def test_a_scheduler_that_is_lost_makes_no_row():
+    with pytest.raises(SetupError, match="the same command goes on where it was"):
+        next(as_they_come(None, {TASKS[0]: Dropped()}, lambda: False))
+
+
+def test_without_workers_it_ends(monkeypatch):
+    class Empty:
+        def scheduler_info(self):
+            return {"workers": {}}
+
+    monkeypatch.setattr("mfo_backend.job.cluster.NO_WORKER_SECONDS", 0.1)
+    waiting = Dropped()
+    waiting.add_done_callback = lambda call: None
+    with pytest.raises(SetupError, match="No Dask worker is left"):
+        next(as_they_come(Empty(), {TASKS[0]: waiting}, lambda: False))
 
 
 def test_recipes_that_are_equal_share_a_runner(tmp_path):

@@ -94,3 +94,18 @@ def test_minus_zero_is_zero(arrays: ModuleType) -> None:
     rows = np.zeros((2, 8), np.float32)
     rows[1] = -0.0
     assert len(arrays._shared(rows)[0]) == 1
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+def test_triangles_out_of_reach_are_left_out(arrays: ModuleType, value: float) -> None:
+    corners = grid(4, 0)
+    corners["positions"] = corners["positions"].copy()
+    corners["positions"][5, 1, 0] = value
+    corners["uvs"] = corners["uvs"].copy()
+    corners["uvs"][7, 0, 0] = np.nan
+    mesh = arrays.CornerMesh(**corners, slots=np.zeros(32, np.int32), is_closed=False)
+    moved = arrays.world_mesh(mesh, np.ones(32, bool), MATRIX)
+    assert moved.triangles.shape == (31, 3)
+    assert all(np.isfinite(part).all() for part in (moved.positions, moved.normals, moved.uvs))
+    mesh.positions[:] = value
+    assert len(arrays.world_mesh(mesh, np.ones(32, bool), MATRIX).triangles) == 0

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,12 +35,11 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=24)
     parser.add_argument("--record", type=Path, default=ROOT / "docs" / "reliability")
     chosen = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="mfo-endurance-") as folder:
-        record = {"backend": backend, "blender": blender, "repeat": repeat}[chosen.what](
-            Path(folder), chosen.fits, chosen.size
-        )
     chosen.record.mkdir(parents=True, exist_ok=True)
-    (chosen.record / f"{chosen.what}.json").write_text(json.dumps(record) + "\n")
+    run = {"backend": backend, "blender": blender, "repeat": repeat}[chosen.what]
+    with tempfile.TemporaryDirectory(prefix="mfo-endurance-") as folder:
+        for record in run(Path(folder), chosen.fits, chosen.size):  # so far, again and again
+            (chosen.record / f"{chosen.what}.json").write_text(json.dumps(record) + "\n")
     print(json.dumps({key: value for key, value in record.items() if key != "rows"}, indent=1))
 
 
@@ -65,7 +65,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def backend(folder: Path, fits: int, size: int) -> dict[str, Any]:
+def backend(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
     """Jobs of three presets in turn, in one process, from seed to seed; also the kernels on disk."""
     from mfo_backend.job.progress import EventWriter
     from mfo_backend.job.run_job import run_job
@@ -96,22 +96,27 @@ def backend(folder: Path, fits: int, size: int) -> dict[str, Any]:
                 "kernels": len(list(cache.glob("*"))) if cache.is_dir() else 0,
             }
         )
-    third = rows[WARM - WARM % 3 :: 3]  # one preset: seconds of different ones cannot be compared
-    found = summary(rows) | {"seconds": summary(third)["seconds"]}
-    return found | {"kernels": [rows[min(WARM, len(rows) - 1)]["kernels"], rows[-1]["kernels"]]}
+        if index == fits - 1 or index % 20 == 19:
+            third = rows[WARM - WARM % 3 :: 3]  # one preset: seconds of different ones cannot be compared
+            found = summary(rows) | {"seconds": summary(third)["seconds"]}
+            yield found | {"kernels": [rows[min(WARM, index)]["kernels"], rows[-1]["kernels"]]}
 
 
-def blender(folder: Path, fits: int, size: int) -> dict[str, Any]:
+def blender(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
     """Fit, apply and revert in one Blender."""
     files = make_demo(folder / "demo", size)
     with in_blender("many", files.start, files.reference, folder, str(fits)) as process:
         assert process.stdout is not None
-        rows = [json.loads(line) for line in process.stdout if line.startswith('{"fit"')]
+        rows = []
+        for line in process.stdout:
+            if line.startswith('{"fit"'):
+                rows.append(json.loads(line))
+                if len(rows) == fits or len(rows) % 20 == 0:
+                    yield summary(rows) | {"images": [rows[0]["images"], rows[-1]["images"]]}
     assert len(rows) == fits, f"Blender ended after {len(rows)} of {fits} fits"
-    return summary(rows) | {"images": [rows[0]["images"], rows[-1]["images"]]}
 
 
-def repeat(folder: Path, fits: int, size: int) -> dict[str, Any]:
+def repeat(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
     """How far results of the same job differ: between processes, and between numbers of threads."""
     job = export(folder, size)
     request = json.loads((job / "request.json").read_text())
@@ -127,7 +132,7 @@ def repeat(folder: Path, fits: int, size: int) -> dict[str, Any]:
             "same_threads": float(max(np.ptp(np.array(some), axis=0).max() for some in runs.values())),
             "any_threads": float(np.ptp(everything, axis=0).max()),
         }
-    return found
+    yield found
 
 
 def _values(job: Path, threads: int) -> np.ndarray:

@@ -229,6 +229,7 @@ def test_it_ends_when_its_parent_is_killed(job: Path, deaf: bool) -> None:
         ("bad_input", 2, "bad_input", "Unknown parameter 'rough': this material has roughness."),
         ("setup", 3, "setup", "No LLVM library was found: get one."),
         ("bug", 1, "failed", "The fit failed (ZeroDivisionError: a bug): the log holds the details."),
+        ("import", 3, "setup", "A package cannot be loaded (libgone.so: cannot allocate memory): run `mfo doctor`"),
         ("memory", 1, "failed", "The fit ran out of memory: lower the resolution or the samples per pixel."),
         ("space", 2, "bad_input", "No space left on device"),
     ],

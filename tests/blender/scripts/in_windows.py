@@ -176,6 +176,7 @@ def check_and_mend():
     assert preflight.is_thorough
     yield from shot("02_check_ready")
     bpy.context.scene.mfo.parameter_set = "chosen"
+    do(bpy.ops.mfo.limit_value, name="roughness")
     yield 2.0  # the longest list of all
     yield from shot("03_values_chosen")
     bpy.context.scene.mfo.parameter_set = "all"
