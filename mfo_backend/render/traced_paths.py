@@ -31,7 +31,7 @@ from ..types.parameter import ParameterTable
 from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import through_filter
 
-MOST_LANES = 1 << 18  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
+MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
 _DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmission)
 _TRANSMITS = (
