@@ -10,7 +10,7 @@ from .scenario import Scenario
 
 _PAPER = {"mse": ("mse",), "flip": ("flip",), "mfo": ("mse", "flip")}
 PAPER_METHODS = tuple(f"{losses}-{light}" for losses in _PAPER for light in ("ldr", "hdr"))
-OUR_METHODS = ("fast", "balanced")
+OUR_METHODS = ("fast", "balanced", "best")
 METHODS = (*PAPER_METHODS, *OUR_METHODS)
 
 

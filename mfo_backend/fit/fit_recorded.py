@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The presets `fast` and `balanced`: a global start and bounded least squares on recorded light paths."""
+"""The presets `fast`, `balanced` and `best`: a global start and bounded least squares on recorded light paths."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from ..metrics.pu21 import Pu21
 from ..metrics.response import OnDisplay, Response, displayed_by, nits_per_unit
 from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
-from ..types.certainty import Certainty, Level
 from ..types.event import Listener, Preview, Started
 from ..types.image import Encoding, Image, Pixels
 from ..types.result import FitResult
@@ -24,17 +23,20 @@ from ..types.status import Status
 from .course import Course
 from .displayed_residual import DisplayedResidual
 from .fit_material import FitOutcome
-from .recorded_stages import MakeResidual, Problem, RecordedFit, RecordedPlan, Vector
-from .residuals import CensoredResidual, RelativeResidual, ResponseResidual, log_residual, residual_rows
+from .kept_values import box_holding, keep_values
+from .picture_judge import NOISY, PictureJudge
+from .recorded_stages import MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan, Vector
+from .residuals import CensoredResidual, RelativeResidual, ResponseResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .stages import Candidate
-from .uncertainty import certainties, standard_deviations
-from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
+from .verification import VERIFY_STREAM, check_reference, picture_errors
 
 STAGES = ("scan", "start", "refine")
 _CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
-# Values the picture does not determine go back to the user's if that costs no more than this share of the residual
-KEEP_TOLERANCE = 1.01
+# Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
+AT_NOISE = 1.5
+BASIN = 0.1  # of the box: solutions nearer than this in every value are one
+FLIP_STARTS = 2
 
 
 def fit_recorded(
@@ -50,8 +52,8 @@ def fit_recorded(
     """Recover the renderer's parameters from a picture of the same scene, with no use of their start but as one guess.
 
     Parameters and errors are those of `fit_material`. The result is the best of the scene's own values and the end of
-    every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the log difference
-    of tiles for `fast`, by true FLIP for `balanced`.
+    every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the least-squares
+    residual of tiles for `fast` and where the picture's noise is reached, else by FLIP (`fit.picture_judge`).
 
     Raises
     ------
@@ -74,34 +76,56 @@ def fit_recorded(
     )
     light = _linear(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))
-    perceptual = _perceptual(ldr, light, mask, view) if settings.preset == "balanced" else {}
-    names = (*STAGES, *perceptual)
+    perceptual = {} if settings.preset == "fast" else _perceptual(ldr, light, mask, view)
+    names = (*STAGES, *perceptual, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
-    clipped = _clipped(reference, view)
-    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped)
+    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, _clipped(reference, view))
 
-    compressed = _censored(log_residual, reference, view)
-    found = fit.start_from_nothing(compressed).x
+    basins = fit.start_from_nothing(_censored(log_residual, reference, view))
     candidates: list[Vector] = [renderer.start]
-    certainty: dict[str, Certainty] = {}
+    kept = None
     notes = list(scene.needs.notes)
-    if not should_stop():
-        make = RelativeResidual if scene.needs.sampled else log_residual
-        solution, last = fit.refine(found, _censored(make, reference, view))
-        found, certainty = _keep_unseen(fit, last, solution.x, notes)
-        candidates.append(found)
-        for name, response in perceptual.items():
-            polished = fit.polish(name, last.groups, lambda target, r=response: ResponseResidual(r, target), found)
-            candidates.append(polished.x)
+    counts: Callable[[Pixels], float] | None = None  # what the result is chosen by
+    if should_stop():
+        candidates.append(basins[0].x)
     else:
-        candidates.append(found)
+        make = RelativeResidual if scene.needs.sampled else log_residual
+        solution, last = fit.refine(basins[0].x, _censored(make, reference, view), _weighted(reference, view))
+        weighted = scene.needs.sampled and not isinstance(view, BakedView)
+        kept = keep_values(fit, last, solution.x, weighted=weighted)
+        fit.box = box_holding(fit.table, renderer.start, kept.held)
+        candidates.append(kept.x)
+        notes += kept.notes
+        noise = fit.noise.level if fit.noise else 0.0
+        at_noise = weighted and np.sqrt(2.0 * solution.equations.cost) < AT_NOISE
+        if at_noise and perceptual:
+            notes.append(
+                f"The fit has reached the picture's own noise ({100 * noise:.0f} % a pixel): "
+                "perceptual stages would fit the noise and were left out."
+            )
+        elif perceptual:
+            linear = reference.encoding is Encoding.LINEAR
+            blurred = linear and (scene.needs.sampled or noise > NOISY)
+            judge = PictureJudge(reference, light, mask, settings, view, ldr=ldr, blurred=blurred)
+            counts = judge.value
+            ends = [kept.x]
+            if settings.preset == "best":
+                ends += [fit.solve_within(last, np.clip(b.x, *fit.box), *fit.box) for b in basins[1:]]
+            for name, response in perceptual.items():
+                found = fit.polish(name, last.groups, lambda target, r=response: ResponseResidual(r, target), ends)
+                candidates += found
+            if settings.preset == "best":
+                candidates += _lower_flip(fit, judge, candidates[1:], notes)
+        if counts is None:
+            counts = _misfit(fit, last, _censored(log_residual, reference, view))
 
     seed = settings.seed ^ VERIFY_STREAM
     spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
     pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
     listener(Preview(pictures[-1].image))
-    best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(perceptual), ldr, compressed)))
+    counts = counts or PictureJudge(reference, light, mask, settings, view, ldr=ldr, blurred=False).value
+    best = best_of([counts(picture.image) for picture in pictures])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     message = status.sentence
     if best == 0:
@@ -117,10 +141,29 @@ def fit_recorded(
         errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
         seconds=time.monotonic() - began,
         passes=renderer.passes,
-        certainty=certainty,
+        certainty=kept.certainty if kept else {},
         notes=tuple(notes),
     )
     return FitOutcome(result, pictures[0].image, pictures[best].image)
+
+
+def best_of(errors: Sequence[float]) -> int:
+    """The number of the smallest error; one that is not finite never wins, and without any the start stays."""
+    values = [error if np.isfinite(error) else np.inf for error in errors]
+    return int(np.argmin(values))
+
+
+def _lower_flip(fit: RecordedFit, judge: PictureJudge, ends: Sequence[Vector], notes: list[str]) -> list[Vector]:
+    """The stage `flip` from the ends with the least FLIP, where the recording holds every pixel."""
+    if not fit.complete:
+        notes.append("The picture is too large to be recorded whole: the stage 'flip' was left out.")
+        return []
+    width = fit.table.upper - fit.table.lower
+    starts: list[Vector] = []
+    for x in sorted(ends, key=lambda x: judge.value(fit.picture(x))):
+        if all(np.max(np.abs(x - other) / width) > BASIN for other in starts):
+            starts.append(x)
+    return fit.lower_flip(judge, starts[:FLIP_STARTS])
 
 
 def _linear(reference: Image, view: View) -> Pixels:
@@ -158,51 +201,17 @@ def _perceptual(ldr: bool, light: Pixels, mask: NDArray[np.bool_], view: View) -
     return {"itp": Itp(nits), "pu21": Pu21(nits)}
 
 
-def _keep_unseen(
-    fit: RecordedFit, problem: Problem, found: Vector, notes: list[str]
-) -> tuple[Vector, dict[str, Certainty]]:
-    """Give values that the picture does not determine back to the user, if the rest can make up for it."""
-    table, user = fit.table, fit.scene.renderer.start
-
-    def judge(x: Vector) -> tuple[float, dict[str, Certainty]]:
-        image = problem.evaluate(x)
-        rows = residual_rows(image, problem.residual)
-        relative = residual_rows(image, RelativeResidual(problem.groups.average(fit.reference)))
-        sd = standard_deviations(relative[:, :, 1:], relative[:, :, 0], table)
-        return float(np.mean(rows[:, :, 0] ** 2)), certainties(sd, table)
-
-    cost, certainty = judge(found)
-    unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
-    if not unseen or len(unseen) == len(table):
-        return found, certainty
-    kept = found.copy()
-    lower, upper = table.lower, table.upper
-    for name in unseen:
-        part = table.slice_of(name)
-        kept[part] = lower[part] = upper[part] = user[part]
-    kept = fit.solve_within(problem, kept, lower, upper)
-    if judge(kept)[0] > KEEP_TOLERANCE * cost + 1e-8:
-        return found, certainty
-    notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
-    return kept, certainty
+def _weighted(reference: Image, view: View) -> MakeWeighted | None:
+    """Residuals in standard deviations of the noise; None for a view that is no formula."""
+    if isinstance(view, BakedView):
+        return None
+    return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), reference, view)(target)
 
 
-def _judge(
-    pictures: Sequence[Candidate],
-    fit: RecordedFit,
-    reference: Image,
-    mask: NDArray[np.bool_],
-    settings: FitSettings,
-    view: View,
-    perceptual: bool,
-    ldr: bool,
-    compressed: MakeResidual,
-) -> list[float]:
-    """An error for each picture."""
-    if perceptual:
-        name = "flip-ldr" if ldr else "flip-hdr"
-        loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
-        return [loss.value(picture.image) for picture in pictures]
-    groups = fit.paths.tile_groups()
-    residual = compressed(groups.average(fit.reference))
-    return [float(np.sqrt(np.mean(residual(groups.average(p.image))[0] ** 2))) for p in pictures]
+def _misfit(fit: RecordedFit, problem: Problem, compressed: MakeResidual) -> Callable[[Pixels], float]:
+    """The least-squares measure of a path-traced picture: of the last problem where it knows the noise, else in log."""
+    residual, groups = problem.residual, problem.groups
+    if not fit.scene.needs.sampled:
+        groups = fit.paths.tile_groups()
+        residual = compressed(groups.average(fit.reference))
+    return lambda image: float(np.sqrt(np.mean(residual(groups.average(image))[0] ** 2)))

@@ -68,6 +68,29 @@ class RelativeResidual:
         return (image - self._reference) * weight, weight
 
 
+class WeightedResidual:
+    """(I - R) x `weight`, both (g, 3), growing only by its root beyond `LIMIT` standard deviations.
+
+    The squares sum to twice P. Huber's loss (1964), so that one firefly in the reference cannot outweigh a tile's
+    neighbours; a weight is one over the deviation of the noise.
+    """
+
+    LIMIT = 4.0
+
+    def __init__(self, reference: Rows, weight: Rows) -> None:
+        self._reference = reference
+        self._weight = weight.astype(np.float32)
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values = (image - self._reference) * self._weight
+        size = np.abs(values)
+        bounded = np.sqrt(np.maximum(2.0 * self.LIMIT * size - self.LIMIT**2, self.LIMIT**2))
+        far = size > self.LIMIT
+        slope = np.where(far, self._weight * (self.LIMIT / bounded), self._weight)
+        return np.where(far, np.copysign(bounded, values), values), slope
+
+
 class CensoredResidual:
     """Another residual that does not look above `limit` where the reference (g, 3) is clipped there.
 

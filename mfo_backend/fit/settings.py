@@ -12,7 +12,7 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding
 
 _CHOICES: dict[str, tuple[str, ...]] = {
-    "preset": ("paper", "fast", "balanced"),
+    "preset": ("paper", "fast", "balanced", "best"),
     "range": ("auto", "hdr", "ldr"),
     "schedule": ("decay", "constant"),
     "region": ("target", "image"),
@@ -28,7 +28,8 @@ class FitSettings:
     ----------
     preset
         ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
-        ``"balanced"``: perceptual least squares from there. They use only `range`, `seed`, `verify_spp` and `region`.
+        ``"balanced"``: perceptual least squares from there; ``"best"``: then FLIP itself, from several solutions. They
+        use only `range`, `seed`, `verify_spp` and `region`.
     model, parameters
         Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
         holds Blender's socket values, else Mitsuba's.
