@@ -16,6 +16,7 @@ def result_text(result: Mapping[str, Any]) -> str:
     rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines += [weak["sentence"] for weak in result.get("weak_combinations", [])]
     return "\n".join(lines)
 
 

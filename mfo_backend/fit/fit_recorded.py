@@ -30,6 +30,7 @@ from .residuals import CensoredResidual, RelativeResidual, ResponseResidual, Wei
 from .settings import FitSettings
 from .stages import Candidate
 from .verification import VERIFY_STREAM, check_reference, picture_errors
+from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
 _CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
@@ -143,6 +144,7 @@ def fit_recorded(
         passes=renderer.passes,
         certainty=kept.certainty if kept else {},
         notes=tuple(notes),
+        weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
     return FitOutcome(result, pictures[0].image, pictures[best].image)
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ GAIN = 1e-3  # relative to the error at the start; less cannot be seen
 SKIP_BELOW = 1e-4  # a mean FLIP that leaves nothing to gain
 
 
-class _Enough(Exception):
+class _Enough(Exception):  # noqa: N818  it is no error
     """Ends the minimiser from within an evaluation."""
 
 
@@ -65,8 +66,6 @@ def minimise_flip(
     scale = [0.0]
     first = np.clip((start - lower) / width, 0.0, (upper - lower) / width)
     bounds = list(zip(np.zeros_like(width), (upper - lower) / width, strict=True))
-    try:
+    with suppress(_Enough):
         minimize(at, first, jac=True, method="SLSQP", bounds=bounds, options={"ftol": GAIN, "maxiter": EVALUATIONS})
-    except _Enough:
-        pass
     return best, best_value

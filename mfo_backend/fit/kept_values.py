@@ -78,9 +78,7 @@ def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: Paramet
     noise = max(2.0 * equations.cost, least**2, 1e-30)
     hessian = equations.hessian + 1e-9 * np.diag(equations.hessian).max() * np.eye(len(found))
     lower, upper = table.lower, table.upper
-    candidates = [
-        p.name for p in table if np.all((user - lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))
-    ]
+    candidates = [p.name for p in table if np.all((user - lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))]
 
     def change(names: list[str]) -> float:
         """How much the cost rises with these names at the user's values and all others at their best."""

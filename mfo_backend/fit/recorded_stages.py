@@ -30,7 +30,7 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 LEAST_NOISE = 0.002
 WEIGHT_ROUNDS = 2  # the first weights come from a model that is still off
 MOST_RECORDINGS = 3  # at the solution, until it holds still
-MOVED = 0.05  # relative change of the tiles by a solve after which its recording is too old
+MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
 
 
 @dataclass(frozen=True)

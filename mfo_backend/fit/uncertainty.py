@@ -24,9 +24,7 @@ INFLATION = 1.2  # own noise in the Jacobian is not counted
 PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite
 
 
-def covariance(
-    jacobian: Vector, residual: Vector, table: ParameterTable, model_error: float = MODEL_ERROR
-) -> Vector:
+def covariance(jacobian: Vector, residual: Vector, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:
     """Covariance (k, k) in widths of the box from weighted derivatives (g, 3, k) and weighted residuals (g, 3).
 
     `model_error` is the least error of a residual; the default is for relative ones.

@@ -8,7 +8,7 @@ import pytest
 
 from mfo_backend.bench.assets import Assets, generated_probe
 from mfo_backend.bench.bumpy_sphere import bumpy_sphere, write_ply
-from mfo_backend.bench.method import METHODS, method_settings
+from mfo_backend.bench.method import METHODS, OUR_METHODS, method_settings
 from mfo_backend.bench.scenario import SCENARIOS
 from mfo_backend.bench.scene import write_scene
 from mfo_backend.material.mitsuba_parameters import MITSUBA_PRINCIPLED
@@ -89,7 +89,7 @@ def test_meshes_of_the_folder_are_used_and_open_ones_not_for_glass(tmp_path):
 def test_methods_are_what_they_are_called(method):
     settings = method_settings(method, SCENARIOS["noise"], 7)
     assert (settings.seed, settings.spp, settings.parameters) == (7, 4, "all")
-    if method in ("fast", "balanced"):
+    if method in OUR_METHODS:
         assert settings.preset == method
     else:
         stages = {"mse": ["mse"], "flip": ["flip"], "mfo": ["mse", "flip"]}[method[:-4]]
