@@ -24,9 +24,10 @@ from .course import Course
 from .displayed_residual import DisplayedResidual
 from .fit_material import FitOutcome
 from .kept_values import box_holding, keep_values
+from .perceptual_stages import perceptual_ends
 from .picture_judge import NOISY, PictureJudge
-from .recorded_stages import MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan, Vector
-from .residuals import CensoredResidual, RelativeResidual, ResponseResidual, WeightedResidual, log_residual
+from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan
+from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .stages import Candidate
 from .verification import VERIFY_STREAM, check_reference, picture_errors
@@ -36,8 +37,6 @@ STAGES = ("scan", "start", "refine")
 _CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
-BASIN = 0.1  # of the box: solutions nearer than this in every value are one
-FLIP_STARTS = 2
 
 
 def fit_recorded(
@@ -84,19 +83,19 @@ def fit_recorded(
     fit = RecordedFit(scene, light, mask, plan, settings.seed, course, _clipped(reference, view))
 
     basins = fit.start_from_nothing(_censored(log_residual, reference, view))
-    candidates: list[Vector] = [renderer.start]
+    ends = [End("start", renderer.start)]
     kept = None
     notes = list(scene.needs.notes)
     counts: Callable[[Pixels], float] | None = None  # what the result is chosen by
     if should_stop():
-        candidates.append(basins[0].x)
+        ends.append(End("start", basins[0].x))
     else:
         make = RelativeResidual if scene.needs.sampled else log_residual
         solution, last = fit.refine(basins[0].x, _censored(make, reference, view), _weighted(reference, view))
         weighted = scene.needs.sampled and not isinstance(view, BakedView)
         kept = keep_values(fit, last, solution.x, weighted=weighted)
         fit.box = box_holding(fit.table, renderer.start, kept.held)
-        candidates.append(kept.x)
+        ends.append(End("refine", kept.x))
         notes += kept.notes
         noise = fit.noise.level if fit.noise else 0.0
         at_noise = weighted and np.sqrt(2.0 * solution.equations.cost) < AT_NOISE
@@ -110,33 +109,32 @@ def fit_recorded(
             blurred = linear and (scene.needs.sampled or noise > NOISY)
             judge = PictureJudge(reference, light, mask, settings, view, ldr=ldr, blurred=blurred)
             counts = judge.value
-            ends = [kept.x]
-            if settings.preset == "best":
-                ends += [fit.solve_within(last, np.clip(b.x, *fit.box), *fit.box) for b in basins[1:]]
-            for name, response in perceptual.items():
-                found = fit.polish(name, last.groups, lambda target, r=response: ResponseResidual(r, target), ends)
-                candidates += found
-            if settings.preset == "best":
-                candidates += _lower_flip(fit, judge, candidates[1:], notes)
+            flip = settings.preset == "best"
+            others = [basin.x for basin in basins[1:]] if flip else []
+            ends += perceptual_ends(fit, last, kept.x, others, perceptual, judge, flip=flip, notes=notes)
+        if fit.recordings > 1:
+            notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
         if counts is None:
             counts = _misfit(fit, last, _censored(log_residual, reference, view))
 
     seed = settings.seed ^ VERIFY_STREAM
     spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
-    pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
+    pictures = [Candidate(end.x, renderer.image(end.x, seed=seed, spp=spp)) for end in ends]
     listener(Preview(pictures[-1].image))
     counts = counts or PictureJudge(reference, light, mask, settings, view, ldr=ldr, blurred=False).value
-    best = best_of([counts(picture.image) for picture in pictures])
+    best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     message = status.sentence
     if best == 0:
         message += " Nothing was better than the start, so the start was kept."
+    elif best == 1 and len(ends) > 2:
+        notes.append("No perceptual stage was better in a picture of its own, so the end of 'refine' was kept.")
     result = FitResult(
         status=status,
         message=message,
         model=renderer.model,
         initial=renderer.table.unpack(renderer.start),
-        recovered=renderer.table.unpack(candidates[best]),
+        recovered=renderer.table.unpack(ends[best].x),
         bounds={p.name: (p.lower, p.upper) for p in renderer.table},
         stages=tuple(course.reports),
         errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
@@ -153,19 +151,6 @@ def best_of(errors: Sequence[float]) -> int:
     """The number of the smallest error; one that is not finite never wins, and without any the start stays."""
     values = [error if np.isfinite(error) else np.inf for error in errors]
     return int(np.argmin(values))
-
-
-def _lower_flip(fit: RecordedFit, judge: PictureJudge, ends: Sequence[Vector], notes: list[str]) -> list[Vector]:
-    """The stage `flip` from the ends with the least FLIP, where the recording holds every pixel."""
-    if not fit.complete:
-        notes.append("The picture is too large to be recorded whole: the stage 'flip' was left out.")
-        return []
-    width = fit.table.upper - fit.table.lower
-    starts: list[Vector] = []
-    for x in sorted(ends, key=lambda x: judge.value(fit.picture(x))):
-        if all(np.max(np.abs(x - other) / width) > BASIN for other in starts):
-            starts.append(x)
-    return fit.lower_flip(judge, starts[:FLIP_STARTS])
 
 
 def _linear(reference: Image, view: View) -> Pixels:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
+from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
 from .course import Course, Stage
@@ -82,6 +83,14 @@ class Problem:
         return normal_equations(self.evaluate, self.residual)
 
 
+@dataclass(frozen=True)
+class End:
+    """Where a stage ended."""
+
+    stage: str
+    x: Vector
+
+
 class RecordedFit:
     """The stages of one fit; `reference` is scene-linear, `mask` holds the pixels that see the target.
 
@@ -103,6 +112,7 @@ class RecordedFit:
         self.paths: RecordedPaths
         self.noise: TileNoise | None = None  # of the reference, known after `refine`
         self.table = scene.renderer.table
+        self.recordings = 0
         self.box = self.table.lower, self.table.upper  # of the perceptual stages, which hold what the user keeps
         course.picture = self.picture
 
@@ -150,6 +160,8 @@ class RecordedFit:
             starts += [node.x for node in metals[:2] if not any(node.x is x for x in starts)]
             starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
             basins = self._race(watched, starts)
+            if not np.isfinite(basins[0].equations.cost):
+                raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
             stage.vector = basins[0].x
         return basins
 
@@ -197,7 +209,11 @@ class RecordedFit:
         # a cost of 1e-11 is a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
         limits = SolveLimits(evaluations=evaluations, cost_change=1e-5, cost_floor=1e-11)
         lower, upper = box or (self.table.lower, self.table.upper)
-        return solve_bounded(residuals, start, lower, upper, limits, self.course.should_stop)
+        try:
+            return solve_bounded(residuals, start, lower, upper, limits, self.course.should_stop)
+        except ValueError:  # a start without finite numbers: every other one is better
+            nothing = np.zeros(len(start))
+            return Solution(start, NormalEquations(np.inf, nothing, np.diag(nothing)), (np.inf,), True)
 
     def solve_within(self, problem: Problem, start: Vector, lower: Vector, upper: Vector) -> Vector:
         """A few steps with other bounds."""
@@ -220,6 +236,7 @@ class RecordedFit:
             for number in range(1, MOST_RECORDINGS + 1):
                 grid, seed = self.plan.grid_last, self.seed + number
                 self.paths = self.scene.record(start, grid=grid, seed=seed, near=True)
+                self.recordings = number
                 solution, problem = self._refine_sampled(stage, start, make, weigh)
                 stage.vector = solution.x
                 if self._moved(problem, start, solution.x) < MOVED or self.course.should_stop():
@@ -254,15 +271,16 @@ class RecordedFit:
         old, new = (problem.evaluate(x)[:, :, 0] for x in (before, after))
         return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + 0.1 * np.abs(new).mean() + 1e-12)))))
 
-    def polish(self, name: str, groups: LaneGroups, make: MakeResidual, starts: list[Vector]) -> list[Vector]:
-        """A stage with another residual on the same recording, from each start."""
+    def polish(self, name: str, groups: LaneGroups, make: MakeResidual, starts: list[Vector]) -> list[Vector] | None:
+        """A stage with another residual on the same recording, from each start; None without finite numbers."""
         with self.course.stage(name) as stage:
             residual = make(groups.average(self.reference))
             problem = Problem(self.scene.evaluator(self.paths, groups), residual, groups)
             watched = self.course.watch(stage, problem.equations)
             found = [self._solve(watched, start, 25, self.box) for start in starts]
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x
-        return [solution.x for solution in found]
+        finite = [solution.x for solution in found if np.isfinite(solution.equations.cost)]
+        return finite or None
 
     def lower_flip(self, judge: PictureJudge, starts: list[Vector]) -> list[Vector]:
         """Stage `flip`: the mean error of the recorded picture itself, from each start."""
