@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import atexit
+
 import bpy
 
 from . import handlers, panel, preferences, previews, properties, running_job
 from .operators import CLASSES as OPERATORS
+from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
 
@@ -18,10 +21,13 @@ def register() -> None:
     properties.attach()
     previews.register()
     handlers.register()
+    if is_module():
+        atexit.register(unregister)  # what is still registered at its end crashes bpy 4.2 and stops bpy 4.5
 
 
 def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
+    atexit.unregister(unregister)
     running_job.close()
     handlers.unregister()
     previews.unregister()

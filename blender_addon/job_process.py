@@ -7,27 +7,24 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from .backend_python import EXTENSION_ROOT, backend_environment
+from .progress_lines import Event, read_events
 
 LOG = "backend.log"
-Event = dict[str, Any]
 
 CANCEL_GRACE = 5.0  # seconds from the cancel command to SIGTERM; the backend promises to need one
 TERMINATE_GRACE = 3.0  # seconds from SIGTERM to SIGKILL
 PIPE_GRACE = 1.0  # seconds a dead process' pipe may stay open (a grandchild can hold it) before we stop reading
-LINE_LIMIT = 1 << 20  # bytes; a longer line is no event of ours
 QUEUE_LIMIT = 1000  # events besides progress and preview, of which only the newest is kept
 
 _LAST_EVENTS = ("finished", "failed")
@@ -138,13 +135,7 @@ class JobProcess:
     def _read(self) -> None:
         stdout = self._process.stdout
         assert stdout is not None
-        for line in _lines(stdout):
-            try:
-                event = json.loads(line)
-            except ValueError:
-                continue  # a library printed something, or a line was cut by the process' death
-            if not isinstance(event, dict) or not isinstance(event.get("event"), str):
-                continue
+        for event in read_events(stdout):
             with self._lock:
                 if event["event"] in _COALESCED:
                     self._newest[event["event"]] = event
@@ -232,16 +223,6 @@ def log_tail(path: Path, lines: int = 40) -> str:
             return "\n".join(file.read().decode("utf-8", "replace").splitlines()[-lines:])
     except OSError:
         return ""
-
-
-def _lines(stream: IO[bytes]) -> Iterator[bytes]:
-    """Complete lines of at most LINE_LIMIT bytes; the rest of a longer one is skipped."""
-    skipping = False
-    with contextlib.suppress(OSError, ValueError):  # the pipe was closed under us
-        while line := stream.readline(LINE_LIMIT):
-            if not skipping and line.endswith(b"\n"):
-                yield line
-            skipping = not line.endswith(b"\n")
 
 
 def _own_group() -> dict[str, Any]:

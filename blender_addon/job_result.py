@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 SCHEMA_VERSION = 1
+LARGEST_FILE = 1 << 26  # bytes; the curves of a long fit take 1 MB
+LARGEST_NUMBER = 3.4e38  # of the float32 that a socket holds
 Value = float | tuple[float, ...]
 
 
@@ -74,7 +76,7 @@ def read_job_result(folder: Path) -> JobResult:
             notes=tuple(map(str, result.get("notes", ()))),
             seconds=float(result.get("seconds", 0.0)),
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise JobResultError(
             f"The files of the job in {folder} are damaged ({type(error).__name__}: {error}): run the fit again."
         ) from error
@@ -82,7 +84,11 @@ def read_job_result(folder: Path) -> JobResult:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_text("utf-8"))
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise ValueError(f"it is larger than {LARGEST_FILE >> 20} MB")
+        data = json.loads(content.decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise JobResultError(f"{path} cannot be read ({error}): run the fit again.") from error
     if not isinstance(data, dict) or data.get("schema_version") != SCHEMA_VERSION:
@@ -94,7 +100,10 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _value(data: Any) -> Value:
-    numbers = tuple(float(v) for v in data) if isinstance(data, list) else float(data)
-    if not all(map(math.isfinite, numbers if isinstance(numbers, tuple) else (numbers,))):
-        raise ValueError(f"{data} is not finite")
-    return numbers
+    given = data if isinstance(data, list) else [data]
+    numbers = tuple(float(v) for v in given)
+    if not 1 <= len(numbers) <= 4 or any(isinstance(v, str) for v in given):
+        raise ValueError(f"{str(data)[:60]} is no value of a socket")
+    if not all(math.isfinite(v) and abs(v) <= LARGEST_NUMBER for v in numbers):
+        raise ValueError(f"{str(data)[:60]} is not finite")
+    return numbers if isinstance(data, list) else numbers[0]

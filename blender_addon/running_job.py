@@ -11,6 +11,7 @@ import atexit
 import shutil
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -177,7 +178,7 @@ def _handle(job: RunningJob, event: Event) -> None:
         elif event["event"] == "stage_end":
             line = "{stage}: {loss_start:.3g} to {loss_best:.3g}, {iterations} iterations ({status})"
             add_message(runtime, line.format_map(event), "CHECKMARK")
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
         return  # a newer backend says less or more than we know; its result is what counts
     redraw()
 
@@ -194,6 +195,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     runtime = _runtime()
     current = None
     atexit.unregister(close)
+    _remove_unfinished(job.process.folder)
     runtime.state = "DONE" if outcome.status in _GOOD else "FAILED"
     runtime.sentence = outcome.sentence
     runtime.progress_text, runtime.detail = "", ""
@@ -207,6 +209,14 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
         shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
         runtime.job_folder = ""
     redraw()
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove files that the backend was killed in the middle of."""
+    for parent in (folder, folder / "pictures"):
+        for path in parent.glob(".*.tmp"):
+            with suppress(OSError):
+                path.unlink()
 
 
 def _clear(runtime: bpy.types.PropertyGroup) -> None:

@@ -98,6 +98,11 @@ def overrides_of(view_layer: bpy.types.ViewLayer) -> list[str]:
     return [owner.name for owner in owners if owner is not None]
 
 
+def is_module() -> bool:
+    """Whether Blender is a module of this Python, not a program."""
+    return not bpy.app.binary_path
+
+
 def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Return the shading normal of every face corner, custom normals included, (corners, 3)."""
     normals = np.empty(len(mesh.loops) * 3, dtype=np.float32)

@@ -64,17 +64,18 @@ def socket_to_parameter(socket_name: str) -> str:
 def apply_values(material: bpy.types.Material, values: Mapping[str, Value], folder: Path) -> list[str]:
     """Set the unlinked sockets in `values` (linear Rec.709), keep what they were, return what was skipped and why.
 
-    A second call keeps the originals of the first one, so that `revert_values` always leads to the user's own material.
+    Nothing is set before all of it is known to fit. A second call keeps the originals of the first one, so that
+    `revert_values` always leads to the user's own material.
 
     Raises
     ------
     WriteBackError
-        If the material is read-only or has no Principled node.
+        If the material is read-only, has no Principled node, or a value is none that its socket can hold.
     """
     if not material.is_editable:
         raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
     node = principled_node(material)
-    notes = []
+    notes, changes = [], []
     for name, value in values.items():
         socket = node.inputs.get(name)
         if socket is None:
@@ -82,8 +83,10 @@ def apply_values(material: bpy.types.Material, values: Mapping[str, Value], fold
         elif socket.is_linked:
             notes.append(f"{name} has a link and was left as it is.")
         else:
-            _keep_original(material.mfo, socket)
-            _set(socket, value)
+            changes.append((socket, _fitting(socket, value)))
+    for socket, value in changes:
+        _keep_original(material.mfo, socket)
+        socket.default_value = value
     material.mfo.job_folder = str(folder)
     return notes
 
@@ -96,6 +99,8 @@ def revert_values(material: bpy.types.Material) -> list[str]:
         socket = node.inputs.get(original.name)
         if socket is None:
             notes.append(f"{original.name} does not exist any more and was skipped.")
+        elif original.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
+            notes.append(f"{original.name} was kept as {original.size} numbers and could not be set.")
         elif original.size == 1:
             socket.default_value = original.value[0]
         else:
@@ -108,19 +113,28 @@ def revert_values(material: bpy.types.Material) -> list[str]:
 def _keep_original(kept: bpy.types.PropertyGroup, socket: bpy.types.NodeSocket) -> None:
     if socket.name in kept.originals:
         return
-    value = socket.default_value
-    numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
+    numbers = _numbers(socket)
     original = kept.originals.add()
     original.name, original.size = socket.name, len(numbers)
     original.value = (*numbers, 0.0, 0.0, 0.0)[:4]
 
 
-def _set(socket: bpy.types.NodeSocket, value: Value) -> None:
-    if isinstance(value, (int, float)):
-        socket.default_value = value
-    elif socket.type == "RGBA":
-        matrix = working_space_to_rec709()
-        color = np.array(value[:3]) if matrix is None else np.linalg.solve(matrix, value[:3])
-        socket.default_value = (*color, socket.default_value[3])
-    else:
-        socket.default_value = value
+def _numbers(socket: bpy.types.NodeSocket) -> tuple[float, ...]:
+    value = getattr(socket, "default_value", ())  # a shader socket has none
+    return (value,) if isinstance(value, (int, float)) else tuple(value)
+
+
+def _fitting(socket: bpy.types.NodeSocket, value: Value) -> Value:
+    """The value as the socket takes it: a number, or as many as it has."""
+    held = _numbers(socket)
+    given = value if isinstance(value, tuple) else (value,)
+    is_color = socket.type == "RGBA"
+    if len(given) not in ((3, 4) if is_color else (len(held),)):
+        raise WriteBackError(
+            f"The result has {len(given)} numbers for {socket.name}, which holds {len(held)}: run the fit again."
+        )
+    if not is_color:
+        return given if len(held) > 1 else given[0]
+    matrix = working_space_to_rec709()
+    color = np.array(given[:3]) if matrix is None else np.linalg.solve(matrix, given[:3])
+    return (*map(float, color), held[3])

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from pathlib import Path
 from .findings import ExportError
 
 GENERATOR = "material_fit_mfo"
+_ABANDONED = re.compile(r"\..+\.(\d+)\.[a-z0-9_]+\.(partial|old)")  # hidden, process id, mkdtemp's letters
 # what a job folder may hold; a folder with anything else is somebody's own
 OWN_NAMES = {
     "request.json", "scene.xml", "meshes", "textures", "view_lut.exr", "progress.jsonl", "cancel", "result.json",
@@ -36,7 +38,8 @@ def new_job_folder(folder: Path) -> Iterator[Path]:
     missing = [parent for parent in folder.parents if not parent.exists()]
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        partial = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".partial", dir=folder.parent))
+        _remove_abandoned(folder.parent)
+        partial = Path(tempfile.mkdtemp(prefix=f".{folder.name}.{os.getpid()}.", suffix=".partial", dir=folder.parent))
         partial.chmod(0o755)
         yield partial
         _replace(partial, folder)
@@ -84,6 +87,27 @@ def _replace(partial: Path, folder: Path) -> None:
         os.replace(old, folder)
         raise
     shutil.rmtree(old, ignore_errors=True)
+
+
+def _remove_abandoned(parent: Path) -> None:
+    """Remove what exports of processes that were killed have left here."""
+    with suppress(OSError):
+        for path in parent.iterdir():
+            found = _ABANDONED.fullmatch(path.name)
+            if found is not None and not _lives(int(found[1])):
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def _lives(pid: int) -> bool:
+    if os.name == "nt":
+        return True  # os.kill would end it there; an abandoned folder stays
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _sentence(problem: OSError, folder: Path) -> str:

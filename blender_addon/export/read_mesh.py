@@ -12,8 +12,11 @@ from .mesh_arrays import CornerMesh
 
 def read_mesh(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> CornerMesh | None:
     """Return the triangles of an evaluated object in its own space, or None if it has no faces."""
+    # the faces of curves, texts and metaballs come complete; with all layers asked for, Blender 4.2 evaluates the
+    # curve behind them as if it were a mesh and crashes
+    layers = evaluated.original.type == "MESH"
     try:
-        mesh = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+        mesh = evaluated.to_mesh(preserve_all_data_layers=layers, depsgraph=depsgraph)
     except RuntimeError:  # this type has no geometry that converts
         return None
     try:

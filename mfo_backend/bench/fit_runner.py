@@ -4,18 +4,35 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from ..fit.fit_material import FitOutcome
 from ..fit.settings import FitSettings
+from ..job.atomic_file import write_atomically
 from ..types.status import Status
 from .assets import Assets
-from .judge import Judge
-from .method import method_settings, warm_up_settings
+from .busy import BusyMark
+from .judge import Judge, TruePictures
+from .method import METHODS, method_settings, warm_up_settings
+from .new_seeds import NewSeeds
 from .row import Row, Task
+from .row_pictures import picture_file, shown_picture
 from .scenario import SCENARIOS
 from .scene import SHAPE, BenchScene, write_scene
+from .stopwatch import Stopwatch
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A fit with what was measured around it."""
+
+    outcome: FitOutcome
+    load_seconds: float
+    parts: Mapping[str, float] = field(default_factory=dict)
+    others_busy: float | None = None
 
 
 class FitRunner:
@@ -27,15 +44,19 @@ class FitRunner:
         If Mitsuba or LLVM is missing.
     """
 
-    def __init__(self, folder: Path, size: int, assets: Assets) -> None:
+    def __init__(self, folder: Path, size: int, assets: Assets, *, threads: int = 0) -> None:
         from ..render.llvm import configure_llvm, needs_llvm
 
         if needs_llvm():
             configure_llvm()  # before the first import of drjit
-        from ..render.variant import load_variant
+        from ..render.variant import load_variant, use_threads
 
         self.size = size
+        began = time.monotonic()
         self.variant = load_variant()
+        self.import_seconds = time.monotonic() - began
+        if threads:
+            use_threads(threads)
         self._folder = folder
         self._assets = assets
         self._warm: set[tuple[str, str]] = set()
@@ -47,44 +68,59 @@ class FitRunner:
         """The number of the scene; references and the judge have seeds far from it."""
         return task.scene
 
-    def __call__(self, task: Task, should_stop: Callable[[], bool]) -> Row:
-        """Fit, then judge; a cancelled fit is not judged."""
-        self._open(task)
+    def __call__(self, task: Task, should_stop: Callable[[], bool], pictures: TruePictures | None = None) -> Row:
+        """Fit, then judge; a cancelled fit is not judged. `pictures` are those of the scene, if they are there."""
+        self._open(task, pictures)
         settings = method_settings(task.method, self._scene.scenario, self.seed(task))
         warm_up = 0.0
         if (task.scenario, task.method) not in self._warm:
             began = time.monotonic()
-            outcome = self._fit(warm_up_settings(settings), should_stop)
-            if outcome.result.status is Status.CANCELLED:
-                return self._row(task, outcome, 0.0)
+            measured = self._fit(task, warm_up_settings(settings), should_stop)
+            if measured.outcome.result.status is Status.CANCELLED:
+                return self._row(task, measured, 0.0)
             self._warm.add((task.scenario, task.method))
             warm_up = time.monotonic() - began
-        return self._row(task, self._fit(settings, should_stop), warm_up)
+        return self._row(task, self._fit(task, settings, should_stop), warm_up)
 
-    def _open(self, task: Task) -> None:
+    def pictures(self, task: Task) -> TruePictures:
+        """The true pictures of the task's scene."""
+        self._open(task, None)
+        return self._judge.pictures
+
+    def _open(self, task: Task, pictures: TruePictures | None) -> None:
         at = (task.scenario, task.scene)
         if self._at != at:
             self._at = None
             folder = self._folder / f"{task.scenario}-{task.scene:03d}"
             self._scene = write_scene(SCENARIOS[task.scenario], task.scene, self.size, self._assets, folder)
-            self._judge = Judge(self._scene)
+            self._judge = Judge(self._scene, pictures)
             self._at = at
+            self._keep_picture(Task(*at, "reference"), self._judge.pictures.reference)
+            self._keep_picture(Task(*at, "truth"), self._judge.pictures.truth[0])
 
-    def _fit(self, settings: FitSettings, should_stop: Callable[[], bool]) -> FitOutcome:
+    def _fit(self, task: Task, settings: FitSettings, should_stop: Callable[[], bool]) -> _Measured:
         from ..fit.fit_material import fit_material
         from ..fit.fit_recorded import fit_recorded
         from ..render.mitsuba_renderer import load_mitsuba_renderer
 
+        began, method = time.monotonic(), METHODS[task.method]
         # a renderer of its own for every fit: passes count from 0 and nothing is left over from the fit before
         renderer = load_mitsuba_renderer(
             self._scene.file, SHAPE, model=settings.model, parameters=settings.parameters, materials={}
         )
-        # not `recover_material`: a preset that hands a scene over to another has not fitted it
-        fit = fit_material if settings.preset == "paper" else fit_recorded
-        return fit(renderer, self._judge.reference, settings, listener=lambda event: None, should_stop=should_stop)
+        loaded, watch, busy = time.monotonic() - began, Stopwatch(), BusyMark.now()
+        common: dict[str, Any] = {"listener": lambda event: None, "should_stop": should_stop}
+        with watch.watching():
+            # not `recover_material`: a preset that hands a scene over to another has not fitted it
+            if settings.preset == "paper":
+                seen = NewSeeds(renderer, settings.seed) if method.new_seeds else renderer
+                outcome = fit_material(seen, self._judge.reference, settings, **common)
+            else:
+                outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
+        return _Measured(outcome, loaded, watch.parts, busy.others())
 
-    def _row(self, task: Task, outcome: FitOutcome, warm_up: float) -> Row:
-        result = outcome.result
+    def _row(self, task: Task, measured: _Measured, warm_up: float) -> Row:
+        result, scene = measured.outcome.result, self._scene
         common = {
             "scenario": task.scenario,
             "scene": task.scene,
@@ -92,26 +128,56 @@ class FitRunner:
             "seed": self.seed(task),
             "size": self.size,
             "status": result.status.value,
-            "object": self._scene.object,
-            "light": self._scene.light,
+            "object": scene.object,
+            "light": scene.light,
+            "material": scene.material,
         }
         if result.status is Status.CANCELLED:
             return Row(**common)
         judge = self._judge
-        difference = judge.difference(result.recovered)
+        picture = judge.picture(result.recovered)
+        self._keep_picture(task, picture)
+        difference, relit = judge.difference_of(picture), judge.relit(result.recovered)
+        start, floor = judge.pictures.start, judge.pictures.floor
         return Row(
             **common,
             seconds=result.seconds,
+            load_seconds=measured.load_seconds,
             warm_up_seconds=warm_up,
+            parts=dict(measured.parts),
+            others_busy=measured.others_busy,
             passes=result.passes,
             flip=difference.flip,
             hdr_flip=difference.hdr_flip,
             relative_rmse=difference.relative_rmse,
-            relit_relative_rmse=judge.relit_relative_rmse(result.recovered),
-            start_flip=judge.start.flip,
-            floor_flip=judge.floor.flip,
-            floor_relative_rmse=judge.floor.relative_rmse,
+            jod=difference.jod,
+            q_jod=difference.q_jod,
+            relit_relative_rmse=sum(d.relative_rmse for d in relit) / len(relit),
+            relit_flips=[d.flip for d in relit],
+            start_flip=start.flip,
+            floor_flip=floor.flip,
+            floor_relative_rmse=floor.relative_rmse,
+            stages=[
+                {
+                    "name": stage.name,
+                    "status": stage.status.value,
+                    "iterations": stage.iterations,
+                    "passes": stage.curve[-1].passes if stage.curve else None,
+                    "flip": judge.flip(stage.values),
+                }
+                for stage in result.stages
+            ],
             parameter_errors=judge.parameter_errors(result.recovered),
             truth=judge.true_values(),
             recovered=dict(result.recovered),
+            certainty={
+                name: {"sd": list(certainty.sd), "level": certainty.level.value}
+                for name, certainty in result.certainty.items()
+            },
+            notes=list(result.notes),
         )
+
+    def _keep_picture(self, task: Task, pixels: Any) -> None:
+        path = picture_file(self._folder.parent, task)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, shown_picture(pixels, self._judge.pictures.truth[0], self._judge.pictures.mask))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.compare import compare_images
+from ..metrics.judges.hdr_vdp import is_configured
+from ..metrics.judges.judgement import judge_images
+from ..metrics.judges.packages import require_pycvvdp
+from ..render.plain_picture import PlainScene
 from ..render.renderer import Renderer, load_renderer
+from ..types.errors import MfoError
 from ..types.image import Encoding, Image, Pixels
 from ..types.parameter import Value
 from .scene import SHAPE, BenchScene
@@ -19,75 +25,135 @@ from .scene import SHAPE, BenchScene
 # far from each other and from the seeds of fits, which are the scenes' numbers and those ^ VERIFY_STREAM
 _REFERENCE_STREAM, _JUDGE_STREAM = 0x0BEF0000, 0x70D6E000
 JUDGE_SPP = 256
+UNPAIRED_SPP = 1024  # where the truth is another material, so that noise is not the same in both pictures
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Means over the object."""
+    """Means over the object, and scores of the whole picture: ColorVideoVDP's and HDR-VDP-3's, None where missing."""
 
     flip: float
     hdr_flip: float
     relative_rmse: float
+    jod: float | None = None
+    q_jod: float | None = None
+
+
+@dataclass(frozen=True)
+class TruePictures:
+    """What only depends on the scene: it is rendered once and can be sent to another process.
+
+    `truth` is under the reference's light and then under those of the judge; `floor` is the difference of the
+    reference from it, its noise, and `start` that of the start.
+    """
+
+    reference: Pixels
+    truth: tuple[Pixels, ...]
+    mask: NDArray[np.bool_]
+    floor: Difference
+    start: Difference
 
 
 class Judge:
-    """Renders a scene's reference and judges values against its truth."""
+    """Judges values against a scene's truth; without `pictures` it renders them first."""
 
-    def __init__(self, scene: BenchScene) -> None:
+    def __init__(self, scene: BenchScene, pictures: TruePictures | None = None) -> None:
         self._scene = scene
-        self._renderer = self._load(scene.file)
-        self._relit = self._load(scene.relit)
+        self._renderers = [self._load(file) for file in (scene.file, *scene.relit)]
+        self._renderer = self._renderers[0]
         self._seed = _JUDGE_STREAM + scene.number
+        self._spp = JUDGE_SPP if scene.truth else UNPAIRED_SPP
         table = self._renderer.table
-        self.truth = table.clip(table.pack(scene.truth))
-        self._mask = self._renderer.target_mask()
-        self._true = self._picture(self._renderer, self.truth)
-        self._relit_true = self._picture(self._relit, self.truth)
-        pixels = self._renderer.image(
-            self.truth, seed=_REFERENCE_STREAM + scene.number, spp=scene.scenario.reference_spp
-        )
-        self.reference = Image(pixels, Encoding.LINEAR)
-        self.floor = self._difference(pixels)
-        self.start = self._difference(self._picture(self._renderer, self._renderer.start))
+        self.truth = table.clip(table.pack(scene.truth)) if scene.truth else None
+        self.pictures = pictures or self._render()
+
+    @property
+    def reference(self) -> Image:
+        """What the fits see."""
+        return Image(self.pictures.reference, Encoding.LINEAR)
+
+    def picture(self, values: Mapping[str, Value]) -> Pixels:
+        """The judge's picture of these values under the reference's light."""
+        return self._picture(self._renderer, self._renderer.table.pack(values))
 
     def difference(self, values: Mapping[str, Value]) -> Difference:
         """Of the pictures of these values and of the true ones, under the same random numbers."""
-        return self._difference(self._picture(self._renderer, self._renderer.table.pack(values)))
+        return self.difference_of(self.picture(values))
 
-    def relit_relative_rmse(self, values: Mapping[str, Value]) -> float:
-        """The same under the light no fit sees."""
-        picture = self._picture(self._relit, self._relit.table.pack(values))
-        return relative_rmse(picture, self._relit_true, self._mask)
+    def difference_of(self, picture: Pixels) -> Difference:
+        """Of a picture of the judge's and the true one."""
+        return _difference(self.pictures.truth[0], picture, self.pictures.mask)
+
+    def flip(self, values: Mapping[str, Value]) -> float:
+        """Mean FLIP alone, without the judges' scores."""
+        return _difference(self.pictures.truth[0], self.picture(values), self.pictures.mask, judges=False).flip
+
+    def relit(self, values: Mapping[str, Value]) -> list[Difference]:
+        """The same under the lights no fit sees."""
+        found = []
+        for renderer, truth in zip(self._renderers[1:], self.pictures.truth[1:], strict=True):
+            picture = self._picture(renderer, renderer.table.pack(values))
+            found.append(_difference(truth, picture, self.pictures.mask, judges=False))
+        return found
 
     def parameter_errors(self, values: Mapping[str, Value]) -> dict[str, float]:
-        """Largest absolute error of each parameter's components."""
+        """Largest absolute error of each parameter's components; empty where there is no true value."""
         table = self._renderer.table
+        if self.truth is None:
+            return {}
         error = np.abs(table.pack(values) - self.truth)
         return {name: float(error[table.slice_of(name)].max()) for name in table.names}
 
     def true_values(self) -> dict[str, Value]:
         """The truth of every fitted parameter, inside the box of the fit."""
-        return self._renderer.table.unpack(self.truth)
+        return {} if self.truth is None else self._renderer.table.unpack(self.truth)
+
+    def _render(self) -> TruePictures:
+        scene, spp = self._scene, self._scene.scenario.reference_spp
+        seed = _REFERENCE_STREAM + scene.number
+        if self.truth is None:
+            plain = [PlainScene(file) for file in scene.true_files]
+            reference = plain[0].image(seed=seed, spp=spp)
+            truth = tuple(one.image(seed=self._seed, spp=self._spp) for one in plain)
+        else:
+            reference = self._renderer.image(self.truth, seed=seed, spp=spp)
+            truth = tuple(self._picture(renderer, self.truth) for renderer in self._renderers)
+        mask = self._renderer.target_mask()
+        floor = _difference(truth[0], reference, mask)
+        start = _difference(truth[0], self._picture(self._renderer, self._renderer.start), mask)
+        return TruePictures(reference, truth, mask, floor, start)
 
     def _load(self, file: Path) -> Renderer:
         return load_renderer(file, SHAPE, model="mitsuba_principled", parameters=self._scene.scenario.fitted)
 
     def _picture(self, renderer: Renderer, vector: NDArray[np.float64]) -> Pixels:
-        return renderer.image(vector, seed=self._seed, spp=JUDGE_SPP)
-
-    def _difference(self, pixels: Pixels) -> Difference:
-        metrics = compare_images(
-            Image(self._true, Encoding.LINEAR), Image(pixels, Encoding.LINEAR), mask=self._mask
-        ).metrics
-        return Difference(
-            _number(metrics["flip"]), _number(metrics["hdr_flip"]), relative_rmse(pixels, self._true, self._mask)
-        )
+        return renderer.image(vector, seed=self._seed, spp=self._spp)
 
 
 def relative_rmse(test: Pixels, truth: Pixels, mask: NDArray[np.bool_]) -> float:
     """Root mean square of the difference over that of the truth, inside the mask."""
     inside, true = test[mask].astype(np.float64), truth[mask].astype(np.float64)
     return float(np.sqrt(np.mean((inside - true) ** 2) / np.mean(true**2)))
+
+
+@functools.cache
+def judges_present() -> bool:
+    """Whether a judge's score can be computed here."""
+    try:
+        require_pycvvdp()
+    except MfoError:
+        return is_configured()
+    return True
+
+
+def _difference(truth: Pixels, pixels: Pixels, mask: NDArray[np.bool_], *, judges: bool = True) -> Difference:
+    true, test = Image(truth, Encoding.LINEAR), Image(pixels, Encoding.LINEAR)
+    metrics = compare_images(true, test, mask=mask).metrics
+    means = _number(metrics["flip"]), _number(metrics["hdr_flip"]), relative_rmse(pixels, truth, mask)
+    if not judges or not judges_present():
+        return Difference(*means)
+    said = judge_images(true, test)
+    return Difference(*means, said.jod, said.hdrvdp3_q_jod)
 
 
 def _number(value: float | None) -> float:

@@ -3,15 +3,64 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+from ..fit.recorded_stages import RecordedPlan
 from ..fit.settings import FitSettings
 from .scenario import Scenario
 
-_PAPER = {"mse": ("mse",), "flip": ("flip",), "mfo": ("mse", "flip")}
-PAPER_METHODS = tuple(f"{losses}-{light}" for losses in _PAPER for light in ("ldr", "hdr"))
-OUR_METHODS = ("fast", "balanced", "best")
-METHODS = (*PAPER_METHODS, *OUR_METHODS)
+EVERY_LANE = 10**9
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a method fits.
+
+    Attributes
+    ----------
+    settings
+        What differs from the defaults of a fit.
+    plan
+        What differs from the defaults of a recorded fit.
+    new_seeds
+        Random numbers of its own for every picture of the fit instead of common ones.
+    compares_with
+        The method that this one leaves something out of; empty for methods that stand for themselves.
+    """
+
+    settings: Mapping[str, Any]
+    plan: RecordedPlan = field(default_factory=RecordedPlan)
+    new_seeds: bool = False
+    compares_with: str = ""
+
+
+def _paper(losses: tuple[str, ...], light: str, **more: Any) -> Method:
+    return Method({"preset": "paper", "losses": losses, "range": light, **more})
+
+
+# cheap ones first: a bench that is stopped early has as much as can be had
+OUR_METHODS = {name: Method({"preset": name, "range": "hdr"}) for name in ("fast", "balanced", "best")}
+PAPER_METHODS = {
+    f"{name}-{light}": _paper(losses, light)
+    for name, losses in (("mfo", ("mse", "flip")), ("mse", ("mse",)), ("flip", ("flip",)))
+    for light in ("hdr", "ldr")
+}
+_BALANCED = OUR_METHODS["balanced"].settings
+ABLATIONS = {
+    "balanced-no-scan": Method(_BALANCED, RecordedPlan(scan=False), compares_with="balanced"),
+    "balanced-no-subset": Method(
+        _BALANCED,
+        RecordedPlan(scan_lanes=EVERY_LANE, start_lanes=EVERY_LANE, refine_lanes=EVERY_LANE),
+        compares_with="balanced",
+    ),
+    "mfo-hdr-kept": replace(_paper(("mse", "flip"), "hdr", keep_optimizer_state=True), compares_with="mfo-hdr"),
+    "mfo-ldr-kept": replace(_paper(("mse", "flip"), "ldr", keep_optimizer_state=True), compares_with="mfo-ldr"),
+    "mfo-hdr-new-seeds": replace(_paper(("mse", "flip"), "hdr"), new_seeds=True, compares_with="mfo-hdr"),
+}
+METHODS = {**OUR_METHODS, **PAPER_METHODS, **ABLATIONS}
+DEFAULT_METHODS = (*OUR_METHODS, *PAPER_METHODS)
 
 
 def method_settings(method: str, scenario: Scenario, seed: int) -> FitSettings:
@@ -20,10 +69,12 @@ def method_settings(method: str, scenario: Scenario, seed: int) -> FitSettings:
     What the paper leaves open (Adam's rate, its schedule, the limit of iterations) is the preset's default.
     """
     chosen = {"model": "mitsuba_principled", "parameters": scenario.fitted, "seed": seed, "spp": scenario.fit_spp}
-    if method in OUR_METHODS:
-        return FitSettings(preset=method, range="hdr", **chosen)
-    losses, _, light = method.partition("-")
-    return FitSettings(preset="paper", losses=_PAPER[losses], range=light, **chosen)
+    return FitSettings(**chosen, **METHODS[method].settings)
+
+
+def is_quick(method: str) -> bool:
+    """Whether it takes seconds and not minutes."""
+    return METHODS[method].settings["preset"] != "paper"
 
 
 def warm_up_settings(settings: FitSettings) -> FitSettings:

@@ -11,6 +11,8 @@ from .row import Row
 from .summary import error_of, quantile
 from .svg_axes import COLOURS, SvgAxes, around
 
+_ORDER = tuple(METHODS)
+
 
 def time_to_quality(rows: Sequence[Row], target: float) -> str:
     """An SVG with the share of all scenes of one scenario that end at a mean FLIP of at most `target`, over seconds.
@@ -72,11 +74,10 @@ def pareto(rows: Sequence[Row]) -> str:
 
 
 def _by_method(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
-    names = sorted({row.method for row in rows}, key=lambda name: METHODS.index(name) if name in METHODS else 99)
+    names = sorted({row.method for row in rows}, key=lambda name: _ORDER.index(name) if name in _ORDER else 99)
     return [(name, [row for row in rows if row.method == name]) for name in names]
 
 
 def _colour(method: str) -> str:
     """A method has the same colour in every plot; ours come first."""
-    order = [*reversed(METHODS)]
-    return COLOURS[order.index(method) % len(COLOURS)] if method in order else COLOURS[-1]
+    return COLOURS[_ORDER.index(method) % len(COLOURS)] if method in _ORDER else COLOURS[-1]

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from ..types.errors import MfoError
 from ..types.status import Status
+from .method import is_quick
 from .row import Row, Task
 from .row_file import RowFile
 
@@ -29,12 +30,19 @@ class Runner(Protocol):
 
 
 def all_tasks(scenarios: Iterable[str], methods: Sequence[str], scenes: int) -> list[Task]:
-    """Scene by scene, so that a bench that ends early has about as many scenes everywhere.
+    """Quick methods first, then scene by scene, so that a bench that ends early has as many scenes everywhere.
 
     A scene's methods follow each other: what else the machine does then disturbs them alike.
     """
     names = list(scenarios)
-    return [Task(scenario, scene, method) for scene in range(scenes) for scenario in names for method in methods]
+    rounds = [[m for m in methods if is_quick(m)], [m for m in methods if not is_quick(m)]]
+    return [
+        Task(scenario, scene, method)
+        for chosen in rounds
+        for scene in range(scenes)
+        for scenario in names
+        for method in chosen
+    ]
 
 
 def run_bench(

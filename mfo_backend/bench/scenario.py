@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scenarios: what is unknown, under which light, and how noisy the pictures are.
+"""The scenarios: what is unknown, under which light, how noisy the pictures are, and what the judge looks at.
 
-They follow the paper's, at 32 samples for Transparency. Where it leaves something open, the choice is stated here.
+`base` to `transparency_4spp` follow the paper's. Where it leaves something open, the choice is stated here. The others
+are this project's: they ask what the paper's do not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 _DRAWN = ("base_color", "roughness", "metallic", "specular")  # the paper draws these at random, the others are 0
+_GLASS = ("base_color", "roughness", "eta", "spec_trans")
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,14 @@ class Scenario:
         Samples per pixel of the reference, and of an iteration of the methods that render one each.
     max_depth
         Mitsuba's path length: 2 is direct light, which a point light gives without noise but for the pixel filter.
+    closed_only
+        Whether the object must have an inside.
+    relights
+        Lights no fit has seen, under which the result is judged too.
+    neighbours
+        Other objects around the target, with materials of their own and a floor; they light and hide it.
+    measured
+        The reference shows a material that the fitted model cannot reach exactly.
     """
 
     name: str
@@ -42,25 +52,33 @@ class Scenario:
     drawn: tuple[str, ...] = _DRAWN
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     constant: Mapping[str, float] = field(default_factory=dict)
-    closed_only: bool = False  # whether the object must have an inside
+    closed_only: bool = False
+    relights: int = 1
+    neighbours: int = 0
+    measured: bool = False
 
 
-SCENARIOS = {
-    scenario.name: scenario
-    for scenario in (
-        Scenario("base", "point", "all", reference_spp=4096, fit_spp=16, max_depth=2),
-        Scenario("parameters", "point", "reduced", reference_spp=4096, fit_spp=16, max_depth=2),
-        Scenario("noise", "probe", "all", reference_spp=4, fit_spp=4, max_depth=3),
-        Scenario(
-            "transparency",
-            "probe",
-            ("base_color", "roughness", "eta", "spec_trans"),
-            reference_spp=32,
-            fit_spp=32,
-            max_depth=8,
-            drawn=("base_color", "roughness", "eta", "spec_trans"),
-            ranges={"spec_trans": (0.75, 1.0), "roughness": (0.0, 0.6), "eta": (1.2, 1.8)},
-            closed_only=True,
-        ),
-    )
-}
+_TRANSPARENCY = Scenario(
+    "transparency",
+    "probe",
+    _GLASS,
+    reference_spp=32,
+    fit_spp=32,
+    max_depth=8,
+    drawn=_GLASS,
+    ranges={"spec_trans": (0.75, 1.0), "roughness": (0.0, 0.6), "eta": (1.2, 1.8)},
+    closed_only=True,
+)
+PAPER_SCENARIOS = (
+    Scenario("base", "point", "all", reference_spp=4096, fit_spp=16, max_depth=2),
+    Scenario("noise", "probe", "all", reference_spp=4, fit_spp=4, max_depth=3),
+    Scenario("parameters", "point", "reduced", reference_spp=4096, fit_spp=16, max_depth=2),
+    _TRANSPARENCY,
+    replace(_TRANSPARENCY, name="transparency_4spp", reference_spp=4, fit_spp=4),
+)
+OUR_SCENARIOS = (
+    Scenario("relighting", "probe", "all", reference_spp=64, fit_spp=8, max_depth=3, relights=3),
+    Scenario("objects", "probe", "all", reference_spp=64, fit_spp=8, max_depth=5, neighbours=3),
+    Scenario("measured", "probe", "all", reference_spp=64, fit_spp=8, max_depth=3, measured=True, closed_only=True),
+)
+SCENARIOS = {scenario.name: scenario for scenario in (*PAPER_SCENARIOS, *OUR_SCENARIOS)}

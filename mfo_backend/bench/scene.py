@@ -11,25 +11,38 @@ import numpy as np
 
 from ..material.mitsuba_parameters import MITSUBA_PRINCIPLED
 from ..types.parameter import Value
-from .assets import Assets
+from .assets import Assets, Mesh, Probe
 from .scenario import Scenario
+from .scene_text import on_sphere, point_light, principled, probe_light, scene_text
 
 SHAPE = "target"
-_FIELD_OF_VIEW = 35.0
 _DISTANCE = 3.6  # of the camera from an object of radius 1, which then fills nine tenths of the frame
-_LIGHT_DISTANCE, _INTENSITY = 4.0, 50.0  # about 3 units of irradiance
+_FURTHER = 1.5  # with neighbours in the frame
+_RELIT_TURNS = (70.0, -70.0, 160.0)  # of a point light from the camera, degrees
 
 
 @dataclass(frozen=True)
 class BenchScene:
-    """`file` shows the start's material; `relit` is the same under a light that no fit sees."""
+    """One scene on the disk.
+
+    Attributes
+    ----------
+    file, relit
+        Scenes that show the start's material: under the light of the reference, and under lights that no fit sees.
+    true_files
+        The same scenes with the true material where the fitted model has no values for it, else empty.
+    truth
+        The true values; empty where there are none.
+    """
 
     scenario: Scenario
     number: int
     object: str
     light: str
+    material: str
     file: Path
-    relit: Path
+    relit: tuple[Path, ...]
+    true_files: tuple[Path, ...]
     truth: Mapping[str, Value] = field(repr=False)
     start: Mapping[str, Value] = field(repr=False)
 
@@ -37,28 +50,36 @@ class BenchScene:
 def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, folder: Path) -> BenchScene:
     """Write scene `number` of a scenario, `size` x `size` pixels, into `folder`.
 
-    Object, camera, lights and both materials depend on the scenario's name, the number and the names of the assets
-    that are there, not on the size.
+    Object, camera, lights and materials depend on the scenario's name, the number and the names of the assets that are
+    there, not on the size.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng([number, *scenario.name.encode()])
-    truth, start = _random_material(scenario, rng), _random_material(scenario, rng)
-    name, mesh = assets.place_object(rng, folder, closed_only=scenario.closed_only)
+    truth, start = random_material(scenario, rng), random_material(scenario, rng)
+    target = assets.place_object(rng, folder, "object.ply", closed_only=scenario.closed_only)
     azimuth, elevation = rng.uniform(-60.0, 60.0), rng.uniform(5.0, 35.0)
-    if scenario.light == "point":
-        light, lights = "point", [_point_light(azimuth + turn, rng) for turn in (rng.uniform(-50.0, 50.0), 70.0)]
-    else:
-        light, probe = assets.place_probe(rng, folder, "probe.exr")
-        _, other = assets.place_probe(rng, folder, "relit_probe.exr", other_than=light)
-        lights = [_probe_light(path, rng) for path in (probe, other)]
-    files = folder / "scene.xml", folder / "relit.xml"
-    for file, emitter in zip(files, lights, strict=True):
-        camera = _on_sphere(azimuth, elevation, _DISTANCE)
-        file.write_text(_xml(scenario, start, mesh, camera, emitter, size), "utf-8")
-    return BenchScene(scenario, number, name, light, *files, truth, start)
+    light, emitters = _lights(scenario, azimuth, assets, rng, folder)
+    around = _neighbours(scenario, azimuth, assets, rng, folder)
+    camera = on_sphere(azimuth, elevation, _DISTANCE * (_FURTHER if around else 1.0))
+    name, true_bsdf = ("", "") if not scenario.measured else assets.measured_material(rng)
+
+    def write(file: str, bsdf: str, emitter: str) -> Path:
+        text = scene_text(SHAPE, target.file, bsdf, [*around, emitter], camera, size, scenario.max_depth)
+        (folder / file).write_text(text, "utf-8")
+        return folder / file
+
+    shown = principled("target_bsdf", start, two_sided="spec_trans" not in start)
+    files = [write("scene.xml", shown, emitters[0])]
+    files += [write(f"relit_{n}.xml", shown, emitter) for n, emitter in enumerate(emitters[1:])]
+    true_files = [write(f"true_{n}.xml", true_bsdf, emitter) for n, emitter in enumerate(emitters) if true_bsdf]
+    return BenchScene(
+        scenario, number, target.name, light, name, files[0], tuple(files[1:]), tuple(true_files),
+        {} if scenario.measured else truth, start,
+    )  # fmt: skip
 
 
-def _random_material(scenario: Scenario, rng: np.random.Generator) -> dict[str, Value]:
+def random_material(scenario: Scenario, rng: np.random.Generator) -> dict[str, Value]:
+    """Values of the scenario's drawn parameters, uniform in their ranges, and its constant ones."""
     values: dict[str, Value] = dict(scenario.constant)
     for name in scenario.drawn:
         parameter = MITSUBA_PRINCIPLED[name]
@@ -69,47 +90,41 @@ def _random_material(scenario: Scenario, rng: np.random.Generator) -> dict[str, 
     return values
 
 
-def _on_sphere(azimuth: float, elevation: float, radius: float) -> str:
-    """A point as Mitsuba writes it; angles in degrees, azimuth 0 is +Z, Y is up."""
-    a, e = np.radians([azimuth, elevation])
-    return ", ".join(f"{radius * v:.6f}" for v in (np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)))
+def _lights(
+    scenario: Scenario, azimuth: float, assets: Assets, rng: np.random.Generator, folder: Path
+) -> tuple[str, list[str]]:
+    """Name of the reference's light, and the emitters: that one and those of the judge."""
+    if scenario.light == "point":
+        turns = (rng.uniform(-50.0, 50.0), *_RELIT_TURNS[: scenario.relights])
+        return "point", [point_light(azimuth + turn, rng.uniform(10.0, 60.0)) for turn in turns]
+    probes: list[Probe] = []
+    for index in range(1 + scenario.relights):
+        file = "relit_probe.exr" if index == 1 else f"probe_{index}.exr" if index else "probe.exr"
+        probes.append(assets.place_probe(rng, folder, file, other_than=[probe.name for probe in probes]))
+    return probes[0].name, [probe_light(p.file, rng.uniform(0.0, 360.0), p.scale) for p in probes]
 
 
-def _point_light(azimuth: float, rng: np.random.Generator) -> str:
-    x, y, z = _on_sphere(azimuth, rng.uniform(10.0, 60.0), _LIGHT_DISTANCE).split(", ")
-    return (
-        f'<emitter type="point"><point name="position" x="{x}" y="{y}" z="{z}"/>'
-        f'<rgb name="intensity" value="{_INTENSITY}, {_INTENSITY}, {_INTENSITY}"/></emitter>'
-    )
-
-
-def _probe_light(path: Path, rng: np.random.Generator) -> str:
-    return (
-        f'<emitter type="envmap"><string name="filename" value="{path.as_posix()}"/>'
-        f'<transform name="to_world"><rotate y="1" angle="{rng.uniform(0.0, 360.0):.3f}"/></transform></emitter>'
-    )
-
-
-def _xml(scenario: Scenario, start: Mapping[str, Value], mesh: Path, camera: str, emitter: str, size: int) -> str:
-    values = "".join(
-        f'<rgb name="{name}" value="{", ".join(map(repr, value))}"/>'
-        if isinstance(value, tuple)
-        else f'<float name="{name}" value="{value!r}"/>'
-        for name, value in start.items()
-    )
-    glass = "spec_trans" in start
-    if glass:
-        bsdf = f'<bsdf type="principled" id="target_bsdf">{values}</bsdf>'
-    else:
-        bsdf = f'<bsdf type="twosided" id="target_bsdf"><bsdf type="principled">{values}</bsdf></bsdf>'
-    return f"""<scene version="3.0.0">
-<integrator type="path"><integer name="max_depth" value="{scenario.max_depth}"/></integrator>
-<sensor type="perspective"><float name="fov" value="{_FIELD_OF_VIEW}"/>
-<transform name="to_world"><lookat origin="{camera}" target="0, 0, 0" up="0, 1, 0"/></transform>
-<film type="hdrfilm"><integer name="width" value="{size}"/><integer name="height" value="{size}"/>
-<rfilter type="box"/></film></sensor>
-{bsdf}
-<shape type="ply" id="{SHAPE}"><string name="filename" value="{mesh.as_posix()}"/><ref id="target_bsdf"/></shape>
-{emitter}
-</scene>
-"""
+def _neighbours(
+    scenario: Scenario, azimuth: float, assets: Assets, rng: np.random.Generator, folder: Path
+) -> list[str]:
+    """A floor and objects of random materials beside and behind the target, none before the camera."""
+    parts: list[str] = []
+    for index in range(scenario.neighbours):
+        mesh: Mesh = assets.place_object(rng, folder, f"neighbour_{index}.ply", closed_only=False)
+        turn = azimuth + (90.0, -90.0, 180.0)[index % 3] + rng.uniform(-25.0, 25.0)
+        scale, distance = rng.uniform(0.5, 0.8), rng.uniform(1.5, 1.9)
+        a = np.radians(turn)
+        x, z = distance * np.sin(a), distance * np.cos(a)
+        values = random_material(scenario, rng)
+        parts.append(
+            f'<shape type="ply"><string name="filename" value="{mesh.file.as_posix()}"/>'
+            f'<transform name="to_world"><scale value="{scale:.6f}"/>'
+            f'<translate x="{x:.6f}" y="{scale - 1.0:.6f}" z="{z:.6f}"/></transform>'
+            f"{principled(f'neighbour_{index}_bsdf', values, two_sided=True)}</shape>"
+        )
+    if parts:
+        parts.append(
+            '<shape type="rectangle"><transform name="to_world"><scale value="6"/><rotate x="1" angle="-90"/>'
+            '<translate y="-1"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="0.4"/></bsdf></shape>'
+        )
+    return parts

@@ -55,7 +55,7 @@ def comparable(rows: Iterable[Row]) -> Comparable:
         methods.setdefault(row.scenario, set()).add(row.method)
         present.setdefault((row.scenario, row.scene), set()).add(row.method)
     kept = [row for row in rows if present[row.scenario, row.scene] == methods[row.scenario]]
-    kept.sort(key=lambda row: (_place(row.scenario, tuple(SCENARIOS)), row.scene, _place(row.method, METHODS)))
+    kept.sort(key=lambda row: (_place(row.scenario, tuple(SCENARIOS)), row.scene, _place(row.method, tuple(METHODS))))
     return Comparable(tuple(kept), len(rows) - len(kept))
 
 
@@ -64,7 +64,7 @@ def summaries(rows: Iterable[Row]) -> list[Summary]:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.scenario, row.method), []).append(row)
-    order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], METHODS)))
+    order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], tuple(METHODS))))
     return [_summary(scenario, method, groups[scenario, method]) for scenario, method in order]
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from ..bench.assets import Assets
-from ..bench.method import METHODS
+from ..bench.method import DEFAULT_METHODS, METHODS
 from ..bench.report import write_report
 from ..bench.row import Row
 from ..bench.row_file import RowFile, keep_setup
@@ -28,7 +28,9 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
         description="Fit random scenes with several methods. An interrupted bench goes on where it stopped.",
     )
     parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="again for more (default: all)")
-    parser.add_argument("--method", action="append", choices=METHODS, help="again for more (default: all)")
+    parser.add_argument(
+        "--method", action="append", choices=tuple(METHODS), help="again for more (default: all but the ablations)"
+    )
     parser.add_argument("--scenes", type=_positive, default=20, metavar="N", help="scenes of each scenario (20)")
     parser.add_argument("--size", type=_positive, default=128, metavar="PIXELS", help="width and height (128)")
     parser.add_argument("--out", type=Path, default=Path("mfo-bench"), metavar="DIR", help="folder (mfo-bench)")
@@ -56,7 +58,7 @@ def work(arguments: argparse.Namespace, runner: Runner, machine: dict) -> int:
     from tqdm import tqdm
 
     file = RowFile(arguments.out)
-    tasks = all_tasks(arguments.scenario or SCENARIOS, arguments.method or METHODS, arguments.scenes)
+    tasks = all_tasks(arguments.scenario or SCENARIOS, arguments.method or DEFAULT_METHODS, arguments.scenes)
     done = {row.key for row in file.read()}
     left = sum(task.key not in done for task in tasks)
     print(f"{left} of {len(tasks)} rows to measure, in {file.path}", file=sys.stderr)
@@ -93,7 +95,7 @@ def run_report(arguments: argparse.Namespace) -> int:
 
 
 def _setup(arguments: argparse.Namespace, assets: Assets) -> dict:
-    return {"size": arguments.size, "objects": list(assets.objects), "probes": list(assets.probes)}
+    return {"size": arguments.size, **assets.manifest()}
 
 
 def _line(row: Row) -> str:

@@ -7,13 +7,9 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..metrics.baked_view import HALF_LEVEL, BakedView
-from ..metrics.itp import Itp
 from ..metrics.pixel_check import check_finite
-from ..metrics.pu21 import Pu21
-from ..metrics.response import OnDisplay, Response, displayed_by, nits_per_unit
 from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..types.event import Listener, Preview, Started
@@ -22,6 +18,7 @@ from ..types.result import FitResult
 from ..types.status import Status
 from .course import Course
 from .displayed_residual import DisplayedResidual
+from .finishing import finishing_residuals
 from .fit_material import FitOutcome
 from .kept_values import box_holding, keep_values
 from .perceptual_stages import perceptual_ends
@@ -53,7 +50,8 @@ def fit_recorded(
 
     Parameters and errors are those of `fit_material`. The result is the best of the scene's own values and the end of
     every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the least-squares
-    residual of tiles for `fast` and where the picture's noise is reached, else by FLIP (`fit.picture_judge`).
+    residual of tiles for `fast` and where the picture's noise is reached, by the last of the losses where the settings
+    name them, else by FLIP (`fit.picture_judge`).
 
     Raises
     ------
@@ -74,10 +72,12 @@ def fit_recorded(
         if reference.encoding is Encoding.SRGB
         else DisplayView.for_scene(reference.pixels, mask)
     )
+    named = None if settings.losses is None else settings.stage_names(reference.encoding)
+    measure = named[-1] if named else "flip-ldr" if ldr else "flip-hdr"
     light = _linear(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))
-    perceptual = {} if settings.preset == "fast" else _perceptual(ldr, light, mask, view)
-    names = (*STAGES, *perceptual, *(["flip"] if settings.preset == "best" else []))
+    finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
+    names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
     fit = RecordedFit(scene, light, mask, plan, settings.seed, course, _clipped(reference, view))
@@ -99,19 +99,18 @@ def fit_recorded(
         notes += kept.notes
         noise = fit.noise.level if fit.noise else 0.0
         at_noise = weighted and np.sqrt(2.0 * solution.equations.cost) < AT_NOISE
-        if at_noise and perceptual:
+        if at_noise and finishing and settings.losses is None:
             notes.append(
                 f"The fit has reached the picture's own noise ({100 * noise:.0f} % a pixel): "
                 "perceptual stages would fit the noise and were left out."
             )
-        elif perceptual:
+        elif finishing:
             linear = reference.encoding is Encoding.LINEAR
-            blurred = linear and (scene.needs.sampled or noise > NOISY)
-            judge = PictureJudge(reference, light, mask, settings, view, ldr=ldr, blurred=blurred)
+            blurred = linear and settings.losses is None and (scene.needs.sampled or noise > NOISY)
+            judge = PictureJudge(measure, reference, light, mask, settings, view, blurred=blurred)
             counts = judge.value
-            flip = settings.preset == "best"
-            others = [basin.x for basin in basins[1:]] if flip else []
-            ends += perceptual_ends(fit, last, kept.x, others, perceptual, judge, flip=flip, notes=notes)
+            others = [basin.x for basin in basins[1:]] if settings.preset == "best" else []
+            ends += perceptual_ends(fit, last, kept.x, others, finishing, judge, settings, notes)
         if fit.recordings > 1:
             notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
         if counts is None:
@@ -121,7 +120,7 @@ def fit_recorded(
     spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
     pictures = [Candidate(end.x, renderer.image(end.x, seed=seed, spp=spp)) for end in ends]
     listener(Preview(pictures[-1].image))
-    counts = counts or PictureJudge(reference, light, mask, settings, view, ldr=ldr, blurred=False).value
+    counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     message = status.sentence
@@ -178,14 +177,6 @@ def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:
     assert isinstance(view, DisplayView)
     limit = 2.0**-view.exposure_ev
     return lambda target: CensoredResidual(make(target), target, limit)
-
-
-def _perceptual(ldr: bool, light: Pixels, mask: NDArray[np.bool_], view: View) -> dict[str, Response]:
-    """The responses of the perceptual stages by name."""
-    if ldr:
-        return {"display": displayed_by(view), "itp": OnDisplay(view, Itp(100.0))}
-    nits = nits_per_unit(light, mask)
-    return {"itp": Itp(nits), "pu21": Pu21(nits)}
 
 
 def _weighted(reference: Image, view: View) -> MakeWeighted | None:

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..metrics.response import Response
 from .picture_judge import PictureJudge
-from .recorded_stages import End, Problem, RecordedFit, Vector
-from .residuals import ResponseResidual
+from .recorded_stages import End, MakeResidual, Problem, RecordedFit, Vector
+from .settings import FitSettings
 
 BASIN = 0.1  # of the box: solutions nearer than this in every value are one
 FLIP_STARTS = 2
@@ -22,23 +21,27 @@ def perceptual_ends(
     problem: Problem,
     start: Vector,
     basins: Sequence[Vector],
-    responses: Mapping[str, Response],
+    residuals: Mapping[str, MakeResidual],
     judge: PictureJudge,
-    *,
-    flip: bool,
+    settings: FitSettings,
     notes: list[str],
 ) -> list[End]:
-    """The best ends of the perceptual stages from `start` and other `basins`, by the judge on recorded pictures."""
+    """The best ends of the perceptual stages from `start` and other `basins`, by the judge on recorded pictures.
+
+    Losses that the settings name are a ladder, each from the end of the one before; a preset's own are alternatives.
+    """
+    flip = settings.preset == "best"
     starts = [start]
     for basin in basins:
         starts.append(fit.solve_within(problem, np.clip(basin, *fit.box), *fit.box))
     ends = [End("refine", x) for x in starts[1:]]
-    for name, response in responses.items():
-        polished = fit.polish(name, problem.groups, lambda target, r=response: ResponseResidual(r, target), starts)
+    for name, make in residuals.items():
+        polished = fit.polish(name, problem.groups, make, starts)
         if polished is None:
             notes.append(f"The stage {name!r} met numbers that are not finite and was left out.")
         else:
             ends += [End(name, x) for x in polished]
+            starts = starts if settings.losses is None else polished
     if not fit.complete:
         if flip:
             notes.append("The picture is too large to be recorded whole: the stage 'flip' was left out.")
@@ -50,4 +53,6 @@ def perceptual_ends(
             if all(np.max(np.abs(x - other) / width) > BASIN for other in nearest):
                 nearest.append(x)
         ends += [End("flip", x) for x in fit.lower_flip(judge, nearest[:FLIP_STARTS])]
+    if len(ends) <= FINALISTS:
+        return ends
     return sorted(ends, key=lambda end: judge.value(fit.picture(end.x)))[:FINALISTS]

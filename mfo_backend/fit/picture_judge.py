@@ -17,7 +17,7 @@ NOISY = 0.02  # noise of a pixel relative to its radiance that FLIP sees
 
 
 class PictureJudge:
-    """FLIP or HDR-FLIP of linear pictures against a reference.
+    """The loss `name`, such as ``flip-hdr``, of linear pictures against a reference.
 
     With `blurred`, picture and reference are blurred inside the mask first: the FLIP of independent noise is a large
     number that says nothing of the material, and being no square it shifts the best values, too.
@@ -25,13 +25,13 @@ class PictureJudge:
 
     def __init__(
         self,
+        name: str,
         reference: Image,
         background: Pixels,
         mask: NDArray[np.bool_],
         settings: FitSettings,
         view: View,
         *,
-        ldr: bool,
         blurred: bool,
     ) -> None:
         self._blur = _MaskedBlur(mask) if blurred else None
@@ -40,9 +40,7 @@ class PictureJudge:
             assert reference.encoding is Encoding.LINEAR
             pixels = self._blur(np.maximum(reference.pixels, 0.0)).astype(np.float32)
             reference = Image(pixels, Encoding.LINEAR)
-        self._loss: Loss = stage_losses(
-            ["flip-ldr" if ldr else "flip-hdr"], reference, background, mask, settings, view
-        )[0]
+        self._loss: Loss = stage_losses([name], reference, background, mask, settings, view)[0]
 
     def value(self, image: Pixels) -> float:
         """The mean error of a linear picture."""

@@ -40,6 +40,8 @@ class RecordedPlan:
 
     Attributes
     ----------
+    scan
+        Whether to look for starts; without it only the scene's own material and a random one are tried.
     grid_first, grid_last
         Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
     scan_lanes, start_lanes
@@ -56,6 +58,7 @@ class RecordedPlan:
         Solutions the preset `best` keeps alive to the end, and how much more than the best one they may cost.
     """
 
+    scan: bool = True
     grid_first: int = 4
     grid_last: int = 8
     scan_lanes: int = 20_000
@@ -150,8 +153,10 @@ class RecordedFit:
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
             groups = all_groups(self.paths, tiles=sampled)
             few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make)
-            nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
-            stage.vector = nodes[0].x
+            nodes = []
+            if plan.scan:
+                nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
+                stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
             more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make)
             watched = self.course.watch(stage, more.equations)

@@ -38,6 +38,7 @@ def recover_material(
             )
         except UnrecordableError as error:
             reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
+    settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
     notes = (*outcome.result.notes, *([reason] if reason else []))
     return replace(outcome, result=replace(outcome.result, notes=notes))

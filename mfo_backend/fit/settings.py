@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from ..metrics.loss_names import SQUARED_KINDS, check_loss_name, is_squared, loss_in_range
 from ..solve.stopping import StoppingRules
 from ..types.errors import BadInputError
 from ..types.image import Encoding
@@ -17,6 +18,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "schedule": ("decay", "constant"),
     "region": ("target", "image"),
 }
+PAPER_LOSSES = ("mse", "flip")
 _POSITIVE = ("max_iterations", "spp", "verify_spp", "patience")
 
 
@@ -29,12 +31,15 @@ class FitSettings:
     preset
         ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
         ``"balanced"``: perceptual least squares from there; ``"best"``: then FLIP itself, from several solutions. They
-        use only `range`, `seed`, `verify_spp` and `region`.
+        use only `losses`, `range`, `seed`, `verify_spp` and `region`.
     model, parameters
         Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
         holds Blender's socket values, else Mitsuba's.
     losses
-        Stages in order, ``"mse"`` or ``"flip"``. The paper's method is the pair; one alone is its comparison.
+        Stages in order by `metrics.loss_names`, each from the result of the one before: any one, two (the paper's
+        method is MSE, then FLIP) or more. A name ending in ``-ldr`` or ``-hdr`` does not follow `range`. The last one
+        judges the result. ``None``: those of the preset. With ``"fast"`` and ``"balanced"`` they are the stages after
+        `refine` and must be sums of squares.
     range
         ``"hdr"`` or ``"ldr"`` losses; ``"auto"`` takes HDR for a linear reference.
     seed, spp
@@ -58,7 +63,7 @@ class FitSettings:
     model: str = "auto"
     preset: str = "balanced"
     parameters: str | tuple[str, ...] = "all"
-    losses: tuple[str, ...] = ("mse", "flip")
+    losses: tuple[str, ...] | None = None
     range: str = "auto"
     seed: int = 0
     max_iterations: int = 300
@@ -89,12 +94,23 @@ class FitSettings:
             )
         if not isinstance(self.model, str):
             raise BadInputError(f"Fit setting 'model' is {self.model!r}: give the name of a material model.")
-        if not self.losses or any(loss not in ("mse", "flip") for loss in self.losses):
-            raise BadInputError(f"Fit setting 'losses' is {list(self.losses)!r}: give 'mse', 'flip' or both in order.")
+        if self.losses is not None:
+            self._check_losses(self.losses)
+
+    def _check_losses(self, losses: tuple[str, ...]) -> None:
+        if not losses:
+            raise BadInputError("Fit setting 'losses' is []: give at least one loss, or leave the setting out.")
+        for name in losses:
+            check_loss_name(name)
+            if self.preset != "paper" and not is_squared(name):
+                raise BadInputError(
+                    f"Preset {self.preset!r} minimises sums of squares, which {name!r} is not: "
+                    f"give losses of {', '.join(SQUARED_KINDS)}, or the preset 'paper'."
+                )
 
     @classmethod
     def from_request(cls, request: Mapping[str, Any]) -> FitSettings:
-        """Settings from JSON values; what is missing takes its default.
+        """Settings from JSON values; what is missing takes its default, and losses without a preset mean ``paper``.
 
         Raises
         ------
@@ -107,10 +123,12 @@ class FitSettings:
             raise BadInputError(f"Unknown fit setting {', '.join(map(repr, unknown))}: known are {', '.join(known)}.")
         values = dict(request)
         for name in ("parameters", "losses"):
-            if name in values and not isinstance(values[name], str):
+            if values.get(name) is not None and not isinstance(values[name], str):
                 values[name] = _names(name, values[name])
         if isinstance(values.get("losses"), str):
             values["losses"] = (values["losses"],)
+        if values.get("losses") is not None:
+            values.setdefault("preset", "paper")
         return cls(**values)
 
     @property
@@ -118,8 +136,8 @@ class FitSettings:
         """The stopping rules of every stage."""
         return StoppingRules(patience=self.patience, max_iterations=self.max_iterations)
 
-    def stage_names(self, encoding: Encoding) -> tuple[str, ...]:
-        """Names of the stages' losses, such as ``mse-hdr``, for a reference of this encoding.
+    def loss_range(self, encoding: Encoding) -> str:
+        """``"hdr"`` or ``"ldr"`` for a reference of this encoding.
 
         Raises
         ------
@@ -131,10 +149,29 @@ class FitSettings:
                 "Fit setting 'range' is 'hdr' but the reference is a display picture: "
                 "use 'ldr' or give a linear reference such as OpenEXR."
             )
-        chosen = self.range
-        if chosen == "auto":
-            chosen = "hdr" if encoding is Encoding.LINEAR else "ldr"
-        return tuple(f"{loss}-{chosen}" for loss in self.losses)
+        if self.range == "auto":
+            return "hdr" if encoding is Encoding.LINEAR else "ldr"
+        return self.range
+
+    def stage_names(self, encoding: Encoding) -> tuple[str, ...]:
+        """Full names of the losses, such as ``mse-hdr``, for a reference of this encoding; by default the paper's.
+
+        Raises
+        ------
+        BadInputError
+            If a loss is not defined for the reference.
+        """
+        chosen = self.loss_range(encoding)
+        names = tuple(loss_in_range(name, chosen) for name in self.losses or PAPER_LOSSES)
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise BadInputError(f"Fit setting 'losses' names {name} twice: a stage needs a loss of its own.")
+            if name.endswith("-hdr") and encoding is Encoding.SRGB:
+                raise BadInputError(
+                    f"Loss {name!r} needs scene-linear values but the reference is a display picture: "
+                    f"use a loss that ends in -ldr or give a linear reference such as OpenEXR."
+                )
+        return names
 
 
 def _names(key: str, value: Any) -> tuple[str, ...]:

@@ -12,6 +12,8 @@ from pathlib import Path, PurePosixPath
 
 from ..types.errors import BadInputError
 
+PICTURES = ("reference.png", "start.png", "result.png", "difference.png", "result.exr", "current.png")
+
 
 @dataclass(frozen=True)
 class JobFolder:
@@ -82,9 +84,13 @@ class JobFolder:
         if ".." in parts or not parts:
             raise BadInputError(f"{what} is {relative!r}, which leaves the job folder: put the file inside it.")
         path = self.root.joinpath(*parts)
-        if not path.resolve().is_relative_to(self.root):
+        try:
+            inside, there = path.resolve().is_relative_to(self.root), path.is_file()
+        except (OSError, RuntimeError, ValueError):  # too long, links in a circle, or not encodable
+            inside, there = True, False
+        if not inside:
             raise BadInputError(f"{what} is {relative!r}, a link out of the job folder: put the file itself inside it.")
-        if not path.is_file():
+        if not there:
             raise BadInputError(f"{what} is {relative!r}, which is not in the job folder {self.root}: put it there.")
         return path
 
@@ -106,6 +112,28 @@ class JobFolder:
                 f"The disk of the job folder {self.root} has {free / 1e6:.1f} MB left and the results need "
                 f"{needed_bytes / 1e6:.1f} MB: free some space or choose another folder."
             )
+
+
+def clear_outputs(folder: JobFolder) -> None:
+    """Remove what an earlier run left and make the folder of pictures.
+
+    Links go too: a stranger's folder may hold ``progress.jsonl`` as a link to a file of the user.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    for path in (folder.result, folder.progress, folder.report):
+        path.unlink(missing_ok=True)
+    if folder.pictures.is_symlink():
+        folder.pictures.unlink()
+    folder.pictures.mkdir(exist_ok=True)
+    for path in folder.pictures.iterdir():
+        if path.name in PICTURES or path.name.endswith(".tmp"):
+            path.unlink()
+    for path in folder.root.glob(".*.tmp"):  # left by a process that was killed while it wrote
+        path.unlink()
 
 
 def unwritable(folder: Path, error: OSError) -> BadInputError:

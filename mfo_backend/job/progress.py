@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sys
@@ -16,7 +17,7 @@ from ..types.event import Event, Preview, Started
 from ..types.image import Pixels
 from ..types.status import Status
 from .atomic_file import write_atomically
-from .job_folder import JobFolder
+from .job_folder import JobFolder, clear_outputs
 from .progress_bar import ProgressBar
 
 PREVIEW_PATH = "pictures/current.png"
@@ -77,8 +78,7 @@ class EventWriter:
         """Clear what an earlier run left in the folder and open progress.jsonl."""
         if self._folder is None or self._file is not None:
             return
-        self._folder.result.unlink(missing_ok=True)
-        self._folder.pictures.mkdir(exist_ok=True)
+        clear_outputs(self._folder)
         self._file = open(self._folder.progress, "w", encoding="utf-8", newline="\n", buffering=1)  # noqa: SIM115
 
     def _end(self, message: dict[str, Any]) -> None:
@@ -108,6 +108,8 @@ class EventWriter:
                     self._file.flush()
                 except OSError as error:  # a full disk: the result itself will say so if it does not fit either
                     print(f"mfo: progress.jsonl cannot be written: {error.strerror}", file=sys.stderr)
+                    with contextlib.suppress(OSError):  # it tries once more
+                        self._file.close()
                     self._file = None
 
     def _write_preview(self, image: Pixels) -> bool:

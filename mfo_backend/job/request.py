@@ -139,7 +139,7 @@ def request_from_json(data: Any) -> Request:
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
-        generator=dict(top.mapping("generator", {})),
+        generator=_generator(top.mapping("generator", {})),
     )
 
 
@@ -172,6 +172,13 @@ def request_to_json(request: Request) -> dict[str, Any]:
     }
 
 
+def _generator(data: Mapping[str, Any]) -> dict[str, Any]:
+    version = data.get("blender", [5, 0])
+    if not isinstance(version, (list, tuple)) or not all(type(part) is int and 0 <= part < 1000 for part in version):
+        raise BadInputError(f"{WHERE}: generator.blender is {shown(version)}: it must be a version like [5, 0, 1].")
+    return dict(data)
+
+
 def _target(data: Any) -> Target:
     target = CheckedObject(data, f"{WHERE}: target", ("shape_id", "bsdf_id", "object", "material", "slot"))
     return Target(
@@ -191,8 +198,8 @@ def _material(bsdf_id: str, data: Any) -> Material:
         socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture"))
         value = socket.raw("value", None)
         numbers = value if isinstance(value, list) else [value]
-        if not (value is None or isinstance(value, bool) or (numbers and all(map(is_number, numbers)))):
-            raise socket.wrong("value", "a number, a list of numbers, true, false or null")
+        if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
+            raise socket.wrong("value", "a number, a list of one to four, true, false or null")
         texture = socket.text("texture") if socket.raw("texture", None) is not None else None
         sockets[name] = Socket(value, socket.boolean("linked", False), texture)
     return Material(

@@ -82,7 +82,8 @@ def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[st
     BadInputError
         If it cannot be read, has another size than the scene, is all black or holds NaN or infinite pixels.
     """
-    image = read_image(folder.file(request.reference, what="request.json: reference.path"))
+    path = folder.file(request.reference, what="request.json: reference.path")
+    image = read_image(path, (request.width, request.height))
     return check_reference(Image(image.pixels, request.encoding, image.alpha), request.width, request.height)
 
 

@@ -7,7 +7,8 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..scene.scene_xml import Element, read_scene, to_text
+from ..scene.ply_file import check_ply
+from ..scene.scene_xml import Element, is_file, read_scene, to_text
 from ..types.errors import BadInputError
 from .job_folder import JobFolder
 
@@ -15,24 +16,26 @@ _MESHES = (".ply", ".obj", ".serialized")
 
 
 def check_scene_files(folder: JobFolder, scene: str) -> None:
-    """Check that a job's scene names existing files of the job folder only.
+    """Check that a job's scene names existing files of the job folder only, and that its meshes hold what they say.
 
     Raises
     ------
     BadInputError
-        If the scene cannot be read, or names a file that is missing or outside.
+        If the scene cannot be read, names a file that is missing or outside, or a PLY file is damaged.
     """
     path = folder.root / scene
     for element, key in _named_files(read_scene(path), scene):
         # the reader has made names of existing files absolute, links resolved
-        file = (path.parent / element.get(key, "")).resolve()
+        file = _resolved(path.parent / element.get(key, ""))
         if not file.is_relative_to(folder.root):
             raise BadInputError(
                 f"{scene} names the file {element.get(key)!r} outside the job folder: put it inside and name it "
                 "relative to the scene."
             )
-        if not file.is_file():
+        if not is_file(file):
             raise BadInputError(f"{scene} names the file {element.get(key)!r}, which is not there: put it there.")
+        if file.suffix.lower() == ".ply":
+            check_ply(file)
 
 
 def pack_scene(source: Path, destination: Path) -> Element:
@@ -48,8 +51,8 @@ def pack_scene(source: Path, destination: Path) -> Element:
     scene = read_scene(source)
     copied: dict[Path, str] = {}
     for element, key in _named_files(scene, source.name):
-        file = (source.parent / element.get(key, "")).resolve()
-        if not file.is_file():
+        file = _resolved(source.parent / element.get(key, ""))
+        if not is_file(file):
             raise BadInputError(f"{source.name} names the file {element.get(key)!r}, which is not there: put it there.")
         if file not in copied:
             folder = "meshes" if file.suffix.lower() in _MESHES else "textures"
@@ -93,3 +96,11 @@ def _named_files(scene: Element, name: str) -> Iterator[tuple[Element, str]]:
             yield element, "value"
         elif element.tag == "spectrum" and element.get("filename"):
             yield element, "filename"
+
+
+def _resolved(path: Path) -> Path:
+    """The path with links followed, or as it is where they form a circle."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError, ValueError):  # a circle is a RuntimeError until Python 3.12
+        return path

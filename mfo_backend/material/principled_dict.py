@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from ..types.errors import BadInputError
+from ..types.parameter import Value
 from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 
 # Sockets without effect here: normals and tangents are the mesh's, subsurface is replaced by a diffuse lobe
@@ -53,14 +54,28 @@ def blender_principled_dict(
         if content.get("texture"):
             result[item.name] = {"type": "bitmap", "filename": str(content["texture"]), "raw": True}
             continue
-        value = content["value"]
-        components = tuple(float(v) for v in value) if isinstance(value, Sequence) else (float(value),)
-        if len(components) != item.size:
-            raise BadInputError(
-                f"Socket {socket!r} has {len(components)} components, allowed are {item.size}: give "
-                f"{'linear red, green and blue' if item.size == 3 else 'one number'}."
-            )
+        value = socket_value(socket, content.get("value"))
+        components = value if isinstance(value, tuple) else (value,)
         default = item.default if isinstance(item.default, tuple) else (item.default,)
         if components != default or item.name in free:
             result[item.name] = {"type": "rgb", "value": list(components)} if item.size == 3 else components[0]
     return result
+
+
+def socket_value(socket: str, value: Any) -> Value:
+    """The value of a known socket as its parameter holds it.
+
+    Raises
+    ------
+    BadInputError
+        If it is missing or has the wrong number of components.
+    """
+    item = BLENDER_PRINCIPLED[PARAMETER_OF_SOCKET[socket]]
+    given = () if value is None else value if isinstance(value, Sequence) else (value,)
+    components = tuple(float(v) for v in given)
+    if len(components) != item.size:
+        raise BadInputError(
+            f"Socket {socket!r} has {len(components)} components, allowed are {item.size}: give "
+            f"{'linear red, green and blue' if item.size == 3 else 'one number'}."
+        )
+    return components if item.size == 3 else components[0]

@@ -14,17 +14,16 @@ from .colour import linear_from_srgb, srgb_from_linear
 from .exposure_range import lit_exposures
 from .flip_loss import FlipLoss, HdrFlipLoss
 from .itp import Itp
-from .optional_losses import OPTIONAL_HDR_LOSSES, OPTIONAL_LDR_LOSSES, hdr_perceptual_loss, ldr_perceptual_loss
+from .loss_names import LOSS_NAMES, OPTIONAL_HDR_LOSSES, OPTIONAL_LDR_LOSSES, OPTIONAL_LOSS_NAMES
+from .optional_losses import hdr_perceptual_loss, ldr_perceptual_loss
 from .pixel_check import check_finite, check_mask
 from .pu21 import Pu21
 from .response import OnDisplay, Response, Scaled, displayed_by, logarithmic_for, nits_per_unit, relative_to
 from .squared_loss import SquaredLoss
 from .tone_mapping import DisplayView, View
 
-LDR_LOSSES = ("mse-ldr", "pu21-ldr", "itp-ldr", "flip-ldr")
-HDR_LOSSES = ("mse-hdr", "log-hdr", "relative-hdr", "pu21-hdr", "itp-hdr", "flip-hdr")
-LOSS_NAMES = LDR_LOSSES + HDR_LOSSES
-OPTIONAL_LOSS_NAMES = OPTIONAL_LDR_LOSSES + OPTIONAL_HDR_LOSSES  # need PyTorch, and packages or weights of the user
+__all__ = ["DISPLAY_NITS", "LOSS_NAMES", "OPTIONAL_LOSS_NAMES", "Loss", "ResidualLoss", "make_loss"]
+
 DISPLAY_NITS = 100.0  # white of a display in cd/m^2 (IEC 61966-2-1 has 80, a usual monitor is set brighter)
 
 

@@ -15,10 +15,6 @@ from .tone_mapping import View
 
 Array = NDArray[np.floating]
 
-KINDS = ("cvvdp", "lpips_alex", "lpips_vgg", "lpips_squeeze")
-OPTIONAL_LDR_LOSSES = tuple(f"{kind}-ldr" for kind in KINDS)
-OPTIONAL_HDR_LOSSES = tuple(f"{kind}-hdr" for kind in KINDS)
-
 
 def hdr_perceptual_loss(name: str, target: Array, nits: float) -> PerceptualLoss:
     """A judge's distance to scene-linear `target`, with `nits` cd/m^2 for a radiance of 1.

@@ -10,7 +10,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..material.blender_selection import select_blender_parameters
-from ..material.principled_dict import blender_principled_dict
+from ..material.principled_dict import blender_principled_dict, socket_value
 from ..material.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ..scene.scene_xml import Element, Target
 from ..types.errors import BadInputError
@@ -70,8 +70,7 @@ def _constants(sockets: Mapping[str, Mapping[str, Any]]) -> dict[str, Value]:
     values: dict[str, Value] = {}
     for socket, content in sockets.items():
         if socket in SOCKETS and content.get("value") is not None:
-            value = content["value"]
-            values[PARAMETER_OF_SOCKET[socket]] = tuple(value) if isinstance(value, Sequence) else float(value)
+            values[PARAMETER_OF_SOCKET[socket]] = socket_value(socket, content["value"])
     return values
 
 

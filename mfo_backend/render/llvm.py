@@ -185,6 +185,7 @@ def _probe_in_child(path: Path, timeout: float) -> LlvmVerdict | None:
             child = subprocess.run(
                 [sys.executable, "-m", f"{__package__}.llvm_probe"],
                 env=environment,
+                cwd=package_root,  # Mitsuba takes plugins from the working folder first
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 text=True,

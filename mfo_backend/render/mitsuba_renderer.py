@@ -15,6 +15,7 @@ from ..scene.scene_xml import find_target, prepare_for_fit, read_scene, to_text
 from ..types.errors import BadInputError
 from ..types.image import Pixels
 from .material_model import material_model
+from .plugins import check_plugins
 from .prepared_material import Materials, PreparedMaterial
 from .renderer import Pullback, Vector
 from .variant import load_variant
@@ -128,6 +129,7 @@ def load_mitsuba_renderer(
     if model == "auto":
         model = "blender_principled" if target.bsdf_id in materials else "mitsuba_principled"
     prepare = material_model(model)
+    check_plugins(document, scene_xml.name)
     prepare_for_fit(document)
     material = prepare(document, target, parameters, materials)
     load_variant()
@@ -140,7 +142,7 @@ def load_mitsuba_renderer(
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
             scene = mi.load_string(to_text(document), optimize=False, parallel=False)
-        except RuntimeError as error:
+        except (RuntimeError, UnicodeDecodeError) as error:  # a message may hold bytes of a damaged file
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 
 from ..types.errors import SetupError
+from .plugins import trust_only_mitsuba
 
 CANDIDATES = ("llvm_ad_rgb", "metal_ad_rgb") if sys.platform != "darwin" else ("metal_ad_rgb", "llvm_ad_rgb")
 
@@ -27,6 +28,7 @@ def load_variant(name: str | None = None) -> str:
         raise SetupError(
             f"Mitsuba cannot be imported ({error}): install mitsuba 3.9.1, then run `mfo doctor`."
         ) from None
+    trust_only_mitsuba()
     current = mi.variant()
     if current is not None and "_ad_rgb" in current and name in (None, current):
         return current
@@ -42,3 +44,10 @@ def load_variant(name: str | None = None) -> str:
         else:
             return candidate
     raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")
+
+
+def use_threads(count: int) -> None:
+    """Limit the threads of this process' kernels, for several processes on one machine; choose the variant before."""
+    import drjit as dr
+
+    dr.set_thread_count(count)

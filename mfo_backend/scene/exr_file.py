@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
+from .picture_size import Size, check_declared_size
 
-MAX_PIXELS = 2**28  # a header may declare any size; this one (16384 x 16384) takes 3 GiB of float32
+MAX_SAMPLES = 2**30  # of all channels and parts, which the package reads together; ZIP makes a thousandth of zeros
 _COLOUR = ("R", "G", "B")
 
 
-def read_exr(path: Path) -> Image:
+def read_exr(path: Path, size: Size | None = None) -> Image:
     """The scene-linear picture in an EXR file.
 
     Of several layers or parts the plain channels R, G, B win, then those of a layer named Combined (Blender's main
@@ -34,14 +36,21 @@ def read_exr(path: Path) -> Image:
     try:
         header = OpenEXR.File(str(path), separate_channels=True, header_only=True)
         headers = [part.header for part in header.parts]
+        names = [[channel.name for channel in part["channels"]] for part in headers]
     except Exception as error:  # the package raises RuntimeError, ValueError and its own type
         raise _damaged(path) from error
     if not headers:
         raise _damaged(path)
     for part in headers:
         _check_size(path, part)
-    names = [[channel.name for channel in part["channels"]] for part in headers]
+    samples = sum(math.prod(_size(part, "dataWindow")) * len(part["channels"]) for part in headers)
+    if samples > MAX_SAMPLES:
+        raise BadInputError(
+            f"Image {path.name!r} declares {samples} samples in all its layers: at most {MAX_SAMPLES} are read, so "
+            "export fewer layers."
+        )
     index, colour, alpha = _choose(path, names)
+    check_declared_size(path.name, _size(headers[index], "displayWindow"), size)
     _check_channels(path, headers[index], [*colour, *([alpha] if alpha else [])])
     try:
         # the package prints what is wrong with a damaged file on stdout, which belongs to our caller
@@ -76,14 +85,14 @@ def _window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
     return int(left), int(top), int(right) + 1, int(bottom) + 1
 
 
+def _size(header: dict[str, Any], name: str) -> Size:
+    left, top, right, bottom = _window(header, name)
+    return right - left, bottom - top
+
+
 def _check_size(path: Path, header: dict[str, Any]) -> None:
     for name in ("dataWindow", "displayWindow"):
-        left, top, right, bottom = _window(header, name)
-        width, height = right - left, bottom - top
-        if width < 1 or height < 1 or width * height > MAX_PIXELS:
-            raise BadInputError(
-                f"Image {path.name!r} declares a size of {width}x{height}: between 1 and {MAX_PIXELS} pixels are read."
-            )
+        check_declared_size(path.name, _size(header, name))
 
 
 def _choose(path: Path, parts: list[list[str]]) -> tuple[int, list[str], str | None]:

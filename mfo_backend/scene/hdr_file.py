@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image
-from .exr_file import MAX_PIXELS
+from .picture_size import Size, check_declared_size
 
 _SIZE = re.compile(rb"^-Y (\d+) \+X (\d+)$")
 
 
-def read_hdr(path: Path) -> Image:
+def read_hdr(path: Path, size: Size | None = None) -> Image:
     """The scene-linear picture in a Radiance file of the usual orientation (-Y +X), run-length coded or flat.
 
     Raises
@@ -31,10 +31,7 @@ def read_hdr(path: Path) -> Image:
         raise _damaged(path) from error
     if b"FORMAT=32-bit_rle_xyze" in header:
         raise BadInputError(f"Image {path.name!r} is coded as XYZ: export it as RGB.")
-    if not 1 <= height * width <= MAX_PIXELS:
-        raise BadInputError(
-            f"Image {path.name!r} declares a size of {width}x{height}: between 1 and {MAX_PIXELS} pixels are read."
-        )
+    check_declared_size(path.name, (width, height), size)
     try:
         rgbe = _decode(body, height, width)
     except (IndexError, ValueError) as error:

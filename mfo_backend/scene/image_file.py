@@ -11,21 +11,26 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
-from .exr_file import MAX_PIXELS, read_exr, write_exr
+from .exr_file import read_exr, write_exr
 from .hdr_file import read_hdr
+from .picture_size import Size, check_declared_size
+from .scene_xml import is_file
 
 __all__ = ["check_reference", "read_image", "write_exr", "write_png"]
 
 _DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 _SUFFIXES = (".exr", ".hdr", *_DISPLAY_SUFFIXES)
+# Pillow goes by the content, whatever the file is called, and hands PostScript to a program of its own
+_FORMATS = ("PNG", "JPEG", "TIFF")
 
 
-def read_image(path: Path | str) -> Image:
+def read_image(path: Path | str, size: Size | None = None) -> Image:
     """The picture in a file.
 
     EXR (any compression, half or float; channels RGB, RGBA or Y, also layered as Blender writes them) and Radiance HDR
     are scene-linear. PNG, JPEG and TIFF are taken as sRGB display values in [0, 1]; a grey picture becomes three equal
-    channels. Pillow reads 16-bit colour PNG and TIFF with 8 bits a channel; 16-bit grey keeps its depth.
+    channels. Pillow reads 16-bit colour PNG and TIFF with 8 bits a channel; 16-bit grey keeps its depth. With `size`
+    (width, height) a picture of another one is refused by its header alone.
 
     Raises
     ------
@@ -36,11 +41,11 @@ def read_image(path: Path | str) -> Image:
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
         raise BadInputError(f"Image {path.name!r} is of an unknown kind: use {', '.join(s[1:] for s in _SUFFIXES)}.")
-    if not path.is_file():
+    if not is_file(path):
         raise BadInputError(f"Image {str(path)!r} does not exist: check the path.")
     if suffix == ".exr":
-        return read_exr(path)
-    return read_hdr(path) if suffix == ".hdr" else _read_display(path)
+        return read_exr(path, size)
+    return read_hdr(path, size) if suffix == ".hdr" else _read_display(path, size)
 
 
 def write_png(path: Path | str, srgb: NDArray[np.floating]) -> None:
@@ -62,11 +67,7 @@ def check_reference(image: Image, width: int, height: int) -> tuple[Image, tuple
     BadInputError
         If the size is not `width` x `height`, a pixel is NaN or infinite, or all are black.
     """
-    if (image.width, image.height) != (width, height):
-        raise BadInputError(
-            f"Reference is {image.width}x{image.height} but the scene renders {width}x{height}: "
-            "render the reference at that size or change the resolution of the scene."
-        )
+    check_declared_size("reference", (image.width, image.height), (width, height))
     nan = int(np.isnan(image.pixels).any(axis=-1).sum())
     infinite = int(np.isinf(image.pixels).any(axis=-1).sum())
     if nan or infinite:
@@ -83,17 +84,15 @@ def check_reference(image: Image, width: int, height: int) -> tuple[Image, tuple
     return Image(np.maximum(image.pixels, np.float32(0)), image.encoding, image.alpha), (note,)
 
 
-def _read_display(path: Path) -> Image:
+def _read_display(path: Path, size: Size | None) -> Image:
     from PIL import Image as PillowImage
 
     try:
         # Pillow warns about large images; ours is an error, and Pillow's hard limit is one like any other
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with PillowImage.open(path) as picture:
-                if picture.width * picture.height > MAX_PIXELS:
-                    size = f"{picture.width}x{picture.height}"
-                    raise BadInputError(f"Image {path.name!r} is {size}: at most {MAX_PIXELS} pixels are read.")
+            with PillowImage.open(path, formats=_FORMATS) as picture:
+                check_declared_size(path.name, picture.size, size)
                 picture.load()
     except BadInputError:
         raise

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +11,12 @@ from xml.etree import ElementTree
 
 from ..types.errors import BadInputError
 from ..types.parameter import Value
+from .safe_xml import Element, parse_xml
 
-Element = ElementTree.Element
 _WRAPPERS = ("twosided", "mask", "bumpmap", "normalmap")  # plugins around exactly one nested BSDF
 _CONSTANTS = ("float", "integer", "rgb", "spectrum")
+_PLUGIN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+MOST_EXPANDED = 2**24  # characters that the defaults of a scene may become; a scene of thousands has a few hundred
 
 
 @dataclass(frozen=True)
@@ -35,22 +38,26 @@ def read_scene(path: Path) -> Element:
     Raises
     ------
     BadInputError
-        If the file cannot be read or is no Mitsuba scene.
+        If the file cannot be read, is no Mitsuba scene, or names a plugin by something else than a plain name.
     """
-    try:
-        scene = ElementTree.fromstring(path.read_bytes())
-    except OSError as error:
-        raise BadInputError(f"Cannot read the scene {path}: {error.strerror}.") from None
-    except ElementTree.ParseError as error:
-        raise BadInputError(f"{path.name} is not XML ({error}): give a Mitsuba 3 scene file.") from None
+    scene = parse_xml(path)
     if scene.tag != "scene":
         raise BadInputError(f"{path.name} holds <{scene.tag}>, not <scene>: give a Mitsuba 3 scene file.")
-    _fill_in_defaults(scene)
+    _fill_in_defaults(scene, path.name)
+    _check_plugin_names(scene, path.name)
     for element in scene.iter("string"):
         file = path.parent / element.get("value", "")
-        if element.get("name") == "filename" and file.is_file():
+        if element.get("name") == "filename" and is_file(file):
             element.set("value", str(file.resolve()))
     return scene
+
+
+def is_file(path: Path) -> bool:
+    """Whether a file is there; False also for a name that the system cannot even look up."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long, or not encodable
+        return False
 
 
 def find_target(scene: Element, shape_id: str) -> Target:
@@ -239,13 +246,31 @@ def _integer(text: str, name: str) -> int:
         raise BadInputError(f"Integrator setting {name} is {text!r}: give a whole number.") from None
 
 
-def _fill_in_defaults(scene: Element) -> None:
+def _fill_in_defaults(scene: Element, file: str) -> None:
     defaults = {element.get("name", ""): element.get("value", "") for element in scene.findall("default")}
+    defaults.pop("", None)
     for element in scene.findall("default"):
         scene.remove(element)
+    if not defaults:
+        return
+    names = sorted(defaults, key=len, reverse=True)  # $depth must not eat the start of $depth_max
+    pattern = re.compile(r"\$(" + "|".join(map(re.escape, names)) + ")")
+    longest = max(map(len, defaults.values()))
+    room = MOST_EXPANDED
     for element in scene.iter():
         for key, text in element.attrib.items():
             if "$" in text:
-                for name in sorted(defaults, key=len, reverse=True):  # $depth must not eat the start of $depth_max
-                    text = text.replace(f"${name}", defaults[name])
-                element.set(key, text)
+                room -= len(text) + text.count("$") * longest
+                if room < 0:
+                    raise BadInputError(f"The <default>s of {file} fill in too much text: write the values themselves.")
+                element.set(key, pattern.sub(lambda found: defaults[found[1]], text))
+
+
+def _check_plugin_names(scene: Element, file: str) -> None:
+    """Mitsuba takes a path for a name too, and a library that it loads runs code: `docs/threats.md`."""
+    for element in scene.iter():
+        name = element.get("type")
+        if name is not None and not _PLUGIN_NAME.fullmatch(name):
+            raise BadInputError(
+                f"{file} has <{element.tag}> of type {name[:60]!r}: a plugin's name has letters, digits and '_' only."
+            )

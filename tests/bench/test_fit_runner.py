@@ -43,8 +43,8 @@ def test_the_truth_itself_has_no_error(runner):
     judge = runner._judge
     difference = judge.difference(judge.true_values())
     assert (difference.flip, difference.relative_rmse) == (0.0, 0.0)  # the same picture twice
-    assert judge.relit_relative_rmse(judge.true_values()) == 0.0
-    assert judge.floor.relative_rmse > 0
+    assert judge.relit(judge.true_values())[0].relative_rmse == 0.0
+    assert judge.pictures.floor.relative_rmse > 0
 
 
 def test_glass_is_refused_by_our_presets(runner):

@@ -23,12 +23,15 @@ def bench(folder, runner, tasks=TASKS, stop=lambda: False):
     return done, shown
 
 
-def test_scenes_come_one_by_one_so_that_a_part_compares_all_methods():
-    assert [task.key for task in TASKS[:4]] == [
-        ("base", 0, "mfo-hdr"),
+def test_quick_methods_come_first_then_scene_by_scene():
+    tasks = all_tasks(["base", "noise"], ["mfo-hdr", "fast", "mse-hdr"], 2)
+    assert [task.key for task in tasks[:6]] == [
         ("base", 0, "fast"),
-        ("noise", 0, "mfo-hdr"),
         ("noise", 0, "fast"),
+        ("base", 1, "fast"),
+        ("noise", 1, "fast"),
+        ("base", 0, "mfo-hdr"),
+        ("base", 0, "mse-hdr"),
     ]
     assert len(set(TASKS)) == 8
 

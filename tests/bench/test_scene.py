@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mfo_backend.bench.assets import Assets, generated_probe
 from mfo_backend.bench.bumpy_sphere import bumpy_sphere, write_ply
-from mfo_backend.bench.method import METHODS, OUR_METHODS, method_settings
+from mfo_backend.bench.method import METHODS, OUR_METHODS, PAPER_METHODS, method_settings
 from mfo_backend.bench.scenario import SCENARIOS
 from mfo_backend.bench.scene import write_scene
 from mfo_backend.material.mitsuba_parameters import MITSUBA_PRINCIPLED
@@ -23,8 +25,12 @@ def test_a_scene_is_the_same_every_time_and_another_by_number(tmp_path, scenario
     first, again = (write_scene(scenario, 4, 32, NO_DATA, tmp_path) for _ in range(2))
     other = write_scene(scenario, 5, 32, NO_DATA, tmp_path)
     assert first == again
-    assert first.truth != other.truth
+    assert first.start != other.start
     assert first.truth != first.start
+    assert bool(first.true_files) == scenario.measured
+    files = [first.file, *first.relit, *first.true_files]
+    assert len(first.relit) == scenario.relights
+    assert len({file.read_text() for file in files}) == len(files)
     for values in (first.truth, first.start):
         for name, value in values.items():
             parameter = MITSUBA_PRINCIPLED[name]
@@ -91,6 +97,10 @@ def test_methods_are_what_they_are_called(method):
     assert (settings.seed, settings.spp, settings.parameters) == (7, 4, "all")
     if method in OUR_METHODS:
         assert settings.preset == method
-    else:
+    elif method in PAPER_METHODS:
         stages = {"mse": ["mse"], "flip": ["flip"], "mfo": ["mse", "flip"]}[method[:-4]]
         assert list(settings.stage_names(Encoding.LINEAR)) == [f"{stage}-{method[-3:]}" for stage in stages]
+    else:
+        whole = METHODS[METHODS[method].compares_with]
+        assert whole.compares_with == ""
+        assert replace(METHODS[method], compares_with="") != whole

@@ -27,7 +27,7 @@ def test_rows_and_report(tmp_path, capsys):
 
 
 def test_a_stopped_bench_reports_what_is_there_and_exits_with_4(tmp_path, capsys):
-    runner = FakeRunner(cancelled=all_tasks(["base"], ["fast", "mfo-hdr"], 2)[2])
+    runner = FakeRunner(cancelled=all_tasks(["base"], ["fast", "mfo-hdr"], 2)[3])
     assert work(arguments(tmp_path), runner, {}) == 4
     captured = capsys.readouterr()
     assert "| fast | 1 |" in captured.out

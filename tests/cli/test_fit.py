@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -12,7 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mfo_backend.cli.fit_options import add_fit_options, fit_from_options
 from mfo_backend.cli.result_text import result_text
+from mfo_backend.fit.settings import FitSettings
 from mfo_backend.scene.image_file import write_exr
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,6 +86,24 @@ def test_it_makes_a_job_and_reports(scene: Path) -> None:
     assert (scene.parent / "mfo-a scene-2" / "result.json").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "losses", "preset"),
+    [
+        (["--lf", "pu21", "--hf", "itp"], ["pu21", "itp"], "paper"),
+        (["--lf", "log"], ["log", "flip"], "paper"),
+        (["--hf", "flip-ldr"], ["mse", "flip-ldr"], "paper"),
+        (["--losses", "log, itp,flip"], ["log", "itp", "flip"], "paper"),
+        (["--losses", "mse", "--preset", "fast"], ["mse"], "fast"),
+    ],
+)
+def test_losses_by_name(words: list[str], losses: list[str], preset: str) -> None:
+    parser = argparse.ArgumentParser()
+    add_fit_options(parser)
+    asked = fit_from_options(parser.parse_args(words))
+    assert asked["losses"] == losses
+    assert FitSettings.from_request(asked).preset == preset
+
+
 def test_json_is_one_object(scene: Path) -> None:
     done = mfo_fit(scene, "--target", "ball", "--reference", "ref.exr", "--out", "here", "--json", "--seed", "3")
     result = json.loads(done.stdout)  # although a library prints on stdout meanwhile
@@ -99,6 +120,11 @@ def test_json_is_one_object(scene: Path) -> None:
         (["--reference", "small.exr"], "Reference is 4x4 but the scene renders 16x12: "),
         (["--reference", "black.exr"], "Reference is all black: "),
         (["--preset", "magic"], "Fit setting 'preset' is 'magic': "),
+        (["--losses", "mse,ssim"], "Unknown loss 'ssim': choose one of mse, "),
+        (["--losses", ","], "Fit setting 'losses' is []: "),
+        (["--losses", "mse", "--hf", "flip"], "Both --losses and --lf or --hf were given: "),
+        (["--hf", "flip", "--preset", "fast"], "Preset 'fast' minimises sums of squares, which 'flip' is not: "),
+        (["--lf", "log", "--reference", "display.png"], "There is no loss 'log-ldr'"),
         (["--spp", "0"], "Fit setting 'spp' is 0: "),
         (
             ["--range", "hdr", "--reference", "display.png"],

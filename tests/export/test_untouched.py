@@ -28,6 +28,7 @@ SKIPPED = {
     "bindcode",
     "pixels",
     "use_nodes",
+    "uv_sculpt",  # reading it crashes Blender 4.2
 }
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import importlib.util
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from mfo_backend.fit.fit_material import FitOutcome, fit_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.colour import srgb_from_linear
-from mfo_backend.types.errors import BadInputError
+from mfo_backend.types.errors import BadInputError, SetupError
 from mfo_backend.types.event import Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
@@ -41,6 +43,36 @@ def test_a_display_reference_is_fitted_by_ldr_losses(sphere, truth) -> None:
     assert [stage.name for stage in outcome.result.stages] == ["mse-ldr", "flip-ldr"]
     assert set(outcome.result.errors) == {"flip", "mse"}
     assert outcome.result.errors["flip"][1] < 0.1 * outcome.result.errors["flip"][0]
+
+
+@pytest.mark.parametrize(
+    "losses", [("pu21", "itp", "flip"), ("log", "flip-ldr"), ("relative", "mse-ldr"), ("itp",)], ids="-".join
+)
+def test_any_losses_make_a_ladder(sphere, truth, losses) -> None:
+    settings = FitSettings(preset="paper", losses=losses)
+    outcome = fit(sphere, sphere.reference(truth), preset="paper", losses=losses)
+    assert tuple(stage.name for stage in outcome.result.stages) == settings.stage_names(Encoding.LINEAR)
+    np.testing.assert_allclose(sphere.table.pack(outcome.result.recovered), truth, atol=0.06)
+
+
+@pytest.mark.judges
+def test_color_video_vdp_is_a_stage(sphere, truth) -> None:
+    if not all(map(importlib.util.find_spec, ("torch", "pycvvdp"))):
+        pytest.skip("the extra `judges` is not installed")
+    outcome = fit(sphere, sphere.reference(truth), preset="paper", losses=("mse", "cvvdp"), max_iterations=25)
+    assert [stage.name for stage in outcome.result.stages] == ["mse-hdr", "cvvdp-hdr"]
+    mse, judged = outcome.result.stages
+    assert judged.loss_best < judged.loss_start
+    assert mse.values != judged.values
+
+
+@pytest.mark.parametrize("name", ["cvvdp", "lpips", "lpips_pu", "lpips_vgg"])
+def test_a_loss_whose_package_is_missing_is_refused_before_the_fit(sphere, truth, name, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    events = []
+    with pytest.raises(SetupError, match="-m pip install"):
+        fit(sphere, sphere.reference(truth), preset="paper", losses=("mse", name), listener=events.append)
+    assert events == []
 
 
 def test_the_last_pictures_have_a_seed_and_samples_of_their_own(noisy_sphere, sphere, truth) -> None:

@@ -25,9 +25,9 @@ TRUTHS = [
 ]
 
 
-def fit(renderer, reference, *, preset="fast", encoding=Encoding.LINEAR, stop=lambda: False, display=None):
+def fit(renderer, reference, *, preset="fast", encoding=Encoding.LINEAR, stop=lambda: False, display=None, losses=None):
     events = []
-    settings = FitSettings(preset=preset, verify_spp=32)
+    settings = FitSettings(preset=preset, verify_spp=32, losses=losses)
     outcome = recover_material(
         renderer, Image(reference, encoding), settings, display=display, listener=events.append, should_stop=stop
     )
@@ -80,6 +80,25 @@ def test_balanced_never_has_more_flip_than_fast(tmp_path):
     balanced, events = fit(renderer, reference, preset="balanced")
     assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "start", "refine", "itp", "pu21"]
     assert balanced.result.errors["hdr_flip"][1] <= fast.result.errors["hdr_flip"][1] * 1.0001
+
+
+@pytest.mark.parametrize(
+    ("encoding", "losses"),
+    [(Encoding.LINEAR, ("mse", "relative", "log-hdr", "pu21", "itp-ldr")), (Encoding.SRGB, ("mse", "pu21", "itp"))],
+)
+def test_named_losses_are_the_finishing_stages_and_the_last_one_judges(tmp_path, encoding, losses):
+    """Each stage starts from the values of the one before, so under its own loss it ends no worse than that."""
+    renderer = load(tmp_path, POINT, size=24)
+    linear = renderer.image(renderer.table.pack(TRUTHS[0]), seed=5, spp=256)
+    view = DisplayView()
+    shown = view.display(linear) if encoding is Encoding.SRGB else linear
+    outcome, events = fit(renderer, shown, encoding=encoding, display=view, losses=losses)
+    names = FitSettings(preset="fast", losses=losses).stage_names(encoding)
+    assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "start", "refine", *names]
+    stages = outcome.result.stages
+    assert all(stage.loss_best <= stage.loss_start for stage in stages[3:])
+    found, truth = (renderer.table.pack(v) for v in (outcome.result.recovered, TRUTHS[0]))
+    np.testing.assert_allclose(found[:4], truth[:4], atol=0.02)
 
 
 def test_a_clipped_display_picture_is_fitted_below_its_white(tmp_path):

@@ -29,12 +29,12 @@ def picture(x):
 
 def judge(reference, *, blurred=False, ldr=False):
     return PictureJudge(
+        "flip-ldr" if ldr else "flip-hdr",
         Image(reference.astype(np.float32), Encoding.LINEAR),
         picture(TRUTH)[0],
         MASK,
         FitSettings(),
         DisplayView(),
-        ldr=ldr,
         blurred=blurred,
     )
 

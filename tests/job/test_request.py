@@ -129,6 +129,11 @@ def test_most_keys_have_a_default() -> None:
         ("fit/spp", 0, ["'spp' is 0"]),
         ("fit/seed", -1, ["'seed' is -1"]),
         ("fit/parameters", [1], ["'parameters' is [1]"]),
+        ("view/exposure_ev", 10**400, ["exposure_ev is 1000"]),
+        ("materials/glaze/sockets/Roughness/value", 10**400, ["Roughness.value is 1000"]),
+        ("materials/glaze/sockets/Roughness/value", [0.5] * 5, ["one to four"]),
+        ("generator/blender", "5.0", ["generator.blender is '5.0'", "[5, 0, 1]"]),
+        ("generator/blender", [5, None], ["generator.blender is [5, None]"]),
         ("notes", "text", ["notes is 'text'", "list of strings"]),
     ],
 )
@@ -172,6 +177,9 @@ def test_no_request(job: Path) -> None:
         ("textures/../../scene.xml", "leaves the job folder"),
         ("", "leaves the job folder"),
         ("missing.exr", "is not in the job folder"),
+        ("a" * 5000, "is not in the job folder"),
+        ("\ud800", "is not in the job folder"),
+        ("circle.exr", "is not in the job folder|a link out"),
         ("textures", "is not in the job folder"),
         ("outside.exr", "a link out of the job folder"),
         ("elsewhere/secret.exr", "a link out of the job folder"),
@@ -185,6 +193,7 @@ def test_paths_stay_in_the_folder(
     if os.name == "posix":
         (job / "outside.exr").symlink_to(tmp_path / "secret.exr")
         (job / "elsewhere").symlink_to(tmp_path)
+        (job / "circle.exr").symlink_to("circle.exr")
     elif words == "a link out of the job folder":
         pytest.skip("links need a right on Windows")
     (job / "request.json").write_text(json.dumps(changed(request_data, place, relative)))

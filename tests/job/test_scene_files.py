@@ -12,6 +12,19 @@ from mfo_backend.job.job_folder import JobFolder
 from mfo_backend.job.scene_files import check_scene_files, film_size, pack_scene
 from mfo_backend.types.errors import BadInputError
 
+PLY = """ply
+format ascii 1.0
+comment {name}
+element vertex 3
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0 1 0 0 0 1 0 3 0 1 2
+"""
+
 
 def scene_with(inner: str) -> str:
     return f'<scene version="3.0.0">{inner}</scene>'
@@ -26,8 +39,8 @@ def root(tmp_path: Path) -> Path:
     folder = tmp_path / "scene"
     (folder / "a").mkdir(parents=True)
     (folder / "b").mkdir()
-    (folder / "a" / "mesh.ply").write_bytes(b"first")
-    (folder / "b" / "mesh.ply").write_bytes(b"second")
+    (folder / "a" / "mesh.ply").write_text(PLY.format(name="first"))
+    (folder / "b" / "mesh.ply").write_text(PLY.format(name="second"))
     (folder / "metal.spd").write_text("400 1")
     (tmp_path / "secret.ply").write_bytes(b"secret")
     return folder
@@ -67,7 +80,9 @@ def test_packing_copies_every_file_once(root: Path, tmp_path: Path) -> None:
     pack_scene(root / "scene.xml", job)
     check_scene_files(JobFolder.open(job), "scene.xml")
     named = [e.get("value") for e in ElementTree.parse(job / "scene.xml").getroot().iter("string")]
-    assert [(job / name).read_bytes() for name in named] == [b"first", b"second", b"first"]
+    assert [(job / name).read_text().split("\n")[2] for name in named] == [
+        f"comment {name}" for name in ("first", "second", "first")
+    ]
     assert len(list((job / "meshes").iterdir())) == 2
 
 

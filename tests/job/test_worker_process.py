@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
 import signal
@@ -13,6 +14,11 @@ import time
 from pathlib import Path
 
 import pytest
+
+from mfo_backend.job.job_folder import JobFolder
+from mfo_backend.job.progress import EventWriter
+from mfo_backend.types.event import Started
+from mfo_backend.types.status import Status
 
 STOP_SECONDS = 1.0  # the promise of docs/architecture.md
 END_SECONDS = 8.0  # a process' end on a busy machine, its interpreter's own included
@@ -263,15 +269,37 @@ def test_it_goes_on_when_nobody_reads_its_stdout(start_worker, job: Path) -> Non
 
 
 @posix_only
-def test_a_full_disk_for_progress_does_not_cost_the_result(start_worker, job: Path) -> None:
+def test_a_full_disk_for_progress_does_not_cost_the_result(job: Path, capsys: pytest.CaptureFixture) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full here")
-    (job / "progress.jsonl").symlink_to("/dev/full")
+    out = io.StringIO()
+    events = EventWriter(stream=out)
+    events.attach(JobFolder.open(job), lambda pixels: b"")
+    events(Started((), (), 0.0))
+    assert events._file is not None
+    events._file.close()
+    events._file = open("/dev/full", "w", buffering=1)  # noqa: SIM115
+    events.finished(Status.STALE, "Done.")
+    assert "progress.jsonl cannot be written: No space left on device" in capsys.readouterr().err
+    assert events_of(out.getvalue())[-1]["event"] == "finished"
+
+
+@posix_only
+def test_links_in_a_strangers_folder_are_not_written_through(start_worker, job: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for name in ("diary.txt", "result.exr", "reference.png"):
+        (mine / name).write_text("precious")
+    for name in ("progress.jsonl", "result.json", "index.html"):
+        (job / name).symlink_to(mine / "diary.txt")
+    (job / "pictures").symlink_to(mine)
     child = start_worker("--progress", "json")
-    out, err = child.communicate(timeout=60)
+    child.communicate(timeout=60)
     assert child.returncode == 0
-    assert "progress.jsonl cannot be written: No space left on device" in err
-    assert events_of(out)[-1]["event"] == "finished"
+    assert {path.read_text() for path in mine.iterdir()} == {"precious"}
+    assert len(list(mine.iterdir())) == 3
+    assert not (job / "pictures").is_symlink()
+    assert (job / "pictures" / "result.exr").is_file()
 
 
 def test_a_log_gets_lines_instead_of_a_bar(start_worker) -> None:

@@ -202,7 +202,7 @@ def test_linked_parameters_are_left_out_of_a_set(tmp_path: Path) -> None:
     [
         ({"light": ""}, "has no light"),
         ({"model": "phong"}, "Unknown material model 'phong'"),
-        ({"light": '<emitter type="bulb"/>'}, "Mitsuba cannot load scene.xml"),
+        ({"light": '<emitter type="bulb"/>'}, "no plugin of Mitsuba"),
     ],
 )
 def test_refuses_scenes_that_cannot_be_rendered(tmp_path: Path, change: dict, sentence: str) -> None:

@@ -23,6 +23,20 @@ def test_sets_a_variant_with_derivatives_and_keeps_it() -> None:
     assert load_variant(name) == name
 
 
+def test_plugins_come_from_mitsuba_alone(tmp_path: Path) -> None:
+    # a file that is no library: were it opened, the loader would fail
+    (tmp_path / "plugins").mkdir()
+    for suffix in ("so", "dylib", "dll"):
+        (tmp_path / "plugins" / f"diffuse.{suffix}").write_bytes(b"no library")
+    code = (
+        f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+        "from mfo_backend.render.variant import load_variant\nload_variant()\nimport mitsuba as mi\n"
+        "mi.load_string('<scene version=\"3.0.0\"><bsdf type=\"diffuse\"/></scene>')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_names_the_variant_that_does_not_exist() -> None:
     before = load_variant()
     with pytest.raises(SetupError, match="llvm_ad_purple is not built into this Mitsuba"):

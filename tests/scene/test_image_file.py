@@ -202,6 +202,48 @@ def test_huge_declared_sizes_are_refused_before_memory_is_taken(tmp_path):
         read_image(tmp_path / "a.hdr")
 
 
+def test_another_size_than_needed_is_refused_by_the_header(tmp_path, monkeypatch):
+    pixels = np.ones((4, 6, 3), np.float32)
+    write_exr(tmp_path / "a.exr", pixels)
+    for suffix in ("png", "jpg", "tif"):
+        PillowImage.fromarray((pixels * 255).astype(np.uint8)).save(tmp_path / f"a.{suffix}")
+    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\n\n-Y 4 +X 6\n")  # no pixels at all
+    monkeypatch.setattr(PillowImage.Image, "load", lambda self: pytest.fail("decoded"))
+    for name in ("a.exr", "a.png", "a.jpg", "a.tif", "a.hdr"):
+        with pytest.raises(BadInputError, match="Reference is 6x4 but the scene renders 4x6"):
+            read_image(tmp_path / name, (4, 6))
+    assert read_image(tmp_path / "a.exr", (6, 4)).width == 6
+
+
+def test_many_layers_are_refused_before_memory_is_taken(tmp_path, monkeypatch):
+    layers = {f"l{i}.{c}": np.zeros((64, 64), np.float32) for i in range(9) for c in "BGR"}
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, layers).write(
+        str(tmp_path / "a.exr")
+    )
+    assert (tmp_path / "a.exr").stat().st_size < 4096  # of 442,368 bytes of pixels
+    read_image(tmp_path / "a.exr")
+    monkeypatch.setattr("mfo_backend.scene.exr_file.MAX_SAMPLES", 64 * 64 * 26)
+    with pytest.raises(BadInputError, match="declares 110592 samples in all its layers"):
+        read_image(tmp_path / "a.exr")
+
+
+def test_a_channel_name_that_is_no_text(tmp_path):
+    data = exr_bytes(tmp_path)
+    at = data.find(b"chlist") + 7 + 4
+    (tmp_path / "a.exr").write_bytes(data[:at] + b"\xe8" + data[at + 1 :])
+    with pytest.raises(BadInputError, match="damaged or not an OpenEXR"):
+        read_image(tmp_path / "a.exr")
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".tif"])
+def test_postscript_is_not_handed_to_a_program(tmp_path, suffix, monkeypatch):
+    monkeypatch.setattr("subprocess.Popen", lambda *a, **k: pytest.fail("started a program"))
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 8 8\n%%EndComments\nshowpage\n")
+    with pytest.raises(BadInputError, match="damaged or not an image"):
+        read_image(path)
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [

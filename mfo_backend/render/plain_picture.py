@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of a scene as it is, whatever its material: references that the fitted model cannot reach."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..types.image import Pixels
+from .variant import load_variant
+
+
+class PlainScene:
+    """A loaded scene file.
+
+    Raises
+    ------
+    SetupError
+        If Mitsuba or LLVM is missing.
+    """
+
+    def __init__(self, file: Path) -> None:
+        load_variant()
+        import mitsuba as mi
+
+        from ..material.measured_network import register
+
+        register()
+        # plugins in Python want this thread
+        self._scene = mi.load_file(str(file), optimize=False, parallel=False)
+
+    def image(self, *, seed: int, spp: int) -> Pixels:
+        """Scene-linear pixels; one that Mitsuba leaves non-finite is black."""
+        import mitsuba as mi
+
+        pixels = np.array(mi.render(self._scene, seed=seed, spp=spp), dtype=np.float32)[..., :3]
+        pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
+        return pixels
