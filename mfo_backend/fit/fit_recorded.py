@@ -98,11 +98,11 @@ def fit_recorded(
         ends.append(End("refine", kept.x))
         notes += kept.notes
         noise = fit.noise.level if fit.noise else 0.0
-        at_noise = weighted and np.sqrt(2.0 * solution.equations.cost) < AT_NOISE
+        at_noise = reference.encoding is Encoding.LINEAR and fit.misfit(kept.x) < AT_NOISE
         if at_noise and finishing and settings.losses is None:
             notes.append(
-                f"The fit has reached the picture's own noise ({100 * noise:.0f} % a pixel): "
-                "perceptual stages would fit the noise and were left out."
+                f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
+                "perceptual stages would fit that noise and were left out."
             )
         elif finishing:
             linear = reference.encoding is Encoding.LINEAR
@@ -111,6 +111,8 @@ def fit_recorded(
             counts = judge.value
             others = [basin.x for basin in basins[1:]] if settings.preset == "best" else []
             ends += perceptual_ends(fit, last, kept.x, others, finishing, judge, settings, notes)
+        if fit.fireflies:
+            notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
         if fit.recordings > 1:
             notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
         if counts is None:

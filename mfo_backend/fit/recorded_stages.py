@@ -16,10 +16,11 @@ from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
 from .course import Course, Stage
+from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
-from .residuals import ImageAndJacobian, OneSidedResidual, Residual, normal_equations
+from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual, normal_equations
 from .tile_noise import TileNoise, tile_noise
 
 Vector = NDArray[np.float64]
@@ -31,6 +32,7 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 LEAST_NOISE = 0.002
 WEIGHT_ROUNDS = 2  # the first weights come from a model that is still off
 MOST_RECORDINGS = 3  # at the solution, until it holds still
+FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
 
 
@@ -116,6 +118,9 @@ class RecordedFit:
         self.noise: TileNoise | None = None  # of the reference, known after `refine`
         self.table = scene.renderer.table
         self.recordings = 0
+        # light with extent is noisy: what a start is found on and noise is measured on; elsewhere a highlight may well
+        # be a pixel wide
+        self.calm, self.fireflies = without_fireflies(reference, mask) if scene.needs.sampled else (reference, 0)
         self.box = self.table.lower, self.table.upper  # of the perceptual stages, which hold what the user keeps
         course.picture = self.picture
 
@@ -133,9 +138,9 @@ class RecordedFit:
         image.reshape(-1, 3)[self.paths.pixel] = table[:, :, 0]
         return image
 
-    def problem(self, groups: LaneGroups, make: MakeResidual) -> Problem:
-        """The residuals of these groups of the present recording."""
-        residual = make(groups.average(self.reference))
+    def problem(self, groups: LaneGroups, make: MakeResidual, *, calm: bool = False) -> Problem:
+        """The residuals of these groups of the present recording, to the reference or to it without fireflies."""
+        residual = make(groups.average(self.calm if calm else self.reference))
         if self.clipped is not None:
             residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
         return Problem(self.scene.evaluator(self.paths, groups), residual, groups)
@@ -152,13 +157,13 @@ class RecordedFit:
             grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
             groups = all_groups(self.paths, tiles=sampled)
-            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make)
+            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make, calm=True)
             nodes = []
             if plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
                 stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
-            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make)
+            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make, calm=True)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             metals = [node for node in nodes if node.metal]
@@ -232,6 +237,9 @@ class RecordedFit:
         """
         with self.course.stage("refine") as stage:
             if not self.scene.needs.sampled:
+                grid = FINER * np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
+                self.paths = self.scene.record(start, grid=grid, seed=self.seed + 1, near=True)
+                self.recordings = 1
                 groups = fewer_groups(all_groups(self.paths, tiles=False), self.reference, self.plan.refine_lanes)
                 problem = self.problem(groups, make)
                 solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
@@ -260,16 +268,27 @@ class RecordedFit:
             return solution, problem
         for _ in range(WEIGHT_ROUNDS):
             self.noise = self._noise(start, groups)
-            least = LEAST_NOISE * float(groups.average(self.reference).mean())
-            weight = (1.0 / np.hypot(self.noise.deviation, max(least, 1e-12))).astype(np.float32)
-            problem = self.problem(groups, lambda target, w=weight: weigh(target, w))
+            problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
             solution = self._solve(self.course.watch(stage, problem.equations), start, 12)
             start = solution.x
         return solution, problem
 
     def _noise(self, x: Vector, groups: LaneGroups) -> TileNoise:
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)[:, :, 0]
-        return tile_noise(self.reference, pixels, self.paths, groups, self.paths.interior)
+        return tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior)
+
+    def misfit(self, x: Vector) -> float:
+        """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
+        groups = all_groups(self.paths, tiles=True)
+        problem = self.problem(groups, self._weighing(self._noise(x, groups), groups))
+        values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
+        # as far as a few outliers go, it is their number that counts and not their size
+        return float(np.sqrt(np.mean(np.minimum(np.abs(values), WeightedResidual.LIMIT) ** 2)))
+
+    def _weighing(self, noise: TileNoise, groups: LaneGroups, weigh: MakeWeighted = WeightedResidual) -> MakeResidual:
+        least = LEAST_NOISE * float(groups.average(self.reference).mean())
+        weight = (1.0 / np.hypot(noise.deviation, max(least, 1e-12))).astype(np.float32)
+        return lambda target: weigh(target, weight)
 
     def _moved(self, problem: Problem, before: Vector, after: Vector) -> float:
         """Root mean square change of the groups relative to their radiance and a tenth of its mean."""

@@ -69,10 +69,10 @@ class RelativeResidual:
 
 
 class WeightedResidual:
-    """(I - R) x `weight`, both (g, 3), growing only by its root beyond `LIMIT` standard deviations.
+    """(I - R) x `weight`, both (g, 3), growing only like the root of a logarithm beyond `LIMIT` standard deviations.
 
-    The squares sum to twice P. Huber's loss (1964), so that one firefly in the reference cannot outweigh a tile's
-    neighbours; a weight is one over the deviation of the noise.
+    A weight is one over the deviation of the noise. The influence of a residual falls beyond the limit, so that one
+    firefly in the reference outweighs neither its neighbours nor what is known of the noise.
     """
 
     LIMIT = 4.0
@@ -84,10 +84,10 @@ class WeightedResidual:
     def __call__(self, image: Rows) -> tuple[Rows, Rows]:
         """See `Residual`."""
         values = (image - self._reference) * self._weight
-        size = np.abs(values)
-        bounded = np.sqrt(np.maximum(2.0 * self.LIMIT * size - self.LIMIT**2, self.LIMIT**2))
+        size = np.maximum(np.abs(values), self.LIMIT)
+        bounded = self.LIMIT * np.sqrt(1.0 + 2.0 * np.log(size / self.LIMIT))
         far = size > self.LIMIT
-        slope = np.where(far, self._weight * (self.LIMIT / bounded), self._weight)
+        slope = np.where(far, self._weight * (self.LIMIT**2 / (size * bounded)), self._weight)
         return np.where(far, np.copysign(bounded, values), values), slope
 
 
