@@ -97,15 +97,16 @@ def fit_recorded(
         fit.box = box_holding(fit.table, renderer.start, kept.held)
         ends.append(End("refine", kept.x))
         notes += kept.notes
+        linear = reference.encoding is Encoding.LINEAR
+        alternatives = finishing and settings.losses is None
+        at_noise = alternatives and linear and fit.misfit(kept.x) < AT_NOISE
         noise = fit.noise.level if fit.noise else 0.0
-        at_noise = reference.encoding is Encoding.LINEAR and fit.misfit(kept.x) < AT_NOISE
-        if at_noise and finishing and settings.losses is None:
+        if at_noise:
             notes.append(
                 f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
                 "perceptual stages would fit that noise and were left out."
             )
         elif finishing:
-            linear = reference.encoding is Encoding.LINEAR
             blurred = linear and settings.losses is None and (scene.needs.sampled or noise > NOISY)
             judge = PictureJudge(measure, reference, light, mask, settings, view, blurred=blurred)
             counts = judge.value

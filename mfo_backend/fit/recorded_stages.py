@@ -33,6 +33,7 @@ LEAST_NOISE = 0.002
 WEIGHT_ROUNDS = 2  # the first weights come from a model that is still off
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
+FINEST = 60
 MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
 
 
@@ -115,7 +116,7 @@ class RecordedFit:
         self.scene, self.reference, self.mask = scene, reference, mask
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
-        self.noise: TileNoise | None = None  # of the reference, known after `refine`
+        self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
         # light with extent is noisy: what a start is found on and noise is measured on; elsewhere a highlight may well
@@ -237,13 +238,13 @@ class RecordedFit:
         """
         with self.course.stage("refine") as stage:
             if not self.scene.needs.sampled:
-                grid = FINER * np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
+                grid = np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
+                grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
                 self.paths = self.scene.record(start, grid=grid, seed=self.seed + 1, near=True)
                 self.recordings = 1
                 groups = fewer_groups(all_groups(self.paths, tiles=False), self.reference, self.plan.refine_lanes)
                 problem = self.problem(groups, make)
                 solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
-                self.noise = self._noise(solution.x, groups)
                 stage.vector = solution.x
                 return solution, problem
             for number in range(1, MOST_RECORDINGS + 1):
@@ -263,9 +264,7 @@ class RecordedFit:
         groups = all_groups(self.paths, tiles=True)
         if weigh is None:
             problem = self.problem(groups, make)
-            solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
-            self.noise = self._noise(solution.x, groups)
-            return solution, problem
+            return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
         for _ in range(WEIGHT_ROUNDS):
             self.noise = self._noise(start, groups)
             problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
@@ -280,7 +279,8 @@ class RecordedFit:
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
         groups = all_groups(self.paths, tiles=True)
-        problem = self.problem(groups, self._weighing(self._noise(x, groups), groups))
+        self.noise = self._noise(x, groups)
+        problem = self.problem(groups, self._weighing(self.noise, groups))
         values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
         # as far as a few outliers go, it is their number that counts and not their size
         return float(np.sqrt(np.mean(np.minimum(np.abs(values), WeightedResidual.LIMIT) ** 2)))

@@ -48,6 +48,8 @@ def weak_combinations(
         if largest > ALONE:
             continue
         named = [name for name in sorted(names, key=lambda n: -share[n]) if share[name] >= PART**2 * largest]
+        if len(named) < 2:
+            continue
         step = {}
         for name in named:
             part = [i for i, o in enumerate(owner) if o == name]
