@@ -34,6 +34,7 @@ WEIGHT_ROUNDS = 2  # the first weights come from a model that is still off
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
+MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
 MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
 
 
@@ -240,23 +241,31 @@ class RecordedFit:
             if not self.scene.needs.sampled:
                 grid = np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
                 grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
-                self.paths = self.scene.record(start, grid=grid, seed=self.seed + 1, near=True)
-                self.recordings = 1
+                if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
+                    self._record(start, grid, 1)
                 groups = fewer_groups(all_groups(self.paths, tiles=False), self.reference, self.plan.refine_lanes)
                 problem = self.problem(groups, make)
                 solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
                 stage.vector = solution.x
                 return solution, problem
+            solution = problem = None
             for number in range(1, MOST_RECORDINGS + 1):
-                grid, seed = self.plan.grid_last, self.seed + number
-                self.paths = self.scene.record(start, grid=grid, seed=seed, near=True)
-                self.recordings = number
+                problem = None  # and with it the recording before
+                self._record(start, self.plan.grid_last, number)
                 solution, problem = self._refine_sampled(stage, start, make, weigh)
                 stage.vector = solution.x
                 if self._moved(problem, start, solution.x) < MOVED or self.course.should_stop():
                     break
                 start = solution.x
+        assert solution is not None
+        assert problem is not None
         return solution, problem
+
+    def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
+        """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
+        del self.paths
+        self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
+        self.recordings = number
 
     def _refine_sampled(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
