@@ -154,6 +154,7 @@ class FitRunner:
             q_jod=difference.q_jod,
             relit_relative_rmse=sum(d.relative_rmse for d in relit) / len(relit),
             relit_flips=[d.flip for d in relit],
+            reference_flip=judge.reference_flip(picture),
             start_flip=start.flip,
             floor_flip=floor.flip,
             floor_relative_rmse=floor.relative_rmse,

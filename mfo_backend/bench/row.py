@@ -51,6 +51,8 @@ class Row:
         the last is the root of the mean square difference over the root of the mean square.
     jod, q_jod
         ColorVideoVDP's and HDR-VDP-3's score of the same pictures, None where they are not installed.
+    reference_flip
+        Of the reference and the picture of the recovered values: less `floor_flip` it is the error above the noise.
     start_flip, floor_flip, floor_relative_rmse
         The same for the start, and for the reference itself: its noise.
     relit_relative_rmse, relit_flips
@@ -86,6 +88,7 @@ class Row:
     q_jod: float | None = None
     relit_relative_rmse: float | None = None
     relit_flips: list[float] = field(default_factory=list)
+    reference_flip: float | None = None
     start_flip: float | None = None
     floor_flip: float | None = None
     floor_relative_rmse: float | None = None
