@@ -87,6 +87,7 @@ def render_job(job: Path, spp: int) -> tuple[Array, Array]:
         model="blender_principled",
         parameters=["base_color"],
         materials=request_materials(folder, request),
+        light_paths=request.light_paths,
     )
     rounds = max(1, spp // (2 * SPP_AT_ONCE))
     halves = [

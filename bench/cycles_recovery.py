@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Materials recovered from Cycles' pictures and judged in Cycles: the demo's scene and others with random materials.
 
-    python -m bench.cycles_recovery [--size 128] [--samples 512] [--only 1/environment ...] [--out DIR]
+    python -m bench.cycles_recovery [--size 96] [--samples 256] [--judge-samples 4096] [--judge PYTHON]
+        [--only 1/environment ...] [--out DIR]
 
-writes docs/cycles_recovery.md. Needs a Python with `bpy`.
+writes docs/cycles_recovery.md. Needs a Python with `bpy`; ColorVideoVDP is computed by PYTHON, which has the packages
+of the extra `judges`.
 """
 
 from __future__ import annotations
@@ -34,27 +36,45 @@ SCENES = (
     (8, "sun"),
     (9, "sun"),
 )
-REFERENCE_SEED, JUDGE_SEED = 0, 1  # Cycles' noise of the judged pictures is not the reference's
-OWN_SAMPLES = 2  # for one of Cycles: ours are independent, its are stratified
-LIMIT = 0.012
+REFERENCE_SEED, TRUTH_SEED, JUDGED_SEED = 0, 1, 2  # no two compared pictures share their noise
+OWN_SAMPLES = 2048
+LIMIT, LEAST_JOD = 0.012, 9.8
 KEPT = "recovery.json"
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """Mean FLIP against the reference, of Cycles renders but for `model`, and the seconds of the fit."""
+    """Differences to a render of the true material with many samples, of Cycles renders but for `model`.
+
+    Mean FLIP, and JOD by ColorVideoVDP, which may be missing; `seconds` are those of the fit, `gap` the result's own
+    figure.
+    """
 
     before: float
     after: float
-    floor: float  # the true material with the noise of the judged pictures
-    paired: float  # not against the reference: recovered against true material, both with the noise of the judge
+    floor: float  # the true material with other noise
     model: float  # our own render of the true material
+    jod: float | None
+    jod_floor: float | None
+    gap: float | None
     seconds: float
     notes: tuple[str, ...]
 
 
-def recover(seed: int, light: str, folder: Path, *, size: int, samples: int) -> Recovery:
+@dataclass(frozen=True)
+class Effort:
+    """Pixels along each side, samples per pixel of the picture that is fitted and of the judged ones."""
+
+    size: int = 96
+    samples: int = 256
+    judge_samples: int = 4096
+
+
+def recover(seed: int, light: str, folder: Path, effort: Effort, judge: str) -> Recovery:
     """Build a scene, fit it with `mfo blend --preset balanced --apply` and judge the saved file.
+
+    The fit sees a picture of few samples; the judged pictures have many, so that they differ by the material and not by
+    their noise.
 
     Raises
     ------
@@ -68,27 +88,35 @@ def recover(seed: int, light: str, folder: Path, *, size: int, samples: int) -> 
 
     from .cycles_parity import render_job
 
-    scene = _run("bench.recovery_scene", seed, light, folder, "--size", size)
+    scene = _run("bench.recovery_scene", seed, light, folder, "--size", effort.size)
 
-    def render(blend: str, picture: str, noise: int) -> Image:
+    def render(blend: str, picture: str, samples: int, noise: int) -> Path:
         words = ("--out", folder / picture, "--samples", samples, "--seed", noise)
         _run("blender_addon.headless", "render", folder / blend, *words)
-        return read_image(folder / picture)
+        return folder / picture
 
-    reference = render("truth.blend", "reference.exr", REFERENCE_SEED)
-    judged = {"floor": render("truth.blend", "floor.exr", JUDGE_SEED)}
-    judged["before"] = render("start.blend", "before.exr", JUDGE_SEED)
+    render("truth.blend", "reference.exr", effort.samples, REFERENCE_SEED)
     common = ("--object", scene["object"], "--reference", folder / "reference.exr")
     options = ("--preset", "balanced", "--out", folder / "job", "--apply", "--save-as", folder / "recovered.blend")
     result = _run("mfo_backend", "blend", folder / "start.blend", *common, *options, "--json")
-    judged["after"] = render("recovered.blend", "after.exr", JUDGE_SEED)
+    truth = render("truth.blend", "truth.exr", effort.judge_samples, TRUTH_SEED)
+    files = {"before": render("start.blend", "before.exr", effort.samples, JUDGED_SEED)}
+    for name, blend in (("after", "recovered.blend"), ("floor", "truth.blend")):
+        files[name] = render(blend, f"{name}.exr", effort.judge_samples, JUDGED_SEED)
+    judged = {name: read_image(path) for name, path in files.items()}
     _run("blender_addon.headless", "export", folder / "truth.blend", *common, "--job", folder / "truth")
-    ours = np.mean(render_job(folder / "truth", OWN_SAMPLES * samples), axis=0).astype(np.float32)
+    ours = np.mean(render_job(folder / "truth", OWN_SAMPLES), axis=0).astype(np.float32)
     judged["model"] = Image(ours, Encoding.LINEAR)
-    view = DisplayView()
+    reference, view = read_image(truth), DisplayView()
     flips = {name: flip_error(reference, picture, display=view).mean for name, picture in judged.items()}
-    flips["paired"] = flip_error(judged["floor"], judged["after"], display=view).mean
-    found = Recovery(**flips, seconds=result["seconds"], notes=tuple(result["notes"]))
+    jod, jod_floor = (
+        _run("mfo_backend", "compare", truth, files[name], "--json", python=judge)["metrics"]["jod"]
+        for name in ("after", "floor")
+    )
+    gap = (result.get("model_gap") or {}).get("relative")
+    found = Recovery(
+        **flips, jod=jod, jod_floor=jod_floor, gap=gap, seconds=result["seconds"], notes=tuple(result["notes"])
+    )
     (folder / KEPT).write_text(json.dumps(asdict(found)))
     return found
 
@@ -101,9 +129,9 @@ def _kept(folder: Path) -> Recovery | None:
     return Recovery(**found | {"notes": tuple(found["notes"])})
 
 
-def _run(module: str, *words: Any) -> dict[str, Any]:
+def _run(module: str, *words: Any, python: str = sys.executable) -> dict[str, Any]:
     """The JSON object on the last line of a Python module's output."""
-    command = [sys.executable, "-m", module, *map(str, words)]
+    command = [python, "-m", module, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     answer = json.loads(lines[-1]) if lines else {}
@@ -115,49 +143,53 @@ def _run(module: str, *words: Any) -> dict[str, Any]:
 INTRODUCTION = """# Materials recovered from Cycles' pictures
 
 `python -m bench.cycles_recovery` writes this file. Scene 1 is that of `mfo demo`; the others have its head and table
-with other random materials, starts and lights: {size}x{size} pixels, {samples} samples per pixel, Blender 5.0.1 and its
-own render settings but for adaptive sampling and denoising. `mfo blend --preset balanced` fits all parameters to a
-Cycles render, and Cycles renders the saved result with another seed. Mean FLIP of the whole picture against the
-reference:
+with other random materials, starts and lights: {size}x{size} pixels, Blender 5.0.1 and its own render settings but for
+adaptive sampling and denoising. `mfo blend --preset balanced` fits all parameters to a Cycles render of {samples}
+samples per pixel; then Cycles renders the saved result. Judged are pictures of {judge_samples} samples, so that the
+figures are those of the material: two of 256 samples under the environment are a FLIP of 0.02 apart through their noise
+alone. Mean FLIP of the whole picture, and JOD by ColorVideoVDP (10 is equal), against Cycles' render of the true
+material:
 
-- before, after: Cycles' render of the start and of the recovered material;
-- floor: Cycles' render of the true material, which differs by noise alone;
-- same noise: Cycles' render of the recovered against that of the true material, both with the seed of the judge, so
-  that most of the noise is in both: what the fit has lost;
-- model gap: our own render of the true material. Above the floor it is what the export and the renderer lose, and the
-  noise of our render, which has {own} times the samples but independent ones.
+- before, after: Cycles' render of the start ({samples} samples) and of the recovered material;
+- floor: Cycles' render of the true material with another seed: the noise that is left;
+- ours: our own render of the true material ({own} samples): what the export and the renderer lose, and noise;
+- gap: the result's own `model_gap`, found without the truth.
 
-| scene | light | before | after | floor | same noise | model gap | fit |
-|---|---|---|---|---|---|---|---|
+| scene | light | before | after | floor | ours | JOD after | JOD floor | gap | fit |
+|---|---|---|---|---|---|---|---|---|---|
 """
 
 
 def table_row(seed: int, light: str, found: Recovery) -> str:
     """One line of the table."""
-    flips = (found.before, found.after, found.floor, found.paired, found.model)
-    return f"| {seed} | {light} | " + " | ".join(f"{flip:.4f}" for flip in flips) + f" | {found.seconds:.0f} s |"
+    flips = " | ".join(f"{flip:.4f}" for flip in (found.before, found.after, found.floor, found.model))
+    jods = " | ".join("-" if jod is None else f"{jod:.2f}" for jod in (found.jod, found.jod_floor))
+    gap = "-" if found.gap is None else f"{100 * found.gap:.1f} %"
+    return f"| {seed} | {light} | {flips} | {jods} | {gap} | {found.seconds:.0f} s |"
 
 
 def summary(found: Sequence[Recovery], tried: int) -> str:
-    """How many were good enough, how many could not be told from the noise, and what was worst."""
+    """How many were good enough by each measure, and what was worst."""
     good = sum(recovery.after <= LIMIT for recovery in found)
-    drowned = sum(recovery.after > LIMIT and recovery.floor > LIMIT for recovery in found)
-    text = f"{good} of {tried} scenes have a mean FLIP of at most {LIMIT} after applying, {tried - len(found)} failed"
-    if drowned:
-        text += f", in {drowned} noise alone gives more"
-    if not found:
-        return f"{text}."
-    return f"{text}. With the same noise the largest is {max(recovery.paired for recovery in found):.4f}."
+    text = f"{good} of {tried} scenes have a mean FLIP of at most {LIMIT} after applying, {tried - len(found)} failed."
+    scores = [recovery.jod for recovery in found if recovery.jod is not None]
+    if scores:
+        high = sum(score >= LEAST_JOD for score in scores)
+        text += f" {high} of {len(scores)} have a JOD of at least {LEAST_JOD}, the lowest is {min(scores):.2f}."
+    return text + (f" The largest FLIP is {max(recovery.after for recovery in found):.4f}." if found else "")
 
 
 def main() -> None:
     """Recover all scenes and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--size", type=int, default=128)
-    parser.add_argument("--samples", type=int, default=512)
+    parser.add_argument("--size", type=int, default=Effort.size)
+    parser.add_argument("--samples", type=int, default=Effort.samples)
+    parser.add_argument("--judge-samples", type=int, default=Effort.judge_samples)
+    parser.add_argument("--judge", default=sys.executable, metavar="PYTHON", help="a Python with ColorVideoVDP")
     parser.add_argument("--only", nargs="*", metavar="SEED/LIGHT", help="print the rows of these scenes alone")
     parser.add_argument("--out", type=Path, help="keep the scenes here, and do not repeat those that are there")
     chosen = parser.parse_args()
+    effort = Effort(chosen.size, chosen.samples, chosen.judge_samples)
     scenes = [(seed, light) for seed, light in SCENES if not chosen.only or f"{seed}/{light}" in chosen.only]
     rows, found = [], []
     notes: dict[str, list[str]] = {}
@@ -165,7 +197,7 @@ def main() -> None:
         for seed, light in scenes:
             folder = (chosen.out or Path(temporary)).absolute() / str(seed)
             try:
-                found.append(_kept(folder) or recover(seed, light, folder, size=chosen.size, samples=chosen.samples))
+                found.append(_kept(folder) or recover(seed, light, folder, effort, chosen.judge))
             except RuntimeError as error:
                 rows.append(f"| {seed} | {light} | failed: {error} |")
             else:
@@ -175,7 +207,7 @@ def main() -> None:
             print(rows[-1], flush=True)
     print(summary(found, len(scenes)))
     if not chosen.only:
-        text = INTRODUCTION.format(size=chosen.size, samples=chosen.samples, own=OWN_SAMPLES) + "\n".join(rows)
+        text = INTRODUCTION.format(**asdict(effort), own=OWN_SAMPLES) + "\n".join(rows)
         lines = [f"- {note} Scenes {', '.join(seeds)}." for note, seeds in notes.items()]
         said = "\n\nNotes of the exporter and the fit:\n\n" + "\n".join(lines) if notes else ""
         TABLE.write_text(f"{text}\n\n{summary(found, len(scenes))}{said}\n", "utf-8")

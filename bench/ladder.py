@@ -4,7 +4,7 @@
     python bench/ladder.py [--scenes 30] [--size 48] [--rows ladder.jsonl] [--doc docs/ladder.md]
 
 Every scene is one line of the rows' file, so a run that was stopped goes on where it was; `--doc ""` only measures.
-Losses whose packages are missing are left out, and so is the judge ColorVideoVDP. The table and docs/ladder.svg
+Losses whose packages are missing are left out, and so is the judge ColorVideoVDP. The table and docs/pictures/ladder.svg
 replace what is there.
 """
 
@@ -34,7 +34,9 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("ladder.jsonl"))
     parser.add_argument("--doc", type=str, default=str(ROOT / "docs" / "ladder.md"))
     arguments = parser.parse_args()
-    rows = [json.loads(line) for line in arguments.rows.read_text("utf-8").splitlines()] if arguments.rows.exists() else []
+    rows = (
+        [json.loads(line) for line in arguments.rows.read_text("utf-8").splitlines()] if arguments.rows.exists() else []
+    )
     done = {row["scene"] for row in rows}
     missing = [number for number in range(arguments.scenes) if number not in done]
     if missing:

@@ -195,7 +195,7 @@ class _Study:
         self._ends: dict[Ladder, tuple[Sequence[Candidate], float, dict[str, int]]] = {(): ((start,), 1.0, {})}
 
     def climb(self, ladder: Ladder) -> tuple[Vector, float, dict[str, int]]:
-        """Values a fit with these stages ends with: the best of start and stages under the last loss and new samples."""
+        """Values a fit with these stages ends with: the best under the last loss on new samples; passes; iterations."""
         candidates, passes, iterations = self._run(ladder)
         loss = self._loss(ladder[-1])
         values = [loss.value(self._verified.image(c.vector, seed=0, spp=0)) for c in candidates]
@@ -237,9 +237,7 @@ class _Study:
         if name not in self._losses:
             background = self._run(())[0][0].image
             full = loss_in_range(name, "hdr")
-            (self._losses[name],) = stage_losses(
-                [full], self._reference, background, self._mask, self._settings, None
-            )
+            (self._losses[name],) = stage_losses([full], self._reference, background, self._mask, self._settings, None)
         return self._losses[name]
 
 

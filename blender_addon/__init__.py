@@ -7,8 +7,21 @@ import atexit
 
 import bpy
 
-from . import handlers, panel, preferences, previews, properties, running_job
+from . import (
+    backend_state,
+    comparison,
+    cycles_check,
+    handlers,
+    panel,
+    preferences,
+    preflight,
+    previews,
+    properties,
+    running_job,
+    translations,
+)
 from .operators import CLASSES as OPERATORS
+from .panel import menu
 from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
@@ -20,7 +33,10 @@ def register() -> None:
         bpy.utils.register_class(cls)
     properties.attach()
     previews.register()
+    menu.register()
     handlers.register()
+    translations.register()
+    backend_state.register()
     if is_module():
         atexit.register(unregister)  # what is still registered at its end crashes bpy 4.2 and stops bpy 4.5
 
@@ -29,7 +45,13 @@ def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
     running_job.close()
+    backend_state.close()
+    cycles_check.close()
     handlers.unregister()
+    preflight.reset()
+    comparison.forget()
+    menu.unregister()
+    translations.unregister()
     previews.unregister()
     properties.detach()
     for cls in reversed(CLASSES):

@@ -16,13 +16,8 @@ class BackendPythonError(Exception):
     """No usable interpreter; the message is one sentence for the user."""
 
 
-def is_chosen(preference: str) -> bool:
-    """Whether an interpreter is given at all; looks at no file, so that a panel may ask."""
-    return bool(os.environ.get(VARIABLE, "").strip() or preference.strip())
-
-
-def backend_python(preference: str) -> Path:
-    """The interpreter of the backend: the variable MFO_BACKEND_PYTHON, else `preference`.
+def backend_python(preference: str, installed: Path | None = None) -> Path:
+    """The interpreter of the backend: the variable MFO_BACKEND_PYTHON, else `preference`, else what is `installed`.
 
     Raises
     ------
@@ -32,10 +27,12 @@ def backend_python(preference: str) -> Path:
     given, origin = os.environ.get(VARIABLE, "").strip(), f"variable {VARIABLE}"
     if not given:
         given, origin = preference.strip(), "add-on preference Backend Python"
+    if not given and installed is not None:
+        return installed
     if not given:
         raise BackendPythonError(
-            "The backend Python is missing: choose the Python that has Mitsuba installed in the add-on preferences "
-            f"(Backend Python) or in the variable {VARIABLE}."
+            "The backend Python is missing: press Install in the add-on preferences, or choose a Python that has "
+            f"Mitsuba there (Backend Python) or in the variable {VARIABLE}."
         )
     path = Path(given).expanduser()
     # never resolve(): python of a virtual environment is a link, and its place says which packages it has

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a job as image datablocks: each one, and a strip of reference | result | difference."""
+"""The pictures of a job as image datablocks: each one, a strip of all, and reference and result split at a line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 
 NAMES = ("reference", "result", "difference")
 COMPARISON = "Material Fit comparison"
+SPLIT = "Material Fit split"
 GAP = 8  # pixels between two pictures
+
+Display = NDArray[np.float32]  # display values (height, width, 4), bottom row first as Blender keeps them
+_halves: tuple[Display, Display] | None = None
 
 
 def comparison_image(pictures: Path) -> bpy.types.Image:
@@ -22,7 +26,7 @@ def comparison_image(pictures: Path) -> bpy.types.Image:
     OSError
         If a picture is missing or unreadable.
     """
-    parts = [_pixels(_load(pictures / f"{name}.png", f"Material Fit {name}")) for name in NAMES]
+    parts = [_pixels(picture_image(pictures, name)) for name in NAMES]
     height = max(p.shape[0] for p in parts)
     width = sum(p.shape[1] for p in parts) + GAP * (len(parts) - 1)
     strip = np.zeros((height, width, 4), np.float32)
@@ -30,28 +34,63 @@ def comparison_image(pictures: Path) -> bpy.types.Image:
     for part in parts:
         strip[: part.shape[0], left : left + part.shape[1]] = part
         left += part.shape[1] + GAP
-    image = bpy.data.images.get(COMPARISON)
-    if image is not None and tuple(image.size) != (width, height):
-        bpy.data.images.remove(image)
-        image = None
-    if image is None:
-        image = bpy.data.images.new(COMPARISON, width, height, alpha=True)
-    image.pixels.foreach_set(strip.ravel())
+    return _packed(COMPARISON, strip)
+
+
+def split_image(pictures: Path, share: float) -> bpy.types.Image:
+    """One packed image, the reference in its left `share` and the result in the rest; `move_split` moves the line.
+
+    Raises
+    ------
+    OSError
+        If a picture is missing, unreadable, or of another size than the other.
+    """
+    global _halves
+    left, right = (_pixels(picture_image(pictures, name)) for name in ("reference", "result"))
+    if left.shape != right.shape:
+        raise OSError(f"{pictures} holds pictures of different sizes")
+    _halves = left, right
+    return _packed(SPLIT, _joined(left, right, share))
+
+
+def move_split(share: float) -> None:
+    """Move the line of the split image that was made last; nothing if there is none."""
+    image = bpy.data.images.get(SPLIT)
+    if image is None or _halves is None or tuple(image.size) != _halves[0].shape[1::-1]:
+        return
+    image.pixels.foreach_set(_joined(*_halves, share).ravel())
     image.update()
-    image.pack()  # a generated image loses its pixels when the file is saved
-    return image
 
 
-def _load(path: Path, name: str) -> bpy.types.Image:
+def has_split() -> bool:
+    """Whether there is a line that can be moved."""
+    return _halves is not None and SPLIT in bpy.data.images
+
+
+def forget() -> None:
+    """Free the pixels kept for `move_split`."""
+    global _halves
+    _halves = None
+
+
+def picture_image(pictures: Path, name: str) -> bpy.types.Image:
+    """One picture of a job folder, always the same image for the same name.
+
+    Raises
+    ------
+    OSError
+        If it is missing or unreadable.
+    """
+    path, label = pictures / f"{name}.png", f"Material Fit {name}"
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist")
-    image = bpy.data.images.get(name)
+    image = bpy.data.images.get(label)
     if image is None:
         try:
             image = bpy.data.images.load(str(path))
         except RuntimeError as error:
             raise OSError(str(error).strip()) from error
-        image.name = name
+        image.name = label
     else:
         image.filepath = str(path)
         image.reload()
@@ -60,8 +99,30 @@ def _load(path: Path, name: str) -> bpy.types.Image:
     return image
 
 
-def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
-    """Display values, float32 (height, width, 4), bottom row first as Blender keeps them."""
+def _joined(left: Display, right: Display, share: float) -> Display:
+    width = left.shape[1]
+    column = round(share * width)
+    joined = np.concatenate([left[:, :column], right[:, column:]], axis=1)
+    if 0 < column < width:
+        joined[:, column] = 1.0
+    return joined
+
+
+def _packed(name: str, pixels: Display) -> bpy.types.Image:
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.get(name)
+    if image is not None and tuple(image.size) != (width, height):
+        bpy.data.images.remove(image)
+        image = None
+    if image is None:
+        image = bpy.data.images.new(name, width, height, alpha=True)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    image.pack()  # a generated image loses its pixels when the file is saved
+    return image
+
+
+def _pixels(image: bpy.types.Image) -> Display:
     width, height = image.size
     pixels = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(pixels)

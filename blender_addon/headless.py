@@ -17,6 +17,8 @@ import json
 import os
 import shutil
 import sys
+import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -81,6 +83,13 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:
     """Put the values of a finished job on its material and save the file under another name."""
     bpy = _open(chosen.file)
+    material, _result, values, notes = _put_values(bpy, chosen)
+    _save(bpy, chosen.save_as)
+    return {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
+
+
+def _put_values(bpy: Any, chosen: argparse.Namespace) -> tuple[Any, Any, dict[str, Any], list[str]]:
+    """Apply a job's result; returns the material, the result, its values by socket and what was skipped."""
     from .job_result import JobResultError, read_job_result
     from .write_back import WriteBackError, apply_values, result_to_sockets
 
@@ -91,22 +100,41 @@ def apply(chosen: argparse.Namespace) -> dict[str, Any]:
         if material is None:
             raise HeadlessError(f"{chosen.file} has no material {name!r}: give the one to change with --material.")
         values = result_to_sockets(result)
-        notes = apply_values(material, values, result.folder)
+        return material, result, values, apply_values(material, values, result.folder)
     except (JobResultError, WriteBackError) as error:
         raise HeadlessError(str(error)) from error
-    _save(bpy, chosen.save_as)
-    return {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
+
+
+def check(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Render with the values of a finished job on its material, at the job's resolution and the scene's samples."""
+    bpy = _open(chosen.file)
+    _watch_parent(chosen.parent)
+    _material, result, _values, _notes = _put_values(bpy, chosen)
+    render, image = bpy.context.scene.render, result.image
+    if render.pixel_aspect_x == render.pixel_aspect_y and all(image):
+        render.resolution_x, render.resolution_y, render.resolution_percentage = *image, 100
+    return _render(bpy, chosen)
 
 
 def render(chosen: argparse.Namespace) -> dict[str, Any]:
     """Render the scene with Cycles into a scene-linear EXR at the scene's resolution."""
     bpy = _open(chosen.file)
+    _watch_parent(chosen.parent)
+    return _render(bpy, chosen)
+
+
+def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
+    from .versions import can_denoise
+
     scene = bpy.context.scene
     if scene.camera is None:
         raise HeadlessError(f"The scene of {chosen.file} has no camera: add one.")
     scene.render.engine = "CYCLES"
-    scene.cycles.samples, scene.cycles.seed = chosen.samples, chosen.seed
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    if chosen.samples:
+        scene.cycles.samples, scene.cycles.seed = chosen.samples, chosen.seed
+        scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    elif not can_denoise():
+        scene.cycles.use_denoising = False
     scene.render.use_compositing = scene.render.use_sequencer = False
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # Blender 5.0
@@ -148,10 +176,14 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--save-as", required=True, type=Path)
     command.add_argument("--material", default="")
-    command = add("render", render)
-    command.add_argument("--out", required=True, type=Path)
-    command.add_argument("--samples", type=int, default=64)
-    command.add_argument("--seed", type=int, default=0)
+    for name, run in (("render", render), ("check", check)):
+        command = add(name, run)
+        command.add_argument("--out", required=True, type=Path)
+        command.add_argument("--samples", type=int, default=64, help="0: the scene's own")
+        command.add_argument("--seed", type=int, default=0)
+        command.add_argument("--parent", type=int, default=0, help="end when this process is not the parent any more")
+    command.add_argument("--job", required=True, type=Path)
+    command.add_argument("--material", default="")
     command = add("demo-scene", demo_scene)
     command.add_argument("--scene-seed", type=int, default=0)
     command.add_argument("--size", type=int, default=256)
@@ -189,6 +221,18 @@ def _save(bpy: Any, path: Path) -> None:
 def _arguments() -> list[str]:
     """Those after `--` of a Blender command line, else all."""
     return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+
+
+def _watch_parent(pid: int) -> None:
+    """End this process when the one that started it is gone; a render cannot be asked to."""
+
+    def watch() -> None:
+        while os.getppid() == pid:
+            time.sleep(1.0)
+        os._exit(1)
+
+    if pid and os.name != "nt":  # Windows keeps the id of a parent that is gone
+        threading.Thread(target=watch, daemon=True).start()
 
 
 def _leave(code: int) -> NoReturn:

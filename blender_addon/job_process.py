@@ -15,9 +15,9 @@ import time
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from .backend_python import EXTENSION_ROOT, backend_environment
+from .process_group import KILL, TERMINATE, own_group, signal_group
 from .progress_lines import Event, read_events
 
 LOG = "backend.log"
@@ -85,7 +85,7 @@ class JobProcess:
                 stderr=log,
                 cwd=root,  # not the job folder: `-m` imports from here, and a job may come from a stranger
                 env=backend_environment(root),
-                **_own_group(),
+                **own_group(),
             )
         self._reader = threading.Thread(target=self._read, name="mfo-reader", daemon=True)
         self._reader.start()
@@ -127,7 +127,7 @@ class JobProcess:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(grace)
             if self._process.poll() is None:
-                self._signal(_KILL)
+                signal_group(self.pid, KILL)
                 self._process.wait()
             self._reader.join(PIPE_GRACE)
             self._end()
@@ -170,10 +170,9 @@ class JobProcess:
             )
         if code < 0:
             name = _signal_name(-code)
-            cause = (
-                "The backend was killed; the memory may have run out" if name == "SIGKILL" else "The backend crashed"
-            )
-            cause += f" ({name})"
+            # native code that gets no memory ends in a segmentation fault (Dr.Jit 1.5.0, Embree 3)
+            ended = "was killed" if name == "SIGKILL" else "crashed"
+            cause = f"The backend {ended} ({name}); the memory may have run out, so try a lower resolution"
         else:
             cause = _EXIT_SENTENCES.get(code, f"The backend ended with the unknown exit code {code}")
         tail = log_tail(self.folder / LOG)
@@ -197,22 +196,11 @@ class JobProcess:
 
     def _stop_after(self, seconds: float) -> None:
         now = time.monotonic()
-        self._deadlines = [(now + seconds, signal.SIGTERM), (now + seconds + TERMINATE_GRACE, _KILL)]
+        self._deadlines = [(now + seconds, TERMINATE), (now + seconds + TERMINATE_GRACE, KILL)]
 
     def _escalate(self) -> None:
         if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self._process.poll() is None:
-            self._signal(self._deadlines.pop(0)[1])
-
-    def _signal(self, number: int) -> None:
-        """Signal the whole group, so that what the backend started ends with it."""
-        with contextlib.suppress(OSError):
-            if os.name == "nt":
-                subprocess.run(["taskkill", "/T", "/F", "/PID", str(self.pid)], capture_output=True, check=False)
-            else:
-                os.killpg(self.pid, number)
-
-
-_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has no SIGKILL; taskkill /F is one anyway
+            signal_group(self.pid, self._deadlines.pop(0)[1])
 
 
 def log_tail(path: Path, lines: int = 40) -> str:
@@ -223,12 +211,6 @@ def log_tail(path: Path, lines: int = 40) -> str:
             return "\n".join(file.read().decode("utf-8", "replace").splitlines()[-lines:])
     except OSError:
         return ""
-
-
-def _own_group() -> dict[str, Any]:
-    if os.name == "nt":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
-    return {"start_new_session": True}
 
 
 def _signal_name(number: int) -> str:

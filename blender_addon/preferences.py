@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Add-on preferences: the Python of the backend and where job folders go."""
+"""Add-on preferences: the backend, its Python, and where job folders go."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
@@ -13,10 +13,17 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from .backend_python import VARIABLE
+from .backend_folder import installed_python
+from .backend_python import VARIABLE, backend_python
 
 # bl_ext.<repository>.material_fit_mfo as an extension, blender_addon when imported by itself
 ADDON_ID = (__package__ or "").removesuffix(".blender_addon")
+
+
+def _look_again(_self: object, _context: bpy.types.Context) -> None:
+    from . import backend_state  # it imports this module
+
+    backend_state.look()
 
 
 class MFO_AP_preferences(bpy.types.AddonPreferences):
@@ -26,8 +33,19 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
 
     backend_python: StringProperty(
         name="Backend Python",
-        description="Python with Mitsuba, for example .venv/bin/python of the environment made for Material Fit",
+        description="A Python of your own that has Mitsuba; empty: the one that Install makes",
         subtype="FILE_PATH",
+        update=_look_again,
+    )
+    base_python: StringProperty(
+        name="Install With",
+        description="Python 3.10 to 3.14 that carries the installed backend; empty: one is looked for",
+        subtype="FILE_PATH",
+    )
+    wheels: StringProperty(
+        name="Wheels",
+        description="Folder of downloaded packages to install from without network; empty: download them",
+        subtype="DIR_PATH",
     )
     job_root: StringProperty(
         name="Job Folders",
@@ -35,10 +53,17 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        """Two paths, and a line where the variable wins over the first."""
+    def draw(self, context: bpy.types.Context) -> None:
+        """The state of the backend, the paths, and a line where the variable wins over the first."""
+        from .backend_section import draw_setup  # it imports this module
+
         layout = self.layout
+        letters = int((context.region.width / context.preferences.system.ui_scale - 140) / 5.8)
+        draw_setup(layout, width=max(16, letters))
         layout.use_property_split = True
+        layout.prop(self, "base_python")
+        layout.prop(self, "wheels")
+        layout.separator()
         layout.prop(self, "backend_python")
         if os.environ.get(VARIABLE):
             layout.label(text=f"{VARIABLE} is set and used instead: {os.environ[VARIABLE]}", icon="INFO")
@@ -61,6 +86,25 @@ def new_job_folder(context: bpy.types.Context, label: str) -> Path:
         n += 1
         folder = Path(root) / f"{stem}_{n}"
     return folder
+
+
+def chosen_python(context: bpy.types.Context) -> Path:
+    """The interpreter of the backend.
+
+    Raises
+    ------
+    BackendPythonError
+        If there is none.
+    """
+    return backend_python(bpy.path.abspath(preference(context, "backend_python")), installed_python(backend_root()))
+
+
+def backend_root() -> Path:
+    """Folder of what Install makes; Blender deletes it with the extension. It need not exist."""
+    try:
+        return Path(bpy.utils.extension_path_user(ADDON_ID, path="backend", create=False))
+    except ValueError:  # not installed as an extension
+        return Path(bpy.utils.user_resource("DATAFILES"), "material_fit_mfo", "backend")
 
 
 def _default_root() -> str:

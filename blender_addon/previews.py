@@ -3,16 +3,22 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy.utils.previews
+import numpy as np
+
+from .export.png_file import write_png
 
 _collection: Any = None
 _shown: dict[str, str] = {}
 _serial = 0
+_is_warm = False
 _SWATCH = 16  # pixels
+_SMALL = 300_000  # bytes of a PNG that is read within some milliseconds
 
 
 def register() -> None:
@@ -30,14 +36,34 @@ def unregister() -> None:
         _collection = None
 
 
-def show(name: str, path: Path) -> None:
-    """Make the picture at `path` the icon called `name`, replacing an earlier one."""
+def warm_up() -> None:
+    """Load a picture of one pixel: the first picture of a session costs Blender some 50 ms more than any other.
+
+    An operator can afford them, the timer that shows the pictures of a running fit cannot.
+    """
+    global _is_warm
+    if _collection is None or bpy.app.background or _is_warm:
+        return
+    _is_warm = True
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pixel.png"
+        write_png(path, np.zeros((1, 1, 3), np.uint8))
+        show("pixel", path, now=True)
+
+
+def show(name: str, path: Path, *, now: bool = False) -> None:
+    """Make the picture at `path` the icon called `name`, replacing an earlier one.
+
+    Blender loads it after its first draw and shows an empty place meanwhile; with `now` a small one is loaded at once.
+    """
     global _serial
     if _collection is None or bpy.app.background or not path.is_file():
         return
     _serial += 1
     key = f"{name} {_serial}"  # a new key each time: Blender keeps the picture of a known one
-    _collection.load(key, str(path), "IMAGE")
+    picture = _collection.load(key, str(path), "IMAGE")
+    if now and path.stat().st_size < _SMALL:
+        _ = picture.image_size[0]  # asking loads it
     old = _shown.get(name)
     _shown[name] = key
     if old is not None:

@@ -17,6 +17,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import comparison
+
 # name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance
 _PARAMETERS = (
     ("base_color", "Base Color", "Colour of the diffuse or metallic surface"),
@@ -65,8 +67,19 @@ PRESET_ITEMS = (
 )
 
 
+# where a bound starts when it is switched on; elsewhere 0 to 1
+_RANGES = {"ior": (1.0, 3.0), "coat_ior": (1.0, 3.0), "thin_film_ior": (1.0, 3.0), "thin_film_thickness": (0.0, 1000.0)}
+
+
 def _has_pixels(_self: object, image: bpy.types.Image) -> bool:
     return image.source in {"FILE", "GENERATED"} and not image.name.startswith("Material Fit ")
+
+
+class MFO_PG_bound(bpy.types.PropertyGroup):
+    """Limits of one value during a fit, of every channel of a colour; the parameter's name in `name`."""
+
+    lower: FloatProperty(name="Least", description="The fit goes no lower", precision=3, step=1)
+    upper: FloatProperty(name="Most", description="The fit goes no higher", precision=3, step=1, default=1.0)
 
 
 class MFO_PG_settings(bpy.types.PropertyGroup):
@@ -113,6 +126,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         options={"ENUM_FLAG"},
         default=SOCKETS_START,
     )
+    bounds: CollectionProperty(type=MFO_PG_bound)
     model: EnumProperty(name="Model", description="Material model to fit", items=MODEL_ITEMS)
     range: EnumProperty(
         name="Range",
@@ -147,6 +161,10 @@ class MFO_PG_row(bpy.types.PropertyGroup):
     certainty: StringProperty()  # level in result.json, empty where unknown
 
 
+def _split_moved(runtime: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    comparison.move_split(runtime.split)
+
+
 class MFO_PG_runtime(bpy.types.PropertyGroup):
     """State of the current fit for the panel; set from `running_job`, reset when a file is loaded."""
 
@@ -160,34 +178,81 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
     progress_text: StringProperty()
     detail: StringProperty()
     has_result: BoolProperty()
-    checked: BoolProperty()  # the messages come from a check, not from the fit
+    split: FloatProperty(
+        name="Split",
+        description="How much of the picture in the Image Editor is the reference; the rest is the result",
+        min=0.0,
+        max=1.0,
+        default=0.5,
+        subtype="FACTOR",
+        update=_split_moved,
+        options={"SKIP_SAVE"},
+    )
+    cycles_text: StringProperty()  # how far the check in Cycles is, or what it found
+    cycles_flip: FloatProperty(default=-1.0)
     messages: CollectionProperty(type=MFO_PG_message)
     values: CollectionProperty(type=MFO_PG_row)
     errors: CollectionProperty(type=MFO_PG_row)
 
 
 class MFO_PG_socket_value(bpy.types.PropertyGroup):
-    """The value a socket had before `mfo.apply`: socket name in `name`, `size` numbers of `value`."""
+    """The value of a socket: its name in `name`, `size` numbers of `value`, and in a history how sure it is."""
 
     size: IntProperty(default=1, min=1, max=4)
     value: FloatVectorProperty(size=4, precision=6)
+    certainty: StringProperty()
+
+
+class MFO_PG_past_result(bpy.types.PropertyGroup):
+    """One result of a material: date and time in `name`, values as linear Rec.709; `flip` is -1 where unknown."""
+
+    job_folder: StringProperty(subtype="DIR_PATH")
+    preset: StringProperty()
+    flip_before: FloatProperty(default=-1.0)
+    flip: FloatProperty(default=-1.0)
+    partial: BoolProperty()
+    values: CollectionProperty(type=MFO_PG_socket_value)
 
 
 class MFO_PG_material(bpy.types.PropertyGroup):
-    """What was applied to a material and what it was before."""
+    """What was applied to a material, what it was before (both as the sockets hold it), and the results it had."""
 
     job_folder: StringProperty(subtype="DIR_PATH")
     originals: CollectionProperty(type=MFO_PG_socket_value)
+    applied: CollectionProperty(type=MFO_PG_socket_value)
+    shows_original: BoolProperty()  # A of A/B: the sockets hold `originals`, not `applied`
+    history: CollectionProperty(type=MFO_PG_past_result)
+    history_index: IntProperty(name="Result", description="One of the results this material had", options=set())
 
 
 CLASSES = (
+    MFO_PG_bound,
     MFO_PG_settings,
     MFO_PG_message,
     MFO_PG_row,
     MFO_PG_runtime,
     MFO_PG_socket_value,
+    MFO_PG_past_result,
     MFO_PG_material,
 )
+
+
+def toggle_bound(settings: bpy.types.PropertyGroup, name: str) -> None:
+    """Give the value `name` limits of its own, or take them away."""
+    index = settings.bounds.find(name)
+    if index >= 0:
+        settings.bounds.remove(index)
+        return
+    bound = settings.bounds.add()
+    bound.name = name
+    bound.lower, bound.upper = _RANGES.get(name, (0.0, 1.0))
+
+
+def crossed_limits(settings: bpy.types.PropertyGroup) -> list[str]:
+    """Labels of the chosen values whose least is not below their most."""
+    labels = {key: label for key, label, *_ in SOCKET_ITEMS}
+    crossed = (bound.name for bound in settings.bounds if not bound.lower < bound.upper)
+    return [labels[name] for name in crossed if name in settings.sockets and name in labels]
 
 
 def chosen_of(model: str) -> str:

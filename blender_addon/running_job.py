@@ -17,57 +17,55 @@ from pathlib import Path
 
 import bpy
 
-from . import previews
+from . import fit_queue, history, previews, shown_result
+from .fit_queue import PreparedFit
 from .job_process import Event, JobProcess, Outcome
-from .job_result import JobResult, JobResultError, Value, read_job_result
-from .write_back import WriteBackError, result_to_sockets, socket_to_parameter
+from .job_result import JobResult, JobResultError, read_job_result
+from .preflight import redraw
+from .shown_result import add_message
+from .versions import is_modal_operator_running
+from .write_back import WriteBackError
 
 TICK = 0.15  # seconds between two looks at the process
-_PICTURES = ("reference", "start", "result", "difference")
+PATIENCE = 60  # looks at a modal operator before a result goes into its history without an undo step
 _GOOD = {"converged", "stale", "unchanged", "max_iterations"}
-_ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
 
 
 @dataclass
 class RunningJob:
-    """A fit in progress and what is known of it so far."""
+    """A fit in progress."""
 
     process: JobProcess
-    material_name: str
-    material_uid: int
-    notes: Sequence[str]
-    is_new: bool
+    fit: PreparedFit
 
 
 current: RunningJob | None = None
-result: JobResult | None = None
-material_uid = 0  # of the material `result` belongs to, 0 when it came from another session
+unrecorded: list[tuple[JobResult, int]] = []  # results with their material's session_uid, not in its history yet
+_patience = PATIENCE
 
 
-def start(
-    process: JobProcess,
-    material: bpy.types.Material,
-    reference: Path,
-    notes: Sequence[str],
-    *,
-    is_new: bool,
-    timer: bool,
-) -> None:
-    """Take over a started process; `is_new`: its folder was made for it; `timer`: look after it while Blender runs."""
-    global current, result
-    result = None
-    current = RunningJob(process, material.name, material.session_uid, tuple(notes), is_new)
+def start(fit: PreparedFit, *, timer: bool) -> None:
+    """Start the backend on a job folder; with `timer` look after it, and then the queue, while Blender runs.
+
+    Raises
+    ------
+    OSError
+        If the backend cannot be started.
+    """
+    global current
+    current = RunningJob(JobProcess(fit.python, fit.folder), fit)
     atexit.register(close)
     runtime = _runtime()
-    _clear(runtime)
-    previews.clear()
-    runtime.state, runtime.material, runtime.job_folder = "RUNNING", material.name, str(process.folder)
+    shown_result.clear(runtime)
+    runtime.state, runtime.material, runtime.job_folder = "RUNNING", fit.material_name, str(fit.folder)
     runtime.progress_text = "Starting"
-    previews.show("reference", reference)
-    for note in notes:
+    previews.warm_up()
+    previews.show("reference", fit.reference)
+    for note in fit.notes:
         add_message(runtime, note, "INFO")
     if timer and not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+    redraw()
 
 
 def step() -> Outcome | None:
@@ -105,11 +103,13 @@ def cancel() -> None:
 
 
 def close() -> None:
-    """End a running fit within about a second and stop the timer."""
+    """End a running fit within about a second, empty the queue and stop the timer."""
     global current
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     atexit.unregister(close)
+    fit_queue.clear()
+    unrecorded.clear()
     if current is not None:
         current.process.close()
         current = None
@@ -117,50 +117,69 @@ def close() -> None:
 
 def reset() -> None:
     """Forget the last fit: its result, pictures and messages."""
-    global result, material_uid
-    result, material_uid = None, 0
-    previews.clear()
-    _clear(_runtime())
-
-
-def show_result(found: JobResult, uid: int) -> None:
-    """Make `found` the result that panel and `mfo.apply` use; `uid` is its material's session_uid or 0."""
-    global result, material_uid
-    result, material_uid = found, uid
-    runtime = _runtime()
-    runtime.checked = False
-    runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
-    for name, (before, after) in found.errors.items():
-        _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
-    for name, value in result_to_sockets(found).items():
-        _add_row(runtime.values, name, found.sockets_start.get(name), value)
-        runtime.values[-1].certainty = found.certainty.get(socket_to_parameter(name), "")
-    for note in found.notes:
-        if note not in runtime.messages:
-            add_message(runtime, note, "INFO")
-    for name in _PICTURES:
-        previews.show(name, found.folder / "pictures" / f"{name}.png")
+    shown_result.clear(_runtime())
 
 
 def fail(sentences: Sequence[str]) -> None:
     """Show errors that kept a fit from starting."""
     runtime = _runtime()
-    _clear(runtime)
-    runtime.state = "FAILED"
+    if current is None:
+        shown_result.clear(runtime)
+        runtime.state = "FAILED"
     runtime.sentence = sentences[0] if sentences else ""
     for sentence in sentences[1:]:
         add_message(runtime, sentence, "ERROR")
     redraw()
 
 
-def add_message(runtime: bpy.types.PropertyGroup, text: str, icon: str) -> None:
-    """Add one line to the panel's list."""
-    message = runtime.messages.add()
-    message.name, message.icon = text, icon
+def record_results() -> int:
+    """Put the results that are not there yet into the histories of their materials; returns how many found theirs."""
+    count = 0
+    materials = {material.session_uid: material for material in bpy.data.materials}
+    for result, uid in unrecorded:
+        material = materials.get(uid)
+        if material is not None and material.is_editable:
+            history.record(material, result)
+            count += 1
+    unrecorded.clear()
+    return count
 
 
 def _tick() -> float | None:
-    return TICK if current is not None and step() is None else None
+    if current is not None:
+        step()
+    if current is None:
+        _record_as_undo_step()
+        _start_next()
+    return TICK if current is not None or fit_queue.waiting or unrecorded else None
+
+
+def _record_as_undo_step() -> None:
+    """A change from a timer that undo does not know would be lost with the next undo."""
+    global _patience
+    window = next(iter(bpy.context.window_manager.windows), None)
+    if not unrecorded or window is None:
+        return
+    if not is_modal_operator_running():
+        with bpy.context.temp_override(window=window):
+            bpy.ops.mfo.record_results("EXEC_DEFAULT", True)
+    elif _patience > 0:  # an undo step in the middle of somebody's drag would cut it in two
+        _patience -= 1
+        return
+    else:
+        record_results()
+    _patience = PATIENCE
+
+
+def _start_next() -> None:
+    fit = None if unrecorded else fit_queue.take()
+    if fit is None:
+        return
+    try:
+        start(fit, timer=True)
+    except OSError as error:
+        fit_queue.ended(fit.material_name, f"The backend could not be started ({error.strerror or error}).", "ERROR")
+        redraw()
 
 
 def _handle(job: RunningJob, event: Event) -> None:
@@ -170,17 +189,23 @@ def _handle(job: RunningJob, event: Event) -> None:
             runtime.fraction = float(event["fraction"])
             if not job.process.cancelling:
                 runtime.progress_text = progress_text(event)
-            runtime.detail = f"{event['stage']}, iteration {event['iteration']}, loss {float(event['best']):.4g}"
+            runtime.detail = f"{event['stage']} · step {event['iteration']} · error {float(event['best']):.3g}"
         elif event["event"] == "preview":
-            path = (job.process.folder / event["path"]).resolve()
-            if path.is_relative_to(job.process.folder.resolve()):
-                previews.show("current", path)
+            _show_preview(job, "current", event["path"])
+            if "difference" in event:
+                _show_preview(job, "difference", event["difference"])
         elif event["event"] == "stage_end":
             line = "{stage}: {loss_start:.3g} to {loss_best:.3g}, {iterations} iterations ({status})"
             add_message(runtime, line.format_map(event), "CHECKMARK")
     except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
         return  # a newer backend says less or more than we know; its result is what counts
     redraw()
+
+
+def _show_preview(job: RunningJob, name: str, relative: str) -> None:
+    path = (job.process.folder / relative).resolve()
+    if path.is_relative_to(job.process.folder.resolve()):
+        previews.show(name, path, now=True)
 
 
 def progress_text(event: Event) -> str:
@@ -201,13 +226,18 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     runtime.progress_text, runtime.detail = "", ""
     try:
         if outcome.status in _GOOD or (job.process.folder / "result.json").is_file():
-            show_result(read_job_result(job.process.folder), job.material_uid)
+            found = read_job_result(job.process.folder)
+            shown_result.show(found, job.fit.material_uid)
+            unrecorded.append((found, job.fit.material_uid))
             runtime.state = "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
-    if outcome.status == "bad_input" and job.is_new and not runtime.has_result:
+    fit_queue.ended(job.fit.material_name, runtime.sentence, "CHECKMARK" if runtime.state == "DONE" else "ERROR")
+    if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:
         shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
         runtime.job_folder = ""
+    if bpy.app.background:
+        record_results()
     redraw()
 
 
@@ -219,47 +249,8 @@ def _remove_unfinished(folder: Path) -> None:
                 path.unlink()
 
 
-def _clear(runtime: bpy.types.PropertyGroup) -> None:
-    for name in (
-        "state",
-        "material",
-        "job_folder",
-        "sentence",
-        "fraction",
-        "progress_text",
-        "detail",
-        "has_result",
-        "checked",
-    ):
-        runtime.property_unset(name)
-    for rows in (runtime.messages, runtime.values, runtime.errors):
-        rows.clear()
-
-
 def _runtime() -> bpy.types.PropertyGroup:
     return bpy.context.window_manager.mfo_runtime
-
-
-def redraw() -> None:
-    """Have the sidebar drawn again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
-
-
-def _add_row(rows: bpy.types.bpy_prop_collection, label: str, before: Value | None, after: Value) -> None:
-    row = rows.add()
-    row.name = label
-    row.start, row.result = _shown(before), _shown(after)
-
-
-def _shown(value: Value | None) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, tuple):
-        return previews.swatch(value)
-    return f"{value:.3g}"
 
 
 def _duration(seconds: float) -> str:

@@ -98,6 +98,20 @@ def overrides_of(view_layer: bpy.types.ViewLayer) -> list[str]:
     return [owner.name for owner in owners if owner is not None]
 
 
+def can_denoise() -> bool:
+    """Whether this build has OpenImageDenoise; Debian's 4.3 has not, and refuses to render with denoising on."""
+    try:
+        import _cycles  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        return False
+    return getattr(_cycles, "with_openimagedenoise", True)
+
+
+def is_modal_operator_running() -> bool:
+    """Whether a drag or another modal operator runs in some window; never, where Blender does not tell."""
+    return any(getattr(window, "modal_operators", ()) for window in bpy.context.window_manager.windows)
+
+
 def is_module() -> bool:
     """Whether Blender is a module of this Python, not a program."""
     return not bpy.app.binary_path

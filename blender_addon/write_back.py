@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -74,7 +75,7 @@ def apply_values(material: bpy.types.Material, values: Mapping[str, Value], fold
     """
     if not material.is_editable:
         raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
-    node = principled_node(material)
+    node, kept = principled_node(material), material.mfo
     notes, changes = [], []
     for name, value in values.items():
         socket = node.inputs.get(name)
@@ -84,39 +85,67 @@ def apply_values(material: bpy.types.Material, values: Mapping[str, Value], fold
             notes.append(f"{name} has a link and was left as it is.")
         else:
             changes.append((socket, _fitting(socket, value)))
+    if kept.shows_original:
+        toggle_values(material)  # so that what is kept as the original stays apart from what was applied
     for socket, value in changes:
-        _keep_original(material.mfo, socket)
+        if socket.name not in kept.originals:
+            keep_value(kept.originals, socket.name, socket.default_value)
         socket.default_value = value
-    material.mfo.job_folder = str(folder)
+        keep_value(kept.applied, socket.name, socket.default_value)
+    kept.job_folder = str(folder)
     return notes
+
+
+def toggle_values(material: bpy.types.Material) -> list[str]:
+    """Give the sockets the other of what they were before and what was applied; what a user changed since is kept.
+
+    Returns what could not be set.
+    """
+    kept, node = material.mfo, principled_node(material)
+    left, entered = (kept.originals, kept.applied) if kept.shows_original else (kept.applied, kept.originals)
+    for value in left:
+        socket = node.inputs.get(value.name)
+        if socket is not None and value.size == len(_numbers(socket)):
+            keep_value(left, value.name, socket.default_value)
+    kept.shows_original = not kept.shows_original
+    return _restore(node, entered)
 
 
 def revert_values(material: bpy.types.Material) -> list[str]:
     """Give the sockets the values they had before the first `apply_values`; returns what could not be set."""
-    node = principled_node(material)
-    notes = []
-    for original in material.mfo.originals:
-        socket = node.inputs.get(original.name)
-        if socket is None:
-            notes.append(f"{original.name} does not exist any more and was skipped.")
-        elif original.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
-            notes.append(f"{original.name} was kept as {original.size} numbers and could not be set.")
-        elif original.size == 1:
-            socket.default_value = original.value[0]
-        else:
-            socket.default_value = original.value[: original.size]
-    material.mfo.originals.clear()
-    material.mfo.job_folder = ""
+    kept = material.mfo
+    notes = [] if kept.shows_original else _restore(principled_node(material), kept.originals)
+    kept.originals.clear()
+    kept.applied.clear()
+    kept.job_folder, kept.shows_original = "", False
     return notes
 
 
-def _keep_original(kept: bpy.types.PropertyGroup, socket: bpy.types.NodeSocket) -> None:
-    if socket.name in kept.originals:
-        return
-    numbers = _numbers(socket)
-    original = kept.originals.add()
-    original.name, original.size = socket.name, len(numbers)
-    original.value = (*numbers, 0.0, 0.0, 0.0)[:4]
+def keep_value(values: bpy.types.bpy_prop_collection, name: str, value: Any) -> bpy.types.PropertyGroup:
+    """Put the numbers of a socket (or of a result) into the entry of that name, made if there is none."""
+    numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
+    entry = values.get(name) or values.add()
+    entry.name, entry.size = name, len(numbers)
+    entry.value = (*numbers, 0.0, 0.0, 0.0)[:4]
+    return entry
+
+
+def kept_value(entry: bpy.types.PropertyGroup) -> Value:
+    """The number or numbers of an entry."""
+    return entry.value[0] if entry.size == 1 else tuple(entry.value[: entry.size])
+
+
+def _restore(node: bpy.types.ShaderNode, values: bpy.types.bpy_prop_collection) -> list[str]:
+    notes = []
+    for entry in values:
+        socket = node.inputs.get(entry.name)
+        if socket is None:
+            notes.append(f"{entry.name} does not exist any more and was skipped.")
+        elif entry.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
+            notes.append(f"{entry.name} was kept as {entry.size} numbers and could not be set.")
+        else:
+            socket.default_value = kept_value(entry)
+    return notes
 
 
 def _numbers(socket: bpy.types.NodeSocket) -> tuple[float, ...]:

@@ -6,26 +6,44 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 
+@dataclass(frozen=True)
+class Fix:
+    """What one press could mend: a key of `mending.KINDS`, and what it needs to know (a name, a size)."""
+
+    kind: str
+    argument: str = ""
+
+
 class ExportError(Exception):
     """The scene cannot be exported; the message is one sentence for the user."""
+
+    def __init__(self, sentence: str, *fixes: Fix) -> None:
+        super().__init__(sentence)
+        self.fixes = fixes
 
 
 @dataclass
 class Findings:
-    """Errors (the fit would be wrong) and notes (ignored or approximated), each sentence once, in order."""
+    """Errors (the fit would be wrong) and notes (ignored or approximated), each sentence once, in order.
+
+    `fixes` has what one press could do about a sentence.
+    """
 
     errors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    fixes: dict[str, tuple[Fix, ...]] = field(default_factory=dict)
 
-    def error(self, sentence: str) -> None:
+    def error(self, sentence: str, *fixes: Fix) -> None:
         """Remember that the export must not go on, and why."""
         if sentence not in self.errors:
             self.errors.append(sentence)
+            self.fixes[sentence] = fixes
 
-    def note(self, sentence: str) -> None:
+    def note(self, sentence: str, *fixes: Fix) -> None:
         """Remember what was left out or approximated."""
         if sentence not in self.notes:
             self.notes.append(sentence)
+            self.fixes[sentence] = fixes
 
     def raise_first(self) -> None:
         """Raise the first error.
@@ -36,4 +54,4 @@ class Findings:
             If anything was reported with `error`.
         """
         if self.errors:
-            raise ExportError(self.errors[0])
+            raise ExportError(self.errors[0], *self.fixes[self.errors[0]])

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +16,22 @@ LINEAR_NAMES = ("Linear Rec.709", "Linear", "scene_linear")
 SRGB_NAMES = ("sRGB",)
 
 
+_only_looking = False
+
+
 class UnreadableImageError(Exception):
     """The pixels cannot be had; the message is the end of a sentence that starts with the image's name."""
+
+
+@contextmanager
+def without_pixels() -> Iterator[None]:
+    """Within it `read_pixels` refuses what it always refuses and gives one grey pixel for the rest, at once."""
+    global _only_looking
+    before, _only_looking = _only_looking, True
+    try:
+        yield
+    finally:
+        _only_looking = before
 
 
 def is_data(image: bpy.types.Image) -> bool:
@@ -35,6 +52,9 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     width, height = image.size
     if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)):
         raise UnreadableImageError("has no pixels (is its file missing?)")
+    if _only_looking:
+        _refuse_colour_space(image)
+        return np.full((1, 1, 4), 0.5, dtype=np.float32)
     channels = image.channels
     raw = np.empty(width * height * channels, dtype=np.float32)
     image.pixels.foreach_get(raw)
@@ -49,9 +69,13 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     if image.is_float:  # Blender converts float files to its working space when it loads them
         pixels[:, :, :3] = to_rec709(pixels[:, :, :3])
         return pixels
-    space = image.colorspace_settings.name
-    if space in SRGB_NAMES:
+    _refuse_colour_space(image)
+    if image.colorspace_settings.name in SRGB_NAMES:
         pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
-    elif space not in LINEAR_NAMES:
-        raise UnreadableImageError(f"has the colour space {space}; set it to sRGB, Linear Rec.709 or Non-Color")
     return pixels
+
+
+def _refuse_colour_space(image: bpy.types.Image) -> None:
+    space = image.colorspace_settings.name
+    if not (is_data(image) or image.is_float or space in SRGB_NAMES or space in LINEAR_NAMES):
+        raise UnreadableImageError(f"has the colour space {space}; set it to sRGB, Linear Rec.709 or Non-Color")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from .scene_file import SceneFiles, scene_files
 
 SCHEMA_VERSION = 1
 
-__all__ = ["ExportError", "ExportReport", "check_export", "export_job"]
+__all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job"]
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,13 @@ def export_job(
     reference: Path | bpy.types.Image | None,
     fit: dict[str, Any],
     bake_view: bool = False,
+    tell: Callable[[float], None] = lambda _share: None,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
     With `bake_view` a display picture is taken under any view of the scene, whose table goes into the job; else one
-    that cannot be undone by a formula is refused.
+    that cannot be undone by a formula is refused. `tell` gets the share that is done, of work that a million triangles
+    make some seconds long.
 
     Raises
     ------
@@ -56,6 +59,7 @@ def export_job(
     data = read_scene(context, obj, findings)
     findings.raise_first()
     assert data is not None
+    tell(0.4)
     picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height), bake_view=bake_view)
     if picture is not None and picture.view is not None:
         findings.note(
@@ -63,9 +67,11 @@ def export_job(
             "scene has it now: the reference must have been rendered with the same look, exposure, gamma and curves."
         )
     files = scene_files(data, findings)
+    tell(0.5)
     request = _request(context, obj, data, files, picture, fit, findings)
     with new_job_folder(Path(folder)) as partial:
         files.write(partial)
+        tell(0.9)
         if picture is not None:
             picture.write(partial)
         (partial / "request.json").write_text(
@@ -76,11 +82,17 @@ def export_job(
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:
     """Return the errors and the notes an export would give, without writing anything."""
+    findings = export_findings(context, obj)
+    return findings.errors, findings.notes
+
+
+def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findings:
+    """Return what an export would say, with what could be done about it, without writing anything."""
     findings = Findings()
     data = read_scene(context, obj, findings)
     if data is not None:
         scene_files(data, findings)
-    return findings.errors, findings.notes
+    return findings
 
 
 def _request(
@@ -115,6 +127,7 @@ def _request(
     request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
     if picture is not None and picture.view is not None:
         request["view"]["lut"] = picture.view.request()
+    request["light_paths"] = data.settings.light_paths
     request["materials"] = {
         identifier: _material(material, files)
         for identifier, material in data.materials.items()

@@ -65,7 +65,8 @@ def approximated(material: Material) -> list[str]:
     """Return a sentence for each thing that no model of the backend has, Blender's own included."""
     found = []
     if material.value("Subsurface Weight", 0.0) != 0.0:
-        found.append("Subsurface is fitted as diffuse: no light travels below the surface.")
+        weight = "" if material.value("Diffuse Roughness", 0.0) else " Its weight has no effect at Diffuse Roughness 0."
+        found.append(f"Subsurface is fitted as diffuse: no light travels below the surface.{weight}")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
     above = [

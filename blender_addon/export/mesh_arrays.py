@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from .ply_file import TriangleMesh
 
+FARTHEST = 1e18  # metres; the square of a distance must fit into a float32
+
 
 @dataclass(frozen=True)
 class CornerMesh:
@@ -26,10 +28,14 @@ class CornerMesh:
 def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:
     """Return the triangles selected by `slots` (triangles,) moved by the 4x4 `matrix`, equal corners shared.
 
-    Normals move with the inverse transpose. A mirroring matrix turns the winding around, so that the side a normal
-    points to stays the outside, as in Cycles.
+    Triangles with a corner at NaN or farther than FARTHEST are left out. Normals move with the inverse
+    transpose. A mirroring matrix turns the winding around, so that the side a normal points to stays the outside, as in
+    Cycles.
     """
-    positions = mesh.positions[slots].reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    with np.errstate(invalid="ignore", over="ignore"):
+        triangle_corners = mesh.positions[slots].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        held = (np.abs(triangle_corners) < FARTHEST).all(axis=(1, 2))  # False for NaN
+    positions = triangle_corners[held].reshape(-1, 3)
     linear = matrix[:3, :3]
     mirrored = np.linalg.det(linear) < 0.0
     # adjugate transpose instead of the inverse: it exists for flat matrices too
@@ -38,12 +44,12 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     )
     if mirrored:
         cofactor = -cofactor
-    normals = mesh.normals[slots].reshape(-1, 3).astype(np.float64) @ cofactor.T
+    normals = mesh.normals[slots][held].reshape(-1, 3).astype(np.float64) @ cofactor.T
     lengths = np.linalg.norm(normals, axis=1)
     flat = _face_normals(positions.reshape(-1, 3, 3), mirrored)
     normals = np.where(lengths[:, None] > 1e-20, normals / np.maximum(lengths, 1e-20)[:, None], flat)
     # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
-    uvs = mesh.uvs[slots].reshape(-1, 2) * (1.0, -1.0) + (0.0, 1.0)
+    uvs = np.nan_to_num(mesh.uvs[slots][held].reshape(-1, 2), posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
     corners = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
     vertices, index = _shared(corners + np.float32(0.0))  # -0.0 and 0.0 are one vertex
     triangles = index.reshape(-1, 3).astype(np.int32)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..versions import cycles_settings
 from .camera_model import Camera, PixelFilter
-from .findings import Findings
+from .findings import Findings, Fix
 
 
 def picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
@@ -19,24 +19,13 @@ def picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
 
 def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings: Findings) -> Camera | None:
     """Return the scene camera, or None with an error in `findings`."""
-    if scene.camera is None or scene.camera.type != "CAMERA":
-        findings.error("The scene has no camera: add one and make it the active camera.")
+    if not has_camera(scene, findings):
         return None
     evaluated = scene.camera.evaluated_get(depsgraph)
     data = evaluated.data
     render = scene.render
     name = scene.camera.name
-    if data.type not in ("PERSP", "ORTHO"):
-        findings.error(f"Camera '{name}' is of type {data.type.title()}: make it Perspective or Orthographic.")
-        return None
-    if render.use_border:
-        findings.error("Render Region is on, so the picture shows a part of the frame: turn Render Region off.")
-    if render.use_multiview:
-        findings.error("Stereoscopy is on: turn it off to fit a single picture.")
-    if data.dof.use_dof:
-        findings.note(f"Camera '{name}': depth of field is left out, everything is sharp.")
-    if render.use_motion_blur:
-        findings.note("Motion blur is left out: the scene is exported at the current frame.")
+    note_picture_settings(scene, findings)
     width, height = picture_size(render)
     aspect = render.pixel_aspect_x / render.pixel_aspect_y
     square_width, square_height = (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
@@ -68,6 +57,36 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings
         clip_start=data.clip_start,
         clip_end=data.clip_end,
     )
+
+
+def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
+    """Report what the scene's camera and output settings do to a picture and the fit does not."""
+    render = scene.render
+    if render.use_border:
+        findings.error(
+            "Render Region is on, so the picture shows a part of the frame: turn Render Region off.", Fix("whole_frame")
+        )
+    if render.use_multiview:
+        findings.error("Stereoscopy is on: turn it off to fit a single picture.", Fix("one_eye"))
+    if scene.camera.data.dof.use_dof:
+        findings.note(f"Camera '{scene.camera.name}': depth of field is left out, everything is sharp.")
+    if render.use_motion_blur:
+        findings.note("Motion blur is left out: the scene is exported at the current frame.")
+
+
+def has_camera(scene: bpy.types.Scene, findings: Findings) -> bool:
+    """Whether the scene camera is one the fit knows; else an error in `findings` says why not."""
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA":
+        names = [item.name for item in scene.objects if item.type == "CAMERA"]
+        fixes = [Fix("camera", name) for name in names[:3]] or [Fix("new_camera")]
+        findings.error("The scene has no camera: add one and make it the active camera.", *fixes)
+        return False
+    if camera.data.type not in ("PERSP", "ORTHO"):
+        sentence = f"Camera '{camera.name}' is of type {camera.data.type.title()}: make it Perspective or Orthographic."
+        findings.error(sentence, Fix("perspective"))
+        return False
+    return True
 
 
 def read_pixel_filter(scene: bpy.types.Scene) -> PixelFilter:

@@ -7,7 +7,7 @@ import bpy
 
 from ..versions import PRINCIPLED, active_output, default_surface_is_principled, node_tree_of
 from .color_space import to_rec709
-from .findings import Findings
+from .findings import Findings, Fix
 from .material_model import Material, Socket, grey
 from .shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 
@@ -48,12 +48,14 @@ def principled_node(material: bpy.types.Material | None) -> bpy.types.Node | Non
 def read_target(material: bpy.types.Material | None, owner: str, slot: int, findings: Findings) -> Material | None:
     """Return the material to fit, or None with an error in `findings`."""
     if material is None:
-        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.")
+        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
+                       Fix("new_material"))  # fmt: skip
         return None
     node = principled_node(material)
     if node is None:
         findings.error(
-            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly."
+            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly.",
+            Fix("principled"),
         )
         return None
     _note_volume(material, findings)
@@ -85,6 +87,8 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     sockets = {name: Socket(value) for name, value in constants.items()}
     for name, theirs in renamed.items():
         sockets[name] = _read(node.inputs[theirs], material.name, False, findings)
+    if model == "null" and list(node.inputs["Color"].default_value)[:3] != [1.0, 1.0, 1.0]:
+        findings.note(f"Material '{material.name}': {node.bl_label} is taken for white.")
     if model == "principled" or (model == "diffuse" and node.inputs["Roughness"].default_value > 0.0):
         findings.note(f"Material '{material.name}': {node.bl_label} is approximated by its closest simple equivalent.")
     return Material(material.name, model, sockets)
@@ -98,15 +102,31 @@ def _read_principled(
         if socket.name in SKIPPED_SOCKETS:
             continue
         if socket.name in NORMAL_SOCKETS:
-            linked = source_of(socket) is not None
-            sockets[socket.name] = Socket(plain_value(socket), linked)
-            if linked:
-                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+            source = source_of(socket)
+            sockets[socket.name] = Socket(plain_value(socket), source is not None)
+            if source is not None and not (socket.name == "Tangent" and _is_uv_tangent(source.node)):
+                fixes = (Fix("unlink", socket.name),) if is_target else ()
+                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.", *fixes)
             continue
         sockets[socket.name] = _read(socket, material.name, is_target, findings)
-    return Material(
-        material.name, "principled", sockets, node.distribution, getattr(node, "subsurface_method", "RANDOM_WALK")
-    )
+    method = getattr(node, "subsurface_method", "RANDOM_WALK")
+    found = Material(material.name, "principled", sockets, node.distribution, method)
+    _note_default_tangent(found, findings)
+    return found
+
+
+def _note_default_tangent(material: Material, findings: Findings) -> None:
+    """Without a link Blender's tangent circles the object's Z axis, and that of the fit follows the UV map."""
+    if not material.sockets["Tangent"].linked and material.value("Anisotropic", 0.0) != 0.0:
+        findings.note(
+            f"Material '{material.name}': Tangent has no link, so that Cycles turns the anisotropy about the object's "
+            "Z axis, and the fit along the UV map: link a Tangent node of direction UV Map."
+        )
+
+
+def _is_uv_tangent(node: bpy.types.Node) -> bool:
+    """Whether a node gives the tangent of the object's active UV map."""
+    return node.bl_idname == "ShaderNodeTangent" and node.direction_type == "UV_MAP" and not node.uv_map
 
 
 def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings: Findings) -> Socket:
@@ -116,7 +136,8 @@ def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings
         if is_target:
             findings.error(
                 f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported: unlink it "
-                "or use an image texture."
+                "or use an image texture.",
+                Fix("unlink", socket.name),
             )
         else:
             findings.note(

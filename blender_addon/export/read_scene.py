@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ..versions import cycles_settings, has_compositor, overrides_of
-from .findings import Findings
+from .findings import Findings, Fix
 from .material_model import Material
 from .mesh_arrays import CornerMesh, joined, world_mesh
 from .ply_file import TriangleMesh
@@ -24,6 +26,7 @@ from .visibility import check_visible
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
 DEFAULT_SPP = 64
+BOUNCES = ("diffuse", "glossy", "transmission")
 
 
 def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
@@ -36,7 +39,8 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
     if overrides_of(view_layer):
         findings.error(
             f"View layer '{view_layer.name}' replaces materials or the world by '{overrides_of(view_layer)[0]}': "
-            "remove the override."
+            "remove the override.",
+            Fix("no_override"),
         )
         return None
     if has_compositor(scene):
@@ -54,7 +58,7 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run()
         if data.target is None:
             if target.name_full not in rendered_objects(view_layer):
-                findings.error(f"Object '{target.name}' is hidden in the render: show it.")
+                findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
             else:
                 findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
             return None
@@ -74,26 +78,27 @@ def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings
         return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
     if cycles.sample_clamp_direct > 0.0:
         findings.note("Cycles clamps direct light; the fit does not.")
-    _note_limits(cycles, findings)
+    light_paths = _read_light_paths(cycles, findings)
     # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
-    bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces))
-    return RenderSettings(pixel_filter, bounces + 2, scene.render.film_transparent, cycles.film_exposure, DEFAULT_SPP)
+    depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
+    exposure = cycles.film_exposure
+    return RenderSettings(pixel_filter, depth, scene.render.film_transparent, exposure, DEFAULT_SPP, light_paths)
 
 
-def _note_limits(cycles: bpy.types.PropertyGroup, findings: Findings) -> None:
-    """List the settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
-    used = []
-    if cycles.blur_glossy > 0.0 and cycles.max_bounces > 0:
-        used.append(f"Filter Glossy ({cycles.blur_glossy:.3g})")
+def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
+    """The settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
     if cycles.sample_clamp_indirect > 0.0:
-        used.append(f"clamping of indirect light ({cycles.sample_clamp_indirect:.3g})")
-    bounces = {kind: getattr(cycles, f"{kind}_bounces") for kind in ("diffuse", "glossy", "transmission")}
-    most = min(max(bounces.values()), cycles.max_bounces)
-    used += [f"limit of {count} {kind} bounces" for kind, count in bounces.items() if count < most]
+        findings.note(
+            f"Clamping of indirect light ({cycles.sample_clamp_indirect:.3g}) works on single samples, and those of "
+            "the fit are not Cycles': how much light it takes away may differ."
+        )
     if not (cycles.caustics_reflective and cycles.caustics_refractive):
-        used.append("removal of caustics")
-    if used:
-        findings.note(f"Left out of the fit: Cycles' {', '.join(used)}. They change indirect light only.")
+        findings.note("Cycles removes caustics; the fit does not.")
+    return {
+        "filter_glossy": cycles.blur_glossy,
+        "clamp_indirect": cycles.sample_clamp_indirect * cycles.film_exposure,
+        **{f"{kind}_bounces": getattr(cycles, f"{kind}_bounces") for kind in BOUNCES},
+    }
 
 
 class _Walk:
@@ -156,6 +161,14 @@ class _Walk:
         slots = np.clip(mesh.slots, 0, last)
         for slot in np.unique(slots):
             piece = world_mesh(mesh, slots == slot, matrix)
+            left_out = int((slots == slot).sum()) - len(piece.triangles)
+            if left_out:
+                self.findings.note(
+                    f"Object '{item.name}' has {left_out} triangles with corners at NaN, infinite or absurdly far "
+                    "positions; they are left out."
+                )
+            if not len(piece.triangles):
+                continue
             if is_target and slot == self.slot:
                 self.target_pieces.append((piece, mesh.is_closed))
                 continue

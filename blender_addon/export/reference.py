@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .exr_file import write_exr
-from .findings import ExportError
+from .findings import ExportError, Fix
 from .image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from .png_file import write_png
 from .view_lut import ViewLut, bake_view_lut
@@ -78,8 +78,7 @@ def read_reference(
     if not path.is_file():
         raise ExportError(f"The reference {path} does not exist: choose another file.")
     suffix = path.suffix.lower()
-    if suffix not in LINEAR_SUFFIXES + DISPLAY_SUFFIXES:
-        raise ExportError(f"The reference {path.name} is no picture we read: use EXR, HDR, PNG, JPEG or TIFF.")
+    refuse_suffix(path)
     if stretched:
         image = bpy.data.images.load(str(path), check_existing=False)
         try:
@@ -89,6 +88,27 @@ def read_reference(
     if suffix in LINEAR_SUFFIXES:
         return Reference(f"reference{suffix}", "linear", source=path)
     return Reference(f"reference{suffix}", "srgb", source=path, view=_view_table(scene, path.name, bake_view))
+
+
+def refuse_suffix(path: Path) -> None:
+    """Raise `ExportError` for the name of something that is no picture the backend reads."""
+    if path.suffix.lower() not in LINEAR_SUFFIXES + DISPLAY_SUFFIXES:
+        raise ExportError(f"The reference {path.name} is no picture we read: use EXR, HDR, PNG, JPEG or TIFF.")
+
+
+def holds_display_colours(image: bpy.types.Image) -> bool:
+    """Whether an image of the .blend went through a view; else it is taken as scene-linear."""
+    return image.colorspace_settings.name in SRGB_NAMES and image.file_format not in LINEAR_FORMATS
+
+
+def refuse_size(name: str, found: tuple[int, int], wanted: tuple[int, int]) -> None:
+    """Raise `ExportError` where a reference has another size (width, height) than the render."""
+    if found != wanted:
+        raise ExportError(
+            f"The reference '{name}' is {found[0]}x{found[1]}, but the scene renders {wanted[0]}x{wanted[1]}: set the "
+            "output resolution to the reference's.",
+            Fix("resolution", f"{found[0]}x{found[1]}"),
+        )
 
 
 def _from_image(
@@ -102,14 +122,10 @@ def _from_image(
     render = scene.render
     wanted = (render.resolution_x * render.resolution_percentage // 100,
               render.resolution_y * render.resolution_percentage // 100) if stretched else size  # fmt: skip
-    if (width, height) != wanted:
-        raise ExportError(
-            f"The reference '{image.name}' is {width}x{height}, but the scene renders {wanted[0]}x{wanted[1]}: set the "
-            "output resolution to the reference's."
-        )
+    refuse_size(image.name, (width, height), wanted)
     if stretched:
         pixels = _stretch(pixels, size)
-    if image.colorspace_settings.name not in SRGB_NAMES or image.file_format in LINEAR_FORMATS:
+    if not holds_display_colours(image):
         return Reference("reference.exr", "linear", pixels=pixels)
     view = _view_table(scene, image.name, bake_view)
     encoded = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055)
@@ -119,7 +135,17 @@ def _from_image(
 
 
 def _view_table(scene: bpy.types.Scene, name: str, bake_view: bool) -> ViewLut | None:
-    """None for a view that did nothing but exposure, gamma and the sRGB curve: a formula undoes it. Else its table."""
+    return bake_view_lut(scene) if needs_table(scene, name, bake_view) else None
+
+
+def needs_table(scene: bpy.types.Scene, name: str, bake_view: bool) -> bool:
+    """False for a view that did nothing but exposure, gamma and the sRGB curve: a formula undoes it.
+
+    Raises
+    ------
+    ExportError
+        If a table is needed and `bake_view` does not allow it, or none can be made.
+    """
     view, device = scene.view_settings, scene.display_settings.display_device
     reasons = []
     if view.view_transform != "Standard":
@@ -131,15 +157,19 @@ def _view_table(scene: bpy.types.Scene, name: str, bake_view: bool) -> ViewLut |
     if getattr(view, "use_white_balance", False):
         reasons.append("a white balance")
     if device == "sRGB" and (bake_view or not reasons):
-        return bake_view_lut(scene) if reasons else None
+        return bool(reasons)
     cure = "render the reference as OpenEXR, or render it again with the view transform Standard and no look"
     if device == "sRGB":
         cure += ", or turn on Bake View (--bake-view) if it was rendered under this view"
     else:
         reasons.append(f"the display device {device}")
+    fixes = (Fix("render_exr"),)
+    if device == "sRGB":
+        fixes = (Fix("bake_view"), Fix("standard_view"), Fix("render_exr"))
     raise ExportError(
         f"The reference {name} holds display colours and the scene uses {' and '.join(reasons)}, which cannot be "
-        f"undone: {cure}."
+        f"undone: {cure}.",
+        *fixes,
     )
 
 

@@ -30,13 +30,17 @@ class Shape:
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """What the picture needs beside the scene. `exposure` is Cycles' film exposure, already in every light."""
+    """What the picture needs beside the scene. `exposure` is Cycles' film exposure, already in every light.
+
+    `light_paths` is that object of request.json: what Cycles does to indirect light.
+    """
 
     pixel_filter: PixelFilter
     max_depth: int
     film_transparent: bool
     exposure: float
     spp: int
+    light_paths: dict[str, float | int] = field(default_factory=dict)
 
 
 @dataclass

@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: fit, cancel, check, apply, revert, look at pictures and report."""
+"""What a user or a script can do: set up the backend, check, fit, cancel, apply, revert, go back, look at pictures."""
 
-from . import apply, fit, pictures
+from . import apply, backend, check, cycles, fit, history, pictures
 
-CLASSES = (*fit.CLASSES, *apply.CLASSES, *pictures.CLASSES)
+CLASSES = (
+    *check.CLASSES,
+    *fit.CLASSES,
+    *apply.CLASSES,
+    *history.CLASSES,
+    *cycles.CLASSES,
+    *pictures.CLASSES,
+    *backend.CLASSES,
+)

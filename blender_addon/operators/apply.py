@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`mfo.apply` and `mfo.revert`, each one undo step."""
+"""`mfo.apply`, `mfo.revert` and `mfo.toggle` (A/B), each one undo step."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
@@ -9,9 +9,9 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from .. import running_job
+from .. import running_job, shown_result
 from ..job_result import JobResult, JobResultError, read_job_result
-from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values
+from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values, toggle_values
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -40,7 +40,7 @@ class MFO_OT_apply(bpy.types.Operator):
         if not bpy.app.background and not context.window_manager.mfo_runtime.has_result:
             cls.poll_message_set("There is no result yet; run a fit")
             return False
-        fitted = _fitted_material()
+        fitted = shown_result.material()
         if fitted is not None and not fitted.is_editable:
             cls.poll_message_set("The material comes from a library; make it local first")
             return False
@@ -63,14 +63,14 @@ class MFO_OT_apply(bpy.types.Operator):
     def _result(self) -> JobResult:
         if self.job_folder:
             return read_job_result(Path(bpy.path.abspath(self.job_folder)))
-        if running_job.result is None:
+        if shown_result.result is None:
             raise JobResultError("There is no result yet: run a fit, or give the folder of a finished job.")
-        return running_job.result
+        return shown_result.result
 
     def _material(self, result: JobResult) -> bpy.types.Material:
         name = self.material or result.material_name
-        of_this_session = not self.material and not self.job_folder and running_job.material_uid
-        found = _fitted_material() if of_this_session else bpy.data.materials.get(name)
+        of_this_session = not self.material and not self.job_folder and shown_result.material_uid
+        found = shown_result.material() if of_this_session else bpy.data.materials.get(name)
         if found is None:
             raise WriteBackError(f"Material {name!r} is not in this file (any more): name the one to change.")
         return found
@@ -98,17 +98,8 @@ class MFO_OT_revert(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the kept values."""
-        obj = context.view_layer.objects.active
-        material = bpy.data.materials.get(self.material) if self.material else (obj.active_material if obj else None)
         try:
-            if material is None:
-                raise WriteBackError("There is no material to revert: select its object or give its name.")
-            if not material.mfo.originals:
-                raise WriteBackError(f"Nothing was applied to material {material.name!r}, so nothing can be reverted.")
-            if not material.is_editable:
-                raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
-            principled_node(material)
-            notes = revert_values(material)
+            notes = revert_values(applied_material(context, self.material))
         except WriteBackError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -117,10 +108,44 @@ class MFO_OT_revert(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _fitted_material() -> bpy.types.Material | None:
-    """The material of the last fit under whatever name it has by now."""
-    uid = running_job.material_uid
-    return next((m for m in bpy.data.materials if m.session_uid == uid), None) if uid else None
+class MFO_OT_toggle(bpy.types.Operator):
+    """Switch the active material between its own values (A) and the recovered ones (B)"""
+
+    bl_idname = "mfo.toggle"
+    bl_label = "Toggle Own and Recovered Values"
+    bl_options = {"REGISTER", "UNDO"}
+
+    material: StringProperty(name="Material", description="Empty: the active object's", options=_SCRIPT)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """In windows only where values were applied."""
+        return MFO_OT_revert.poll.__func__(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the other values."""
+        try:
+            notes = toggle_values(applied_material(context, self.material))
+        except WriteBackError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for note in notes:
+            self.report({"WARNING"}, note)
+        return {"FINISHED"}
 
 
-CLASSES = (MFO_OT_apply, MFO_OT_revert)
+def applied_material(context: bpy.types.Context, name: str) -> bpy.types.Material:
+    """The material of that name, or the active object's, to which values were applied and may be again."""
+    active = context.object.active_material if context.object else None
+    material = bpy.data.materials.get(name) if name else active
+    if material is None:
+        raise WriteBackError("There is no material to revert: select its object or give its name.")
+    if not material.mfo.originals:
+        raise WriteBackError(f"Nothing was applied to material {material.name!r}, so nothing can be reverted.")
+    if not material.is_editable:
+        raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
+    principled_node(material)
+    return material
+
+
+CLASSES = (MFO_OT_apply, MFO_OT_revert, MFO_OT_toggle)

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ..comparison import COMPARISON, comparison_image
+from ..comparison import comparison_image, picture_image, split_image
 
 
 class _JobOperator:
@@ -29,30 +29,44 @@ class _JobOperator:
 
 
 class MFO_OT_show_pictures(_JobOperator, bpy.types.Operator):
-    """Show reference, result and difference side by side in an open Image Editor"""
+    """Show pictures of the fit in an Image Editor, in a new window if none is open"""
 
     bl_idname = "mfo.show_pictures"
     bl_label = "Compare Pictures"
     bl_options = {"REGISTER", "UNDO"}
 
     job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", options={"HIDDEN", "SKIP_SAVE"})
+    show: StringProperty(
+        name="Show",
+        description='"strip", "split" or the name of one picture, as reference, start, result, difference or cycles',
+        default="strip",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        """A tooltip for each kind of view."""
+        return {
+            "strip": "Show reference, result and difference side by side in an Image Editor",
+            "split": "Show reference and result as one picture with a line between them that the slider moves",
+        }.get(properties.show, f"Show the picture {properties.show} at full size in an Image Editor")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Load the pictures, build the strip, show it."""
+        """Load the pictures, build the image, show it."""
+        pictures = Path(self.folder(context)) / "pictures"
         try:
-            image = comparison_image(Path(self.folder(context)) / "pictures")
+            if self.show == "strip":
+                image = comparison_image(pictures)
+            elif self.show == "split":
+                image = split_image(pictures, context.window_manager.mfo_runtime.split)
+            else:
+                image = picture_image(pictures, Path(self.show).name)
         except OSError as error:
             self.report({"ERROR"}, f"The pictures of the fit cannot be read ({error}): run the fit again.")
             return {"CANCELLED"}
-        shown = False
-        for window in context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type == "IMAGE_EDITOR":
-                    area.spaces.active.image = image
-                    area.tag_redraw()
-                    shown = True
-        if not shown:
-            self.report({"INFO"}, f"Open an Image Editor to see the image {COMPARISON!r}.")
+        for area in _image_editors(context):
+            area.spaces.active.image = image
+            area.tag_redraw()
         return {"FINISHED"}
 
 
@@ -73,6 +87,20 @@ class MFO_OT_open_report(_JobOperator, bpy.types.Operator):
             return {"CANCELLED"}
         bpy.ops.wm.url_open(url=report.absolute().as_uri())
         return {"FINISHED"}
+
+
+def _image_editors(context: bpy.types.Context) -> list[bpy.types.Area]:
+    """All Image Editors that are open; that of a new window where there is none, and none in background mode."""
+    windows = context.window_manager.windows
+    found = [area for window in windows for area in window.screen.areas if area.type == "IMAGE_EDITOR"]
+    if not found and not bpy.app.background and context.window is not None:
+        before = set(windows)
+        bpy.ops.wm.window_new()
+        for window in set(windows) - before:
+            area = max(window.screen.areas, key=lambda a: a.width * a.height)
+            area.type = "IMAGE_EDITOR"
+            found.append(area)
+    return found
 
 
 def job_folder_of(context: bpy.types.Context) -> str:

@@ -12,17 +12,19 @@ from typing import Any
 from ..fit.fit_material import FitOutcome
 from ..fit.settings import FitSettings
 from ..job.atomic_file import write_atomically
+from ..types.errors import UnrecordableError
+from ..types.image import Pixels
 from ..types.status import Status
 from .assets import Assets
 from .busy import BusyMark
 from .judge import Judge, TruePictures
 from .method import METHODS, method_settings, warm_up_settings
-from .new_seeds import NewSeeds
 from .row import Row, Task
 from .row_pictures import picture_file, shown_picture
 from .scenario import SCENARIOS
 from .scene import SHAPE, BenchScene, write_scene
 from .stopwatch import Stopwatch
+from .wrapped_renderer import NewSeeds
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class _Measured:
 
 
 class FitRunner:
-    """Writes scenes into `folder`, fits and judges. All methods of a scene start from the same material and seed.
+    """Writes scenes into `folder`, fits and judges. All methods of a scene start from the same material and seed, the
+    number of the scene; references and the judge have seeds far from it. Pictures go to `pictures`, if that is given.
 
     Raises
     ------
@@ -44,7 +47,9 @@ class FitRunner:
         If Mitsuba or LLVM is missing.
     """
 
-    def __init__(self, folder: Path, size: int, assets: Assets, *, threads: int = 0) -> None:
+    def __init__(
+        self, folder: Path, size: int, assets: Assets, pictures: Path | None = None, *, threads: int = 0
+    ) -> None:
         from ..render.llvm import configure_llvm, needs_llvm
 
         if needs_llvm():
@@ -59,19 +64,16 @@ class FitRunner:
             use_threads(threads)
         self._folder = folder
         self._assets = assets
+        self._kept_at = pictures
         self._warm: set[tuple[str, str]] = set()
         self._at: tuple[str, int] | None = None
         self._scene: BenchScene
         self._judge: Judge
 
-    def seed(self, task: Task) -> int:
-        """The number of the scene; references and the judge have seeds far from it."""
-        return task.scene
-
     def __call__(self, task: Task, should_stop: Callable[[], bool], pictures: TruePictures | None = None) -> Row:
         """Fit, then judge; a cancelled fit is not judged. `pictures` are those of the scene, if they are there."""
         self._open(task, pictures)
-        settings = method_settings(task.method, self._scene.scenario, self.seed(task))
+        settings = method_settings(task.method, self._scene.scenario, task.scene)
         warm_up = 0.0
         if (task.scenario, task.method) not in self._warm:
             began = time.monotonic()
@@ -101,22 +103,30 @@ class FitRunner:
     def _fit(self, task: Task, settings: FitSettings, should_stop: Callable[[], bool]) -> _Measured:
         from ..fit.fit_material import fit_material
         from ..fit.fit_recorded import fit_recorded
+        from ..fit.fit_transmission import fit_transmission
         from ..render.mitsuba_renderer import load_mitsuba_renderer
 
         began, method = time.monotonic(), METHODS[task.method]
         # a renderer of its own for every fit: passes count from 0 and nothing is left over from the fit before
         renderer = load_mitsuba_renderer(
-            self._scene.file, SHAPE, model=settings.model, parameters=settings.parameters, materials={}
+            self._scene.file,
+            SHAPE,
+            model=settings.model,
+            parameters=settings.parameters,
+            materials=self._scene.materials,
         )
         loaded, watch, busy = time.monotonic() - began, Stopwatch(), BusyMark.now()
         common: dict[str, Any] = {"listener": lambda event: None, "should_stop": should_stop}
         with watch.watching():
-            # not `recover_material`: a preset that hands a scene over to another has not fitted it
+            # not `recover_material`: a preset that hands a scene over to the preset `paper` has not fitted it
             if settings.preset == "paper":
                 seen = NewSeeds(renderer, settings.seed) if method.new_seeds else renderer
                 outcome = fit_material(seen, self._judge.reference, settings, **common)
             else:
-                outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
+                try:
+                    outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
+                except UnrecordableError:
+                    outcome = fit_transmission(renderer, self._judge.reference, settings, **common)
         return _Measured(outcome, loaded, watch.parts, busy.others())
 
     def _row(self, task: Task, measured: _Measured, warm_up: float) -> Row:
@@ -125,7 +135,7 @@ class FitRunner:
             "scenario": task.scenario,
             "scene": task.scene,
             "method": task.method,
-            "seed": self.seed(task),
+            "seed": task.scene,
             "size": self.size,
             "status": result.status.value,
             "object": scene.object,
@@ -178,7 +188,9 @@ class FitRunner:
             notes=list(result.notes),
         )
 
-    def _keep_picture(self, task: Task, pixels: Any) -> None:
-        path = picture_file(self._folder.parent, task)
+    def _keep_picture(self, task: Task, pixels: Pixels) -> None:
+        if self._kept_at is None:
+            return
+        path = picture_file(self._kept_at, task)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, shown_picture(pixels, self._judge.pictures.truth[0], self._judge.pictures.mask))

@@ -128,7 +128,8 @@ class Judge:
         return TruePictures(reference, truth, mask, floor, start)
 
     def _load(self, file: Path) -> Renderer:
-        return load_renderer(file, SHAPE, model="mitsuba_principled", parameters=self._scene.scenario.fitted)
+        chosen = self._scene.scenario
+        return load_renderer(file, SHAPE, model=chosen.model, parameters=chosen.fitted, materials=self._scene.materials)
 
     def _picture(self, renderer: Renderer, vector: NDArray[np.float64]) -> Pixels:
         return renderer.image(vector, seed=self._seed, spp=self._spp)

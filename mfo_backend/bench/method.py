@@ -7,8 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from ..fit.recorded_stages import RecordedPlan
 from ..fit.settings import FitSettings
+from ..metrics.loss import make_loss
+from ..metrics.loss_names import OPTIONAL_LOSS_NAMES
+from ..types.errors import SetupError
+from ..types.image import Encoding, Image
 from .scenario import Scenario
 
 EVERY_LANE = 10**9
@@ -47,6 +53,7 @@ PAPER_METHODS = {
     for name, losses in (("mfo", ("mse", "flip")), ("mse", ("mse",)), ("flip", ("flip",)))
     for light in ("hdr", "ldr")
 }
+PAPER_METHODS |= {"lpips": _paper(("lpips",), "ldr"), "lpips-pu": _paper(("lpips_pu",), "hdr")}
 _BALANCED = OUR_METHODS["balanced"].settings
 ABLATIONS = {
     "balanced-no-scan": Method(_BALANCED, RecordedPlan(scan=False), compares_with="balanced"),
@@ -68,8 +75,21 @@ def method_settings(method: str, scenario: Scenario, seed: int) -> FitSettings:
 
     What the paper leaves open (Adam's rate, its schedule, the limit of iterations) is the preset's default.
     """
-    chosen = {"model": "mitsuba_principled", "parameters": scenario.fitted, "seed": seed, "spp": scenario.fit_spp}
+    chosen = {"model": scenario.model, "parameters": scenario.fitted, "seed": seed, "spp": scenario.fit_spp}
     return FitSettings(**chosen, **METHODS[method].settings)
+
+
+def missing_for(method: str) -> str:
+    """Why a method cannot run here, one sentence; empty where it can. LPIPS needs weights of the user."""
+    settings = FitSettings(**METHODS[method].settings)
+    grey = Image(np.full((64, 64, 3), 0.5, np.float32), Encoding.LINEAR)
+    try:
+        for name in settings.stage_names(Encoding.LINEAR) if settings.preset == "paper" else ():
+            if name in OPTIONAL_LOSS_NAMES:
+                make_loss(name, grey)
+    except SetupError as error:
+        return str(error)
+    return ""
 
 
 def is_quick(method: str) -> bool:

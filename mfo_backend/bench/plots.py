@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .method import METHODS
 from .row import Row
@@ -20,12 +21,16 @@ def time_to_quality(rows: Sequence[Row], target: float) -> str:
     A run counts from its end on; one that raises or ends above the target never does, so its curve stays below 100 %.
     Empty if no run has ended.
     """
+    return _reached(rows, target, "seconds of the fit")
+
+
+def _reached(rows: Sequence[Row], target: float, x_name: str) -> str:
     times = [row.seconds for row in rows if row.seconds]
     if not times:
         return ""
     axes = SvgAxes(
-        f"Share of scenes with FLIP at most {target:g} over time",
-        "seconds of the fit",
+        f"Share of scenes with FLIP at most {target:g}",
+        x_name,
         f"scenes with FLIP ≤ {target:g}",
         around(times),
         (0.0, 1.0),
@@ -39,6 +44,12 @@ def time_to_quality(rows: Sequence[Row], target: float) -> str:
         axes.line(points, _colour(method))
     axes.legend([(method, _colour(method)) for method, _ in _by_method(rows)])
     return axes.svg()
+
+
+def data_profile(rows: Sequence[Row], target: float) -> str:
+    """As `time_to_quality`, over passes, which do not depend on the machine."""
+    counted = [replace(row, seconds=row.passes) for row in rows]
+    return _reached(counted, target, "passes (pictures at full size; an Adam step counts 3)")
 
 
 def pareto(rows: Sequence[Row]) -> str:

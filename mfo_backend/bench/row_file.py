@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,29 @@ class RowFile:
             row = self._row(line, number)
             rows.setdefault(row.key, row)
         return list(rows.values())
+
+    @contextmanager
+    def only_writer(self) -> Iterator[None]:
+        """Keep other benches out of the folder while the block runs; a process that is killed keeps nobody out.
+
+        Raises
+        ------
+        BadInputError
+            If another bench is writing there.
+        """
+        try:
+            import fcntl
+        except ImportError:  # Windows: two benches in one folder are the user's to avoid
+            yield
+            return
+        with open(self.path.with_name("rows.lock"), "ab") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise BadInputError(
+                    f"Another bench is writing into {self.path.parent}: wait for it, or give another folder with --out."
+                ) from None
+            yield
 
     def append(self, row: Row) -> None:
         """Add a row and wait until the disk has it; an unfinished line of a killed process is cut off first."""

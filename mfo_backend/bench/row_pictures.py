@@ -16,7 +16,7 @@ from .row import Task
 
 def picture_file(folder: Path, task: Task) -> Path:
     """Where the picture of a method's result lies; the methods ``reference`` and ``truth`` are the scene's own."""
-    return folder / "pictures" / f"{task.scenario}-{task.scene:03d}" / f"{task.method}.png"
+    return folder / f"{task.scenario}-{task.scene:03d}" / f"{task.method}.png"
 
 
 def shown_picture(pixels: Pixels, truth: Pixels, mask: NDArray[np.bool_]) -> bytes:

@@ -24,10 +24,6 @@ class Runner(Protocol):
         """The row, its status `cancelled` where it was asked to stop before the end."""
         ...
 
-    def seed(self, task: Task) -> int:
-        """The seed of the task's fit."""
-        ...
-
 
 def all_tasks(scenarios: Iterable[str], methods: Sequence[str], scenes: int) -> list[Task]:
     """Quick methods first, then scene by scene, so that a bench that ends early has as many scenes everywhere.
@@ -65,11 +61,7 @@ def run_bench(
             continue
         if should_stop():
             return False
-        try:
-            row = runner(task, should_stop)
-        except Exception as error:
-            log(traceback.format_exc())
-            row = _failed(task, runner, error)
+        row = measured_row(task, lambda task=task: runner(task, should_stop), runner.size, log)
         if row.status == Status.CANCELLED.value or (row.error and should_stop()):
             return False
         row = replace(row, machine=dict(machine))
@@ -78,7 +70,19 @@ def run_bench(
     return True
 
 
-def _failed(task: Task, runner: Runner, error: Exception) -> Row:
+def measured_row(
+    task: Task, measure: Callable[[], Row], size: int, log: Callable[[str], None] = lambda text: None
+) -> Row:
+    """The row of a task, or one with the error that was raised."""
+    try:
+        return measure()
+    except Exception as error:
+        log(traceback.format_exc())
+        return failed_row(task, size, error)
+
+
+def failed_row(task: Task, size: int, error: BaseException) -> Row:
+    """The row of a task that raised."""
     status = error.status if isinstance(error, MfoError) else Status.FAILED
     words = " ".join(str(error).split())
     sentence = words if isinstance(error, MfoError) else f"{type(error).__name__}: {words}"
@@ -86,8 +90,8 @@ def _failed(task: Task, runner: Runner, error: Exception) -> Row:
         scenario=task.scenario,
         scene=task.scene,
         method=task.method,
-        seed=runner.seed(task),
-        size=runner.size,
+        seed=task.scene,
+        size=size,
         status=status.value,
         error=sentence[:400],
     )

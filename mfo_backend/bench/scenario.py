@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 _DRAWN = ("base_color", "roughness", "metallic", "specular")  # the paper draws these at random, the others are 0
-_GLASS = ("base_color", "roughness", "eta", "spec_trans")
+_GLASS = ("base_color", "roughness", "ior", "transmission_weight")
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ class Scenario:
         Other objects around the target, with materials of their own and a floor; they light and hide it.
     measured
         The reference shows a material that the fitted model cannot reach exactly.
+    model
+        Material model of truth and fit. Transparency is Blender's, which all methods can fit; the paper's is Disney's.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Scenario:
     relights: int = 1
     neighbours: int = 0
     measured: bool = False
+    model: str = "mitsuba_principled"
 
 
 _TRANSPARENCY = Scenario(
@@ -66,8 +69,9 @@ _TRANSPARENCY = Scenario(
     fit_spp=32,
     max_depth=8,
     drawn=_GLASS,
-    ranges={"spec_trans": (0.75, 1.0), "roughness": (0.0, 0.6), "eta": (1.2, 1.8)},
+    ranges={"transmission_weight": (0.75, 1.0), "roughness": (0.0, 0.6), "ior": (1.2, 1.8)},
     closed_only=True,
+    model="blender_principled",
 )
 PAPER_SCENARIOS = (
     Scenario("base", "point", "all", reference_spp=4096, fit_spp=16, max_depth=2),

@@ -6,16 +6,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..material.mitsuba_parameters import MITSUBA_PRINCIPLED
+from ..material.principled_parameters import BLENDER_PRINCIPLED, SOCKET_OF_PARAMETER
 from ..types.parameter import Value
 from .assets import Assets, Mesh, Probe
 from .scenario import Scenario
 from .scene_text import on_sphere, point_light, principled, probe_light, scene_text
 
 SHAPE = "target"
+TABLES = {"mitsuba_principled": MITSUBA_PRINCIPLED, "blender_principled": BLENDER_PRINCIPLED}
 _DISTANCE = 3.6  # of the camera from an object of radius 1, which then fills nine tenths of the frame
 _FURTHER = 1.5  # with neighbours in the frame
 _RELIT_TURNS = (70.0, -70.0, 160.0)  # of a point light from the camera, degrees
@@ -46,6 +49,11 @@ class BenchScene:
     truth: Mapping[str, Value] = field(repr=False)
     start: Mapping[str, Value] = field(repr=False)
 
+    @property
+    def materials(self) -> dict[str, Any]:
+        """Sockets of the start, where the scenario's model has them."""
+        return materials_of(self.scenario, self.start)
+
 
 def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, folder: Path) -> BenchScene:
     """Write scene `number` of a scenario, `size` x `size` pixels, into `folder`.
@@ -68,7 +76,7 @@ def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, fold
         (folder / file).write_text(text, "utf-8")
         return folder / file
 
-    shown = principled("target_bsdf", start, two_sided="spec_trans" not in start)
+    shown = shown_bsdf(scenario, start)
     files = [write("scene.xml", shown, emitters[0])]
     files += [write(f"relit_{n}.xml", shown, emitter) for n, emitter in enumerate(emitters[1:])]
     true_files = [write(f"true_{n}.xml", true_bsdf, emitter) for n, emitter in enumerate(emitters) if true_bsdf]
@@ -78,11 +86,25 @@ def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, fold
     )  # fmt: skip
 
 
+def shown_bsdf(scenario: Scenario, values: Mapping[str, Value]) -> str:
+    """The target's BSDF; Blender's takes the place of this one when its sockets are given with the scene."""
+    mitsuba = scenario.model == "mitsuba_principled"
+    return principled("target_bsdf", values if mitsuba else {}, two_sided=mitsuba)
+
+
+def materials_of(scenario: Scenario, values: Mapping[str, Value]) -> dict[str, Any]:
+    """What a renderer is told beside the scene: the sockets of Blender's model, nothing for Mitsuba's."""
+    if scenario.model == "mitsuba_principled":
+        return {}
+    sockets = {SOCKET_OF_PARAMETER[name]: {"value": value, "linked": False} for name, value in values.items()}
+    return {"target_bsdf": {"sockets": sockets}}
+
+
 def random_material(scenario: Scenario, rng: np.random.Generator) -> dict[str, Value]:
     """Values of the scenario's drawn parameters, uniform in their ranges, and its constant ones."""
     values: dict[str, Value] = dict(scenario.constant)
     for name in scenario.drawn:
-        parameter = MITSUBA_PRINCIPLED[name]
+        parameter = TABLES[scenario.model][name]
         low, high = scenario.ranges.get(name, (parameter.lower, parameter.upper))
         low, high = max(low, parameter.lower), min(high, parameter.upper)
         drawn = rng.uniform(low, high, parameter.size)

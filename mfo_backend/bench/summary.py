@@ -23,7 +23,7 @@ class Summary:
     `at_noise` those whose picture differs from the reference by no more than 0.02 above what the true one does.
     `seconds` are of runs that did not
     raise: median and 90th percentile. `seconds_per_solved` is the time of all runs over the number solved.
-    `flip` holds the quartiles of all runs.
+    `flip` holds the quartiles of all runs, `relit_flip` the median under all lights no fit saw, `jod` mean and minimum.
     """
 
     scenario: str
@@ -39,6 +39,8 @@ class Summary:
     flip: tuple[float, float, float]
     relative_rmse: float
     relit_relative_rmse: float
+    relit_flip: float
+    jod: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ def error_of(value: float | None) -> float:
 def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
     seconds = [row.seconds for row in rows if row.seconds is not None]
     flips = [error_of(row.flip) for row in rows]
+    jods = [row.jod for row in rows if row.jod is not None]
     solved = sum(flip <= SOLVED_FLIP for flip in flips)
     return Summary(
         scenario=scenario,
@@ -107,6 +110,8 @@ def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
         flip=(quantile(flips, 0.25), quantile(flips, 0.5), quantile(flips, 0.75)),
         relative_rmse=quantile([error_of(row.relative_rmse) for row in rows], 0.5),
         relit_relative_rmse=quantile([error_of(row.relit_relative_rmse) for row in rows], 0.5),
+        relit_flip=quantile([flip for row in rows for flip in (row.relit_flips or [math.inf])], 0.5),
+        jod=(sum(jods) / len(jods), min(jods)) if jods else (math.nan, math.nan),
     )
 
 

@@ -55,10 +55,10 @@ class SvgAxes:
         self.parts.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4.5" fill="{colour}"/>')
 
     def legend(self, names: Sequence[tuple[str, str]]) -> None:
-        """Names with their colours over the frame, at most four in each of two rows."""
+        """Names with their colours over the frame, at most five in each of two rows."""
         for number, (name, colour) in enumerate(names):
-            row, column = divmod(number, 4)
-            x, y = _LEFT + column * (WIDTH - _LEFT - _RIGHT) / 4, 18 + 18 * row
+            row, column = divmod(number, 5)
+            x, y = _LEFT + column * (WIDTH - _LEFT - _RIGHT) / 5, 18 + 18 * row
             self.parts.append(f'<circle cx="{x + 4:.1f}" cy="{y - 4}" r="4" fill="{colour}"/>')
             self.parts.append(_text(x + 12, y, name, colour=colour))
 

@@ -5,19 +5,25 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from ..bench.assets import Assets
-from ..bench.method import DEFAULT_METHODS, METHODS
+from ..bench.method import DEFAULT_METHODS, METHODS, missing_for
 from ..bench.report import write_report
 from ..bench.row import Row
 from ..bench.row_file import RowFile, keep_setup
-from ..bench.run_bench import Runner, all_tasks, run_bench
+from ..bench.run_bench import all_tasks, run_bench
+from ..bench.scatter import FitRecipe, run_scattered
 from ..bench.scenario import SCENARIOS
+from ..job.cluster import open_client, threads_each
 from ..job.progress_bar import terminal_columns
 from ..job.stop import StopSignal
 from ..types.errors import BadInputError
 from ..types.status import Status
+from .bench_surface import add_surface_parser
+from .cluster_options import add_cluster_options
 
 
 def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
@@ -28,62 +34,81 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
         description="Fit random scenes with several methods. An interrupted bench goes on where it stopped.",
     )
     parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="again for more (default: all)")
-    parser.add_argument(
-        "--method", action="append", choices=tuple(METHODS), help="again for more (default: all but the ablations)"
-    )
+    standing = "again for more (default: all that can run here, without the ablations)"
+    parser.add_argument("--method", action="append", choices=tuple(METHODS), help=standing)
     parser.add_argument("--scenes", type=_positive, default=20, metavar="N", help="scenes of each scenario (20)")
     parser.add_argument("--size", type=_positive, default=128, metavar="PIXELS", help="width and height (128)")
     parser.add_argument("--out", type=Path, default=Path("mfo-bench"), metavar="DIR", help="folder (mfo-bench)")
+    add_cluster_options(parser)
     parser.set_defaults(func=run)
-    actions = parser.add_subparsers(dest="action", metavar="[report DIR]")
+    actions = parser.add_subparsers(dest="action", metavar="[report DIR | surface]")
     report = actions.add_parser("report", help="print and write the report of a bench folder")
     report.add_argument("folder", type=Path, metavar="DIR", help="folder of a bench")
     report.add_argument("--note", action="append", default=[], help="a remark for the report, such as a busy machine")
     report.set_defaults(func=run_report)
+    add_surface_parser(actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the bench with real fits, then report."""
+    assets = Assets.find()
+    keep_setup(arguments.out, _setup(arguments, assets))
+    pictures = (arguments.out / "pictures").absolute()
+    pictures.mkdir(exist_ok=True)
+    if arguments.scheduler or arguments.workers:
+        manifest = tuple((name, tuple(values)) for name, values in assets.manifest().items())
+        threads = 0 if arguments.scheduler else threads_each(arguments.workers)
+        recipe = FitRecipe(arguments.size, manifest, str(pictures), threads)
+        with open_client(arguments.scheduler, arguments.workers) as client:
+            return work(arguments, lambda tasks, file, **common: run_scattered(tasks, file, client, recipe, **common))
+
     from ..bench.fit_runner import FitRunner
     from ..bench.machine import machine_facts
 
-    assets = Assets.find()
-    keep_setup(arguments.out, _setup(arguments, assets))
-    runner = FitRunner(arguments.out / "scenes", arguments.size, assets)
-    return work(arguments, runner, machine_facts(runner.variant))
+    runner = FitRunner(arguments.out / "scenes", arguments.size, assets, pictures)
+    machine = machine_facts(runner.variant)
+    return work(arguments, partial(run_bench, runner=runner, machine=machine, log=partial(_log, arguments.out)))
 
 
-def work(arguments: argparse.Namespace, runner: Runner, machine: dict) -> int:
-    """Run the bench with a given runner; returns the exit code."""
+def work(arguments: argparse.Namespace, bench: Callable[..., bool]) -> int:
+    """Run `bench` on the tasks that are left; returns the exit code."""
     from tqdm import tqdm
 
     file = RowFile(arguments.out)
-    tasks = all_tasks(arguments.scenario or SCENARIOS, arguments.method or DEFAULT_METHODS, arguments.scenes)
-    done = {row.key for row in file.read()}
-    left = sum(task.key not in done for task in tasks)
-    print(f"{left} of {len(tasks)} rows to measure, in {file.path}", file=sys.stderr)
+    methods = arguments.method or [m for m in DEFAULT_METHODS if can_run(m)]
+    tasks = all_tasks(arguments.scenario or SCENARIOS, methods, arguments.scenes)
     stop = StopSignal()
-    # disable=None: shown on a terminal only; the time left is reckoned from the mean of all rows so far
-    shape = {"disable": None, "smoothing": 0.0, "ncols": terminal_columns(), "nrows": 20}
-    with stop.watching(), tqdm(total=left, unit="row", **shape) as bar:
+    with file.only_writer(), stop.watching():
+        done = {row.key for row in file.read()}
+        left = sum(task.key not in done for task in tasks)
+        print(f"{left} of {len(tasks)} rows to measure, in {file.path}", file=sys.stderr)
+        # disable=None: shown on a terminal only; the time left is reckoned from the mean of all rows so far
+        with tqdm(total=left, unit="row", disable=None, smoothing=0.0, ncols=terminal_columns(), nrows=20) as bar:
 
-        def listener(row: Row) -> None:
-            tqdm.write(_line(row), file=sys.stderr)
-            bar.update()
+            def listener(row: Row) -> None:
+                tqdm.write(_line(row), file=sys.stderr)
+                bar.update()
 
-        def log(text: str) -> None:
-            with open(arguments.out / "errors.log", "a", encoding="utf-8") as errors:
-                errors.write(text + "\n")
-
-        complete = run_bench(
-            tasks, file, runner, machine=machine, listener=listener, should_stop=stop.requested, log=log
-        )
+            complete = bench(tasks, file, listener=listener, should_stop=stop.requested)
     if file.read():
         print(write_report(arguments.out))
     if not complete:
         print("mfo: stopped; the same command goes on where it was.", file=sys.stderr)
         return Status.CANCELLED.exit_code
     return 0
+
+
+def can_run(method: str) -> bool:
+    """Whether this machine has all a method needs; says on stderr what is missing."""
+    missing = missing_for(method)
+    if missing:
+        print(f"mfo: without {method}: {missing}", file=sys.stderr)
+    return not missing
+
+
+def _log(folder: Path, text: str) -> None:
+    with open(folder / "errors.log", "a", encoding="utf-8") as errors:
+        errors.write(text + "\n")
 
 
 def run_report(arguments: argparse.Namespace) -> int:

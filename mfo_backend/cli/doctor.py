@@ -9,7 +9,8 @@ from dataclasses import asdict
 
 from ..job.protocol_stream import take_stdout
 from ..types.status import Status
-from .machine_checks import Check, check_machine
+from .check import Check
+from .machine_checks import check_machine
 
 _MARKS = {"ok": "ok      ", "warning": "warning ", "problem": "PROBLEM "}
 

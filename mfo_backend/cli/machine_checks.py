@@ -11,26 +11,17 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..render.cache_folder import cache_folder
 from ..render.llvm import find_llvm, library_cure, llvm_cure, missing_system_library, needs_llvm, require_mitsuba
 from ..types.errors import SetupError
+from .check import Check
+from .optional_checks import check_optional
 
 PINNED = {"mitsuba": "3.9.1", "drjit": "1.5.0"}  # those of pyproject.toml; a test compares them
 LEAST = {"numpy": "1.26", "scipy": "1.11", "OpenEXR": "3.3", "pillow": "11", "tqdm": "4.66"}
-
-
-@dataclass(frozen=True)
-class Check:
-    """One finding. `state` is ok, warning (works, but) or problem (the backend cannot run); `cure` mends it."""
-
-    name: str
-    state: str
-    found: str
-    cure: str = ""
 
 
 def check_machine() -> Iterator[Check]:
@@ -45,6 +36,7 @@ def check_machine() -> Iterator[Check]:
     if sys.platform == "win32":
         kernels = os.environ.get("DRJIT_CACHE_DIR") or str(Path(tempfile.gettempdir()) / "drjit")
     yield _cache("kernel cache", Path(kernels), "DRJIT_CACHE_DIR")
+    yield from check_optional()
 
 
 def _python() -> Check:

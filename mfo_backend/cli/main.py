@@ -23,6 +23,8 @@ COMMANDS = {
     "fit": "fit a material of a Mitsuba scene to a reference picture",
     "blend": "fit a material of a .blend file to a reference picture",
     "compare": "measure the difference between two pictures",
+    "judge": "measure a picture against the reference of a job",
+    "batch": "run many job folders, several at a time or on a cluster",
     "bench": "measure speed against error on random scenes",
     "run": "run a job folder (what the Blender add-on starts)",
 }
@@ -34,10 +36,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # NumPy's own threads would fight with Dr.Jit's; read when NumPy is first imported
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if arguments is None else arguments)
-    parsed = _parser(words).parse_args(words)
+    try:
+        parsed = _parser(words).parse_args(words)  # loads the command's module and what that needs
+    except ImportError as error:
+        return report_error(Status.SETUP, _not_importable(error), stream=sys.stdout if "--json" in words else None)
     stream = sys.stdout if getattr(parsed, "json", False) else None
     try:
         return parsed.func(parsed)
+    except ImportError as error:
+        return report_error(Status.SETUP, _not_importable(error), stream=stream)
     except MfoError as error:
         return report_error(error.status, str(error), stream=stream)
     except KeyboardInterrupt:
@@ -53,6 +60,18 @@ def report_error(status: Status, sentence: str, *, stream: TextIO | None) -> int
     if stream is not None:
         print(json.dumps({"status": status.value, "sentence": sentence}, ensure_ascii=False), file=stream, flush=True)
     return status.exit_code
+
+
+def _not_importable(error: ImportError) -> str:
+    """The sentence for a package that is missing or cannot be loaded."""
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        lock = Path(__file__).resolve().parents[2] / "requirements" / "backend.lock"
+        what = f'-r "{lock}"' if lock.is_file() else error.name.partition(".")[0]
+        return (
+            f"{error.name} is not installed in {sys.executable}: run \"{sys.executable}\" -m pip install {what}, or "
+            "choose the Python that has the backend's packages."
+        )
+    return f"A package cannot be loaded ({error}): run `mfo doctor`, which says what is missing."
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:

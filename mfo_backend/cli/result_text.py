@@ -14,6 +14,9 @@ def result_text(result: Mapping[str, Any]) -> str:
         level = result.get("certainty", {}).get(name, {}).get("level", "")
         rows.append((name, _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " ")))
     rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
+    if result.get("model_gap"):
+        gap = result["model_gap"]
+        rows.append(("model gap", "", f"{100 * gap['relative']:.2g} %", f"at most {100 * gap['at_most']:.2g} %"))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     lines += [weak["sentence"] for weak in result.get("weak_combinations", [])]

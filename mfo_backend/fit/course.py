@@ -110,17 +110,10 @@ class Course:
         """A function that notes the loss of every vector it is told in `stage`."""
 
         def noted(x: Vector, loss: float) -> None:
-            if not stage.curve:
-                stage.loss_start = loss
             if loss < stage.loss_best:
-                stage.loss_best, stage.best = loss, x.copy()
-            now = time.monotonic()
-            seconds = now - self._began
-            stage.curve.append(CurvePoint(len(stage.curve) + 1, loss, stage.loss_best, seconds, self._renderer.passes))
-            if now - self._told > _QUIET_SECONDS:
-                self._told = now
-                self._tell(stage, loss, seconds)
-            self._show(stage, now)
+                stage.best = x.copy()
+            self.note(stage, loss)
+            self._show(stage, time.monotonic())
 
         return noted
 
@@ -132,6 +125,18 @@ class Course:
             return
         self._listener(Preview(self.picture(stage.best)))
         stage.best, self._shown = None, time.monotonic()
+
+    def note(self, stage: Stage, loss: float) -> None:
+        """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard."""
+        if not stage.curve:
+            stage.loss_start = loss
+        stage.loss_best = min(stage.loss_best, loss)
+        now = time.monotonic()
+        seconds = now - self._began
+        stage.curve.append(CurvePoint(len(stage.curve) + 1, loss, stage.loss_best, seconds, self._renderer.passes))
+        if now - self._told > _QUIET_SECONDS:
+            self._told = now
+            self._tell(stage, loss, seconds)
 
     def _tell(self, stage: Stage, loss: float, seconds: float) -> None:
         index = self.names.index(stage.name)

@@ -31,7 +31,7 @@ from .verification import VERIFY_STREAM, check_reference, picture_errors
 from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
-_CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
+CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
 
@@ -74,13 +74,13 @@ def fit_recorded(
     )
     named = None if settings.losses is None else settings.stage_names(reference.encoding)
     measure = named[-1] if named else "flip-ldr" if ldr else "flip-hdr"
-    light = _linear(reference, view)
+    light = linear_pixels(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
     names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
-    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, _clipped(reference, view))
+    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped_pixels(reference, view))
 
     basins = fit.start_from_nothing(_censored(log_residual, reference, view))
     ends = [End("start", renderer.start)]
@@ -120,7 +120,7 @@ def fit_recorded(
             counts = _misfit(fit, last, _censored(log_residual, reference, view))
 
     seed = settings.seed ^ VERIFY_STREAM
-    spp = min(_CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
+    spp = min(CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
     pictures = [Candidate(end.x, renderer.image(end.x, seed=seed, spp=spp)) for end in ends]
     listener(Preview(pictures[-1].image))
     counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
@@ -155,7 +155,7 @@ def best_of(errors: Sequence[float]) -> int:
     return int(np.argmin(values))
 
 
-def _linear(reference: Image, view: View) -> Pixels:
+def linear_pixels(reference: Image, view: View) -> Pixels:
     """Scene-linear values of a reference; those above a display's white are lost."""
     if reference.encoding is Encoding.LINEAR:
         return np.maximum(reference.pixels, 0.0)
@@ -163,7 +163,7 @@ def _linear(reference: Image, view: View) -> Pixels:
     return view.linear(reference.pixels)
 
 
-def _clipped(reference: Image, view: View) -> Pixels | None:
+def clipped_pixels(reference: Image, view: View) -> Pixels | None:
     """1 where only a lower bound of the radiance is known, else 0; None for a linear reference."""
     if reference.encoding is Encoding.LINEAR:
         return None

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
 from .fit_recorded import fit_recorded
+from .fit_transmission import fit_transmission
 from .settings import FitSettings
 
 
@@ -28,7 +30,8 @@ def recover_material(
 ) -> FitOutcome:
     """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`).
 
-    A scene that recorded paths cannot hold is fitted by `fit_material` whatever the preset, and a note says so.
+    A material that recorded paths cannot hold, such as glass, is fitted by `fit_transmission`; where that cannot do it
+    either, by `fit_material` whatever the preset, and a note says so.
     """
     reason = ""
     if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer):
@@ -38,6 +41,11 @@ def recover_material(
             )
         except UnrecordableError as error:
             reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
+        if settings.losses is None:  # its stages know no losses of the user's choice
+            with contextlib.suppress(UnrecordableError):
+                return fit_transmission(
+                    renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
+                )
     settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
     notes = (*outcome.result.notes, *([reason] if reason else []))

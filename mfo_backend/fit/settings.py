@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from ..metrics.loss_names import SQUARED_KINDS, check_loss_name, is_squared, loss_in_range
 from ..solve.stopping import StoppingRules
 from ..types.errors import BadInputError
 from ..types.image import Encoding
+from ..types.parameter_bounds import checked_bounds
 
 _CHOICES: dict[str, tuple[str, ...]] = {
     "preset": ("paper", "fast", "balanced", "best"),
@@ -56,6 +57,8 @@ class FitSettings:
         FLIP over the object of 0.0005 with decay from 0.05, 0.0019 from 0.02, and 0.031 with a constant 0.05.
     keep_optimizer_state
         Carry Adam's moments and rate into the next stage instead of a new optimisation.
+    bounds
+        Narrower limits by parameter name, (lower, upper) for every component; see `types.parameter_bounds`.
     region
         Pixels the losses look at: those that see the target, or all.
     """
@@ -74,6 +77,7 @@ class FitSettings:
     schedule: str = "decay"
     keep_optimizer_state: bool = False
     region: str = "target"
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, allowed in _CHOICES.items():
@@ -129,6 +133,8 @@ class FitSettings:
             values["losses"] = (values["losses"],)
         if values.get("losses") is not None:
             values.setdefault("preset", "paper")
+        if "bounds" in values:
+            values["bounds"] = checked_bounds(values["bounds"])
         return cls(**values)
 
     @property

@@ -4,15 +4,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
 
+from ..fit.settings import FitSettings
 from ..metrics.tone_mapping import View
 from ..types.event import Listener
 from ..types.image import Image, Pixels
+from ..types.model_gap import ModelGap
+from ..types.parameter_bounds import narrowed
 from ..types.result import FitResult
 from .job_folder import JobFolder
 from .request import Request, request_to_json
+
+if TYPE_CHECKING:
+    from ..render.renderer import Renderer
+
+_WITHOUT_LIGHT_PATHS = (
+    "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
+    "limits for one kind of bounce."
+)
+
+
+GAP_STREAM = 0x6A500000  # apart from the seeds users choose and from those of the verification
 
 
 @dataclass(frozen=True)
@@ -68,18 +82,22 @@ def fit_scene(
         configure_llvm()  # before the first import of drjit, so the imports below stay here
     from ..fit.recover_material import recover_material
     from ..render.interruptible import InterruptibleRenderer, NativeThread
-    from ..render.renderer import Renderer, load_renderer
+    from ..render.renderer import load_renderer
     from ..render.variant import load_variant
 
     def load() -> tuple[str, Renderer]:
         variant = load_variant()
-        return variant, load_renderer(
+        renderer = load_renderer(
             folder.root / request.scene,
             request.target.shape_id,
             model=request.fit.model,
             parameters=request.fit.parameters,
             materials=request_materials(folder, request),
+            light_paths=request.light_paths,
         )
+        renderer.table = narrowed(renderer.table, request.fit.bounds)
+        renderer.start = renderer.table.clip(renderer.start)
+        return variant, renderer
 
     if request.fit.preset == "paper":
         thread = NativeThread(should_stop)
@@ -90,7 +108,30 @@ def fit_scene(
     outcome = recover_material(
         renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
     )
-    return JobOutcome(outcome.result, outcome.start_image, outcome.result_image, variant)
+    result = outcome.result
+    if not should_stop():
+        gap = _model_gap(renderer, result, reference, request.fit, view)
+        said = (gap.sentence,) if gap is not None and gap.sentence else ()
+        result = replace(result, model_gap=gap, notes=(*result.notes, *said))
+    if request.light_paths is not None and result.model == "mitsuba_principled":
+        result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
+    return JobOutcome(result, outcome.start_image, outcome.result_image, variant)
+
+
+def _model_gap(
+    renderer: Renderer, result: FitResult, reference: Image, settings: FitSettings, view: View
+) -> ModelGap | None:
+    """The gap of the recovered values, of two renders whose random numbers no stage has seen; None when stopped."""
+    from ..fit.model_gap import model_gap
+    from ..render.interruptible import Interrupted
+
+    vector = renderer.table.pack(result.recovered)
+    spp = max(settings.verify_spp // 2, 1)
+    try:
+        first, second = (renderer.image(vector, seed=settings.seed ^ GAP_STREAM ^ k, spp=spp) for k in (0, 1))
+    except Interrupted:
+        return None
+    return model_gap(reference, (first, second), renderer.target_mask(), view)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from ..metrics.flip_error import flip_error
 from ..metrics.tone_mapping import View
+from ..report.curve_picture import curve_png
 from ..report.difference_map import magma
 from ..report.html_report import ReportContent, report_html
 from ..report.picture import displayed, displayed_linear, png_bytes
@@ -15,7 +16,7 @@ from ..types.image import Encoding, Image
 from .atomic_file import write_atomically
 from .fit_scene import JobOutcome
 from .job_folder import JobFolder
-from .progress import PREVIEW_PATH
+from .progress import DIFFERENCE_PATH, PREVIEW_PATH
 from .request import Request
 from .result import result_to_json, versions, write_result
 
@@ -46,6 +47,9 @@ def write_outputs(
     folder.pictures.mkdir(exist_ok=True)
     for name, data in pictures.items():
         write_atomically(folder.pictures / f"{name}.png", data)
+    curve = curve_png(outcome.result.stages)
+    if curve is not None:
+        write_atomically(folder.pictures / "curve.png", curve)
     write_exr(folder.pictures / "result.exr", outcome.result_image)
     report = ReportContent(
         title=_title(request),
@@ -57,7 +61,8 @@ def write_outputs(
     )
     write_atomically(folder.report, report_html(report).encode("utf-8"))
     write_result(folder, result_to_json(outcome.result, notes=notes, variant=outcome.variant))
-    (folder.root / PREVIEW_PATH).unlink(missing_ok=True)  # result.png is what it was on the way to
+    for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
+        (folder.root / path).unlink(missing_ok=True)
 
 
 def bytes_needed(request: Request) -> int:

@@ -21,7 +21,9 @@ from .job_folder import JobFolder, clear_outputs
 from .progress_bar import ProgressBar
 
 PREVIEW_PATH = "pictures/current.png"
+DIFFERENCE_PATH = "pictures/current_difference.png"
 PREVIEW_SECONDS = 0.3  # a viewer cannot follow faster, and encoding costs about 10 ms at 256x256
+DIFFERENCE_SECONDS = 1.0  # a FLIP map costs several times that
 
 
 class EventWriter:
@@ -41,23 +43,36 @@ class EventWriter:
         self._bar = ProgressBar() if bar else None
         self._folder: JobFolder | None = None
         self._encode_preview: Callable[[Pixels], bytes] | None = None
+        self._encode_difference: Callable[[Pixels], bytes] | None = None
         self._file: TextIO | None = None
-        self._last_preview = -math.inf
+        self._last_preview = self._last_difference = -math.inf
         self._lock = threading.Lock()
         self._ended = False
 
-    def attach(self, folder: JobFolder, encode_preview: Callable[[Pixels], bytes]) -> None:
+    def attach(
+        self,
+        folder: JobFolder,
+        encode_preview: Callable[[Pixels], bytes],
+        encode_difference: Callable[[Pixels], bytes] | None = None,
+    ) -> None:
         """Name the folder for progress.jsonl and previews; nothing is written there before the first event."""
         self._folder = folder
-        self._encode_preview = encode_preview
+        self._encode_preview, self._encode_difference = encode_preview, encode_difference
 
     def __call__(self, event: Event) -> None:
         """Report one event of the fit."""
         if isinstance(event, Preview):
-            if time.monotonic() - self._last_preview < PREVIEW_SECONDS or not self._write_preview(event.image):
+            if time.monotonic() - self._last_preview < PREVIEW_SECONDS:
                 return
-            self._last_preview = time.monotonic()
+            if not self._write_picture(PREVIEW_PATH, self._encode_preview, event.image):
+                return
             fields: dict[str, Any] = {"path": PREVIEW_PATH}
+            self._last_preview = time.monotonic()
+            if self._last_preview - self._last_difference >= DIFFERENCE_SECONDS and self._write_picture(
+                DIFFERENCE_PATH, self._encode_difference, event.image
+            ):
+                fields["difference"] = DIFFERENCE_PATH
+                self._last_difference = time.monotonic()
         else:
             fields = asdict(event)
         if isinstance(event, Started):
@@ -112,11 +127,11 @@ class EventWriter:
                         self._file.close()
                     self._file = None
 
-    def _write_preview(self, image: Pixels) -> bool:
-        if self._folder is None or self._encode_preview is None or not self._folder.pictures.is_dir():
+    def _write_picture(self, path: str, encode: Callable[[Pixels], bytes] | None, image: Pixels) -> bool:
+        if self._folder is None or encode is None or not self._folder.pictures.is_dir():
             return False
         try:
-            write_atomically(self._folder.root / PREVIEW_PATH, self._encode_preview(image))
+            write_atomically(self._folder.root / path, encode(image))
         except OSError:  # on Windows also when a viewer holds the old one; the next preview comes soon
             return False
         return True

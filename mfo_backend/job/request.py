@@ -12,6 +12,7 @@ from ..fit.settings import FitSettings
 from ..metrics.tone_mapping import DisplayView
 from ..types.errors import BadInputError
 from ..types.image import Encoding
+from ..types.light_paths import NO_LIMIT, LightPaths
 from .checked_object import CheckedObject, is_number, shown
 from .job_folder import JobFolder
 from .scene_files import check_scene_files
@@ -19,7 +20,10 @@ from .scene_files import check_scene_files
 SCHEMA_VERSION = 1
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
-_KEYS = ("schema_version", "generator", "scene", "target", "image", "reference", "view", "materials", "fit", "notes")
+_KEYS = (
+    *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
+    *("fit", "notes"),
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class Request:
     film_transparent: bool = False
     view: DisplayView | None = None
     view_table: ViewTable | None = None
+    light_paths: LightPaths | None = None
     materials: Mapping[str, Material] = field(default_factory=dict)
     fit: FitSettings = field(default_factory=FitSettings)
     notes: tuple[str, ...] = ()
@@ -136,6 +141,7 @@ def request_from_json(data: Any) -> Request:
         encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
         view=_view(top.raw("view", None)),
         view_table=_view_table(top.raw("view", None)),
+        light_paths=_light_paths(top.raw("light_paths", None)),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
@@ -166,6 +172,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         },
         "reference": {"path": request.reference, "encoding": request.encoding.value},
         "view": view,
+        "light_paths": asdict(request.light_paths) if request.light_paths is not None else None,
         "materials": materials,
         "fit": asdict(request.fit),
         "notes": list(request.notes),
@@ -233,4 +240,16 @@ def _view_table(data: Any) -> ViewTable | None:
         size=table.integer("size", 3, 128),
         log2_min=table.number("log2_min", -64.0, 64.0),
         log2_max=table.number("log2_max", -64.0, 64.0),
+    )
+
+
+def _light_paths(data: Any) -> LightPaths | None:
+    if data is None:
+        return None
+    counts = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+    paths = CheckedObject(data, f"{WHERE}: light_paths", ("filter_glossy", "clamp_indirect", *counts))
+    return LightPaths(
+        paths.number("filter_glossy", 0.0, 1e4, 0.0),
+        paths.number("clamp_indirect", 0.0, 1e12, 0.0),
+        *(paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts),
     )

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Sequence
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -61,6 +62,7 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
             }
             for stage in result.stages
         ],
+        "model_gap": asdict(result.model_gap) if result.model_gap is not None else None,
         "seconds": result.seconds,
         "passes": result.passes,
         "notes": [*notes, *result.notes],

@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 
 from ..render.renderer import Interrupted
-from ..report.picture import displayed_linear, png_bytes
+from ..report.live_pictures import LivePictures
 from ..scene.image_file import check_reference, read_image
 from ..types.errors import MfoError
 from ..types.event import Event, Progress
@@ -40,6 +40,10 @@ def run_job(path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter
         traceback.print_exc(file=sys.stderr)
         refused = unwritable(path, error)
         return _fail(events, refused.status, str(refused))
+    except ImportError as error:  # a package is missing, or there was no memory for its library
+        traceback.print_exc(file=sys.stderr)
+        what = str(error).strip().split("\n")[0][:200]
+        return _fail(events, Status.SETUP, f"A package cannot be loaded ({what}): run `mfo doctor`, or free some memory.")
     except MemoryError:
         traceback.print_exc(file=sys.stderr)
         return _fail(events, Status.FAILED, "The fit ran out of memory: lower the resolution or the samples per pixel.")
@@ -60,7 +64,8 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> t
     reference, notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     folder.require_space(bytes_needed(request))
-    events.attach(folder, lambda pixels: png_bytes(displayed_linear(pixels, view)))
+    small = LivePictures(reference, view)
+    events.attach(folder, small.current, small.difference)
 
     def listener(event: Event) -> None:
         if isinstance(event, Progress):

@@ -43,10 +43,10 @@ def reflection_albedo(roughness: Any, mu: Any) -> tuple[Any, Any]:
     return cycles_table("ggx_E")(roughness, mu), cycles_table("ggx_Eavg")(roughness)
 
 
-def glass_albedo(roughness: Any, mu: Any, n: Any) -> tuple[Any, Any]:
-    """E and Eavg of the white glass lobe with relative index `n`."""
+def glass_albedo(roughness: Any, mu: Any, n: Any, ior: Any) -> tuple[Any, Any]:
+    """E and Eavg of the white glass lobe with relative index `n`, which is `ior` or its reciprocal."""
     inverse = dr.select(n < 1, dr.uint32_array_t(type(n))(1), 0)
-    z = table_place(n)
+    z = table_place(ior)  # that of the reciprocal is the same
     albedo = cycles_table("ggx_glass_E", "ggx_glass_inv_E")(roughness, mu, z, choice=inverse)
     average = cycles_table("ggx_glass_Eavg", "ggx_glass_inv_Eavg")(roughness, z, choice=inverse)
     return albedo, average

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .clamp import saturate
 
 _TABLES: list[GridTable] = []
+MOST_SLICES = 32  # of a table: each is state that a frozen launch carries along
 
 
 class GridTable:
@@ -30,6 +31,8 @@ class GridTable:
     """
 
     def __init__(self, *tables: NDArray[Any]) -> None:
+        self._tables = tables
+        self._slices: dict[float, GridTable] = {}
         self.shape = tables[0].shape
         self.dimensions = len(self.shape)
         corners = [
@@ -51,6 +54,9 @@ class GridTable:
     def __call__(self, *places: Any, choice: Any = None) -> Any:
         """The value at `places`, one array in [0, 1] per axis; differentiable in them, constant outside."""
         float_type = type(places[0])
+        fixed = _literal(places[-1]) if self.dimensions > 1 else None
+        if fixed is not None and (fixed in self._slices or len(self._slices) < MOST_SLICES):
+            return self._slice(fixed)(*places[:-1], choice=choice)
         index_type = dr.uint32_array_t(float_type)
         index = index_type(0)
         fractions = []
@@ -66,6 +72,16 @@ class GridTable:
             values = [a + (b - a) * fraction for a, b in zip(values[::2], values[1::2], strict=True)]
         return values[0]
 
+    def _slice(self, place: float) -> GridTable:
+        """The table at a fixed place of its last axis: half as many numbers to read, from a table that fits a cache."""
+        if place not in self._slices:
+            scaled = min(max(place, 0.0), 1.0) * (self.shape[-1] - 1)
+            node = min(int(scaled), self.shape[-1] - 2)
+            share = scaled - node
+            cut = (np.asarray(t, np.float64)[..., node : node + 2] @ np.array([1 - share, share]) for t in self._tables)
+            self._slices[place] = GridTable(*cut)
+        return self._slices[place]
+
     def _corners_at(self, index: Any, float_type: type) -> list[Any]:
         count = 2**self.dimensions
         width = min(count, 4)
@@ -74,6 +90,12 @@ class GridTable:
         buffer, parts = self.buffer(float_type), count // width
         packets = [dr.gather(packet, buffer, index * parts + part) for part in range(parts)]
         return [value for values in packets for value in values]
+
+
+def _literal(place: Any) -> float | None:
+    """The value of `place` where the compiler knows it and nothing differentiates it."""
+    known = dr.is_jit_v(place) and place.state == dr.VarState.Literal and not dr.grad_enabled(place)
+    return float(place[0]) if known and dr.width(place) == 1 else None
 
 
 def loaded_buffers() -> list[Any]:

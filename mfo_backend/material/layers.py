@@ -9,7 +9,7 @@ Source: Blender 4.2-5.2, node "Principled BSDF" (Cycles closures), checked again
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -81,6 +81,12 @@ class Layers:
         x = self.cos_rotation * direction.x - self.sin_rotation * direction.y
         y = self.cos_rotation * direction.y + self.sin_rotation * direction.x
         return type(direction)(x, y, z)
+
+    def blurred(self, least: Any) -> Layers:
+        """These layers with microfacet lobes of alpha `least` or more; albedos stay, as with Cycles' Filter Glossy."""
+        names = ("ax", "ay", "coat_alpha", "glass_alpha")
+        wider = {n: dr.maximum(getattr(self, n), least) for n in names if getattr(self, n) is not None}
+        return replace(self, **wider)
 
 
 def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: CyclesModel) -> Layers:
@@ -187,11 +193,12 @@ def _add_glass(
     n = dr.select(inside, dr.rcp(ior), ior)
     f0 = saturate(normal_incidence(ior) * p["specular_tint"])
     colour = root(base)
-    gain = _compensation(glass_albedo(roughness, mu, n) if model.multiple_scattering else None, colour)
+    gain = _compensation(glass_albedo(roughness, mu, n, ior) if model.multiple_scattering else None, colour)
     stack |= {
         "glass": w * weight * gain.scale,
         "glass_alpha": dr.maximum(dr.square(roughness), 1e-6),
-        "glass_ior": n,
+        # at exactly 1 the half vector of refraction has no length and its density is infinite
+        "glass_ior": dr.select(dr.abs(n - 1) < 1e-4, 1 + 1e-4, n),
         "glass_fresnel": DielectricTerm(f0, n, film.seen_from_inside(inside, ior) if film else None),
         "glass_colour": colour,
     }

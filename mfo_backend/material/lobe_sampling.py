@@ -104,37 +104,42 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
     radius = dr.sqrt(u2.y)
     cosine = vector(radius * phi_cos, radius * phi_sin, dr.safe_sqrt(1 - u2.y))
     wo, lobe, below = cosine, dr.uint32_array_t(type(u1))(NAMES.index("diffuse")), u1 != u1
-    start: Any = 0
+    chosen, reused, start = {}, u1, 0
     for name, probability in choice.probability.items():
-        index = NAMES.index(name)
-        chosen = (u1 >= start) & (u1 < start + probability)
-        reused = (u1 - start) / dr.maximum(probability, 1e-12)
+        chosen[name] = (u1 >= start) & (u1 < start + probability)
+        if name == "glass":
+            reused = (u1 - start) / dr.maximum(probability, 1e-12)
         start = start + probability
-        if name == "diffuse":
-            continue
-        if name == "transparent":
-            direction = -wi
-        elif name == "sheen" and layers.sheen_shape is not None:
-            direction = layers.sheen_shape.sample(cosine)
-        elif name == "glass":
-            direction, refracts = _sample_glass(layers, reused, u2)
-            below |= chosen & refracts
-        else:
-            ax, ay = (layers.ax, layers.ay) if name == "base" else (layers.coat_alpha, layers.coat_alpha)
-            h = sample_visible(wi, ax, ay, u2)
-            direction = h * (2 * dr.dot(wi, h)) - wi
-        wo = dr.select(chosen, direction, wo)
-        lobe = dr.select(chosen, index, lobe)
+        lobe = dr.select(chosen[name], NAMES.index(name), lobe)
+    # one normal serves whichever microfacet lobe was chosen
+    shapes = {"base": (layers.ax, layers.ay), "coat": (layers.coat_alpha,) * 2, "glass": (layers.glass_alpha,) * 2}
+    ax = ay = None
+    for name in (name for name in shapes if name in chosen):
+        one, other = shapes[name]
+        ax = one if ax is None else dr.select(chosen[name], one, ax)
+        ay = other if ay is None else dr.select(chosen[name], other, ay)
+    if ax is not None:
+        h = sample_visible(wi, ax, ay, u2)
+        reflected = h * (2 * dr.dot(wi, h)) - wi
+        for name in ("base", "coat"):
+            if name in chosen:
+                wo = dr.select(chosen[name], reflected, wo)
+        if "glass" in chosen:
+            through, refracts = _through_glass(layers, h, reused)
+            wo = dr.select(chosen["glass"], dr.select(refracts, through, reflected), wo)
+            below |= chosen["glass"] & refracts
+    if "sheen" in chosen and layers.sheen_shape is not None:
+        wo = dr.select(chosen["sheen"], layers.sheen_shape.sample(cosine), wo)
+    if "transparent" in chosen:
+        wo = dr.select(chosen["transparent"], -wi, wo)
     wo = dr.detach(wo)
     transparent = lobe == NAMES.index("transparent")
     return wo, lobe, (wi.z > 0) & (transparent | dr.select(below, wo.z < 0, wo.z > 0))
 
 
-def _sample_glass(layers: Layers, u1: Any, u2: Any) -> tuple[Any, Any]:
-    wi, n, alpha = layers.wi, layers.glass_ior, layers.glass_alpha
-    h = sample_visible(wi, alpha, alpha, u2)
+def _through_glass(layers: Layers, h: Any, u1: Any) -> tuple[Any, Any]:
+    """The direction refracted at the normal `h`, and whether the number `u1` in [0, 1) chooses it."""
+    wi, n = layers.wi, layers.glass_ior
     c = dr.dot(wi, h)
-    refracts = u1 >= reflect_probability(layers, c)
     cos_t = dr.safe_sqrt(1 - (1 - dr.square(c)) / dr.square(n))
-    through = h * (c / n - cos_t) - wi / n
-    return dr.select(refracts, through, h * (2 * c) - wi), refracts
+    return h * (c / n - cos_t) - wi / n, u1 >= reflect_probability(layers, c)

@@ -5,8 +5,10 @@ Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a n
 further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will
 change after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later
 brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
-no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `mi.traverse` shows
-`<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`.
+no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `filtered` (false) reads
+the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of Mitsuba 3.9 looks at: the integrator
+`cycles_path` puts Filter Glossy there. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
+`<id>.<name>.data`.
 
 A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
 on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
@@ -41,6 +43,7 @@ class BlenderPrincipled(mi.BSDF):
             raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
         version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")))
+        self.filtered = bool(props.get("filtered", False))
         self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
@@ -84,7 +87,10 @@ class BlenderPrincipled(mi.BSDF):
         self.m_flags = flags
         # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
         above = mi.Vector3f(0, 0, 1)
-        evaluate(layer_stack({}, above, self.lobes, self.model), above)
+        for index in (mi.Float(1.5), dr.opaque(mi.Float, 1.5)):  # known and unknown ones read other tables
+            indices = {"ior": index, "coat_ior": index, "specular_ior_level": index}
+            evaluate(layer_stack(indices, above, self.lobes, self.model), above)
+            evaluate(layer_stack({"ior": index, "coat_ior": index}, above, self.lobes, self.model), above)
 
     def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Show every value; those of lobes that are left out too, so that a caller can set them."""
@@ -111,7 +117,8 @@ class BlenderPrincipled(mi.BSDF):
         return values
 
     def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> Layers:
-        return layer_stack(self.values_at(si, active), si.wi, self.lobes, self.model)
+        layers = layer_stack(self.values_at(si, active), si.wi, self.lobes, self.model)
+        return layers.blurred(si.duv_dx.x) if self.filtered else layers
 
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)

@@ -36,8 +36,8 @@ class RecordedModel(Protocol):
     scanned: tuple[str, ...]
     two_sided: bool
 
-    def values(self, given: Mapping[str, Value], free: Collection[str]) -> dict[str, Value]:
-        """Every value `bind` needs besides the free ones, from those of a material.
+    def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
+        """Every value `bind` needs besides the free ones, from those of a material; None is one of a texture.
 
         Raises
         ------
@@ -46,7 +46,7 @@ class RecordedModel(Protocol):
         """
         ...
 
-    def bind(self, fixed: Mapping[str, Value], free: Collection[str]) -> Evaluate:
+    def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
         """The function of all values, without the lobes that cannot contribute."""
         ...
 
@@ -66,14 +66,14 @@ class BlenderPrincipledModel:
     def __init__(self, cycles: CyclesModel = BLENDER_5_0) -> None:
         self._cycles = cycles
 
-    def values(self, given: Mapping[str, Value], free: Collection[str]) -> dict[str, Value]:
+    def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`."""
         for name, opaque in (("transmission_weight", 0.0), ("alpha", 1.0)):
             if name in free or given.get(name, opaque) != opaque:
                 raise UnrecordableError(f"The material has {name!r} and recorded paths hold reflected light only.")
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in free}
 
-    def bind(self, fixed: Mapping[str, Value], free: Collection[str]) -> Evaluate:
+    def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
         """See `RecordedModel`."""
         lobes = needed_lobes(fixed, free)
         return lambda parameters, wi, wo: blender_principled(parameters, wi, wo, lobes, self._cycles)

@@ -32,8 +32,10 @@ def pixels_of(planes: Array) -> Array:
 def flip_map(reference: Array, test: Array, *, pixels_per_degree: float = DEFAULT_PIXELS_PER_DEGREE) -> Array:
     """LDR-FLIP map (height, width) in [0, 1] of two pictures (height, width, 3) in sRGB display values.
 
-    Values outside [0, 1] are clipped. The pooled FLIP value is the mean of the map.
+    Values outside [0, 1] are clipped. The pooled FLIP value is the mean of the map. Computed in float64 and returned in
+    float32: FLIP's powers turn the rounding of float32 into errors of 1e-4 where two pictures nearly agree.
     """
     check_pair(reference, test)
-    light = [planes_of(linear_from_srgb(np.clip(image, 0, 1))) for image in (reference, test)]
-    return FlipReference(light[0], pixels_per_degree).compare(light[1]).error
+    shown = (np.clip(image.astype(np.float64), 0, 1) for image in (reference, test))
+    light = [planes_of(linear_from_srgb(image)) for image in shown]
+    return FlipReference(light[0], pixels_per_degree).compare(light[1]).error.astype(np.float32)

@@ -118,6 +118,13 @@ def hdr_flip_map(
     """HDR-FLIP map (height, width) in [0, 1] of two linear Rec.709 pictures (height, width, 3), in the official range.
 
     The pooled value is the mean of the map. The range comes from the reference, so the order of the two matters.
+    Computed in float64 and returned in float32, as `flip_map`.
     """
     check_pair(reference, test)
-    return HdrFlip(reference, exposures=exposures, curve=curve, pixels_per_degree=pixels_per_degree).map(test)
+    planes = [planes_of(image.astype(np.float64)) for image in (reference, test)]
+    exposures = exposures or official_exposures(reference.astype(np.float64), curve)
+    error = np.zeros(planes[0].shape[1:])
+    for ev in exposures.values:  # nothing is kept of an exposure, of which there may be many
+        shown = [curve.apply(image, ev) for image in planes]
+        np.maximum(error, FlipReference(shown[0], pixels_per_degree).compare(shown[1]).error, out=error)
+    return error.astype(np.float32)

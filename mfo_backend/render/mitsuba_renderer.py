@@ -7,13 +7,15 @@ import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.scene_xml import find_target, prepare_for_fit, read_scene, to_text
+from ..scene.scene_xml import Element, find_target, prepare_for_fit, read_scene, to_text
 from ..types.errors import BadInputError
 from ..types.image import Pixels
+from ..types.light_paths import LightPaths
 from .material_model import material_model
 from .plugins import check_plugins
 from .prepared_material import Materials, PreparedMaterial
@@ -26,10 +28,13 @@ _MASK_RAYS = 4  # rays per pixel and axis that look for the target
 class MitsubaRenderer:
     """The `Renderer` protocol on a loaded Mitsuba scene."""
 
-    def __init__(self, model: str, material: PreparedMaterial, scene: Any) -> None:
+    def __init__(
+        self, model: str, material: PreparedMaterial, scene: Any, light_paths: LightPaths | None = None
+    ) -> None:
         import mitsuba as mi
 
         self.model = model
+        self.light_paths = light_paths
         self.table = material.table
         self.start = material.start
         self.passes = 0.0
@@ -121,7 +126,13 @@ class MitsubaRenderer:
 
 
 def load_mitsuba_renderer(
-    scene_xml: Path, shape_id: str, *, model: str, parameters: str | Sequence[str], materials: Materials
+    scene_xml: Path,
+    shape_id: str,
+    *,
+    model: str,
+    parameters: str | Sequence[str],
+    materials: Materials,
+    light_paths: LightPaths | None = None,
 ) -> MitsubaRenderer:
     """See `renderer.load_renderer`."""
     document = read_scene(scene_xml)
@@ -132,13 +143,19 @@ def load_mitsuba_renderer(
     check_plugins(document, scene_xml.name)
     prepare_for_fit(document)
     material = prepare(document, target, parameters, materials)
+    # only Blender's model knows how to blur its lobes
+    light_paths = light_paths if model == "blender_principled" else None
     load_variant()
     import mitsuba as mi
 
-    from ..material.principled_plugin import register
+    from ..material import principled_plugin
+    from . import cycles_path
 
-    register()
-    with _two_threads():
+    principled_plugin.register()
+    cycles_path.register()
+    if light_paths is not None:
+        _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
+    with two_threads():
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
             scene = mi.load_string(to_text(document), optimize=False, parallel=False)
@@ -146,7 +163,20 @@ def load_mitsuba_renderer(
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
-    return MitsubaRenderer(model, material, scene)
+    return MitsubaRenderer(model, material, scene, light_paths)
+
+
+def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, float | int]) -> None:
+    """Let the integrator, and the materials it blurs, treat indirect light as Cycles does."""
+    integrator = document.find("integrator")
+    assert integrator is not None  # `prepare_for_fit` put it there
+    integrator.set("type", plugin)
+    for name, value in properties.items():
+        kind = "integer" if isinstance(value, int) else "float"
+        ElementTree.SubElement(integrator, kind, name=name, value=repr(value))
+    for bsdf in document.iter("bsdf"):
+        if bsdf.get("type") == "blender_principled":
+            ElementTree.SubElement(bsdf, "boolean", name="filtered", value="true")
 
 
 def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[str, str]:
@@ -169,7 +199,7 @@ def _opaque(seed: int) -> Any:
 
 
 @contextlib.contextmanager
-def _two_threads() -> Iterator[None]:
+def two_threads() -> Iterator[None]:
     """Mitsuba 3.9.1 waits for ever for an EXR file when its thread pool holds the calling thread alone."""
     import drjit as dr
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..types.image import Pixels
+from .mitsuba_renderer import two_threads
 from .variant import load_variant
 
 
@@ -27,8 +28,9 @@ class PlainScene:
         from ..material.measured_network import register
 
         register()
-        # plugins in Python want this thread
-        self._scene = mi.load_file(str(file), optimize=False, parallel=False)
+        with two_threads():
+            # plugins in Python want this thread
+            self._scene = mi.load_file(str(file), optimize=False, parallel=False)
 
     def image(self, *, seed: int, spp: int) -> Pixels:
         """Scene-linear pixels; one that Mitsuba leaves non-finite is black."""

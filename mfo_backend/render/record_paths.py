@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
+from ..types.light_paths import LightPaths
 from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
@@ -31,7 +33,8 @@ class RecordSettings:
     proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
-    wrapper.
+    wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
+    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -41,6 +44,8 @@ class RecordSettings:
     hide_emitters: bool = False
     stride: int = 1
     two_sided: bool = False
+    held: tuple[str, ...] = ()
+    light_paths: LightPaths | None = None
 
 
 @dataclass
@@ -51,6 +56,17 @@ class _Lanes:
     wo: mi.Vector3f
     weight: mi.Color3f
     position: mi.UInt32
+    held: tuple[Any, ...]
+
+
+@dataclass
+class _Hits:
+    """First hits of the camera rays on the target."""
+
+    si: Any
+    position: mi.UInt32
+    share: mi.Float
+    held: tuple[Any, ...]
 
 
 def record_paths(
@@ -83,29 +99,46 @@ def record_paths(
         ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        if settings.two_sided or shape.bsdf().class_name() == "TwoSided":
+        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
+        if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
             si = _face_camera(si)
-        dr.eval(si, position, filter_weight)
-        lanes = _delta_lights(scene, si, position, filter_weight)
-        lanes += _sampled_lights(scene, si, position, filter_weight, settings)
+        held = ()
+        if settings.held:
+            values = shape.bsdf().values_at(si, mi.Bool(True))
+            held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
+        dr.eval(si, position, filter_weight, held)
+        hits = _Hits(si, position, filter_weight, held)
+        lanes = _delta_lights(scene, hits)
+        lanes += _sampled_lights(scene, hits, settings)
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
-        merged = _merge(lanes, rays, covered, coverage, constant)
+        if glow is not None:
+            pixel = rays.pixel[np.array(position)]
+            flat = constant.reshape(-1, 3)
+            dr.eval(glow)
+            for channel in range(3):
+                flat[:, channel] += np.bincount(pixel, glow[channel].numpy(), len(flat))
+        merged = _merge(lanes, rays, covered, coverage, constant, settings.held)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged
 
 
-def indirect_share(scene: mi.Scene, shape: mi.Shape, depth: int, two_sided: bool) -> float:
+def indirect_share(
+    scene: mi.Scene, shape: mi.Shape, depth: int, two_sided: bool, light_paths: LightPaths | None = None
+) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
     with dr.suspend_grad():
         direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2, two_sided=two_sided), allow_dark=True)
         everything = record_paths(
-            scene, shape, RecordSettings(grid=1, depth=depth, two_sided=two_sided), allow_dark=True
+            scene,
+            shape,
+            RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths),
+            allow_dark=True,
         )
-        sums = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) for p in (direct, everything)]
-    return (sums[1] - sums[0]) / max(sums[0], 1e-30)
+        lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
+    return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
 
 def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
@@ -116,8 +149,9 @@ def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     return si
 
 
-def _delta_lights(scene: mi.Scene, si, position: mi.UInt32, share: mi.Float) -> list[_Lanes]:
+def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
     """One exact sample for each light of no extent."""
+    si = hits.si
     lanes = []
     for emitter in scene.emitters():
         if not mi.has_flag(emitter.flags(), DELTA):
@@ -126,14 +160,13 @@ def _delta_lights(scene: mi.Scene, si, position: mi.UInt32, share: mi.Float) -> 
         wo = si.to_local(ds.d)
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
-        lanes.append(_compress(si.wi, wo, value * share, position, lit))
+        lanes.append(_compress(hits, wo, value * hits.share, lit))
     return lanes
 
 
-def _sampled_lights(
-    scene: mi.Scene, si, position: mi.UInt32, share: mi.Float, settings: RecordSettings
-) -> list[_Lanes]:
+def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> list[_Lanes]:
     """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
+    si, position, share = hits.si, hits.position, hits.share
     everywhere = list(scene.emitters())
     extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
     indirect = settings.depth > 2
@@ -143,12 +176,14 @@ def _sampled_lights(
     sampler = fresh_sampler(settings.seed + 0x51ED270, count)
     proposal = settings.proposal
     front = si.wi.z > 0.0
-    # each extended light is chosen with the same probability
+    # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
+    # would be most of the noise, 3 % of a tile for two lights
     choice = 1.0 / max(len(extended), 1)
     lanes = []
     if extended:
         table = mi.UInt32(np.array(extended, np.uint32))
-        pick = dr.minimum(mi.UInt32(sampler.next_1d() * len(extended)), len(extended) - 1)
+        turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, 1 + int(dr.max(position)[0])).next_1d() * 65536)
+        pick = (dr.arange(mi.UInt32, count) + dr.gather(mi.UInt32, turns, position)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
         ds, value = emitter.sample_direction(si, sampler.next_2d(), front)
         wo = si.to_local(ds.d)
@@ -156,7 +191,7 @@ def _sampled_lights(
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         light_density = ds.pdf * choice
         mis = light_density / (light_density + proposal.density(si.wi, wo))
-        lanes.append(_compress(si.wi, wo, value * (share * mis / choice), position, lit))
+        lanes.append(_compress(hits, wo, value * (share * mis / choice), lit))
 
     wo = proposal.sample(si.wi, sampler.next_1d(), sampler.next_2d())
     density = proposal.density(si.wi, wo)
@@ -170,24 +205,52 @@ def _sampled_lights(
     weight = emission / (light_density + density)
     if indirect:
         # a path tracer's radiance along the ray, less what the ray meets directly
-        integrator = mi.load_dict({"type": "path", "max_depth": settings.depth - 1})
-        radiance, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray), None, valid & far.is_valid())
+        before = None
+        if settings.light_paths is not None:
+            value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo, valid)
+            before = (likely, value / dr.maximum(likely, 1e-12))
+        radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, valid & far.is_valid(), before=before)
         weight += dr.maximum(radiance - emission, 0.0) / density
     weight *= share
-    lanes.append(_compress(si.wi, wo, weight, position, valid & (dr.max(weight) > 0.0)))
+    lanes.append(_compress(hits, wo, weight, valid & (dr.max(weight) > 0.0)))
     return lanes
 
 
-def _compress(wi: mi.Vector3f, wo: mi.Vector3f, weight: mi.Color3f, position: mi.UInt32, keep: mi.Bool) -> _Lanes:
+def _traced(
+    scene: mi.Scene,
+    sampler: mi.Sampler,
+    ray: mi.Ray3f,
+    settings: RecordSettings,
+    depth: int,
+    active: mi.Bool,
+    *,
+    hide: bool = False,
+    before: tuple[mi.Float, mi.Color3f] | None = None,
+) -> mi.Color3f:
+    """Radiance along `ray` by a path tracer of the settings' kind, after a bounce of `before`: density and weight."""
+    properties: dict[str, Any] = {"max_depth": depth, "hide_emitters": hide}
+    if settings.light_paths is None:
+        integrator = mi.load_dict({"type": "path", **properties})
+        return integrator.sample(scene, sampler, mi.RayDifferential3f(ray), None, active)[0]
+    from .cycles_path import PLUGIN_NAME, light_path_properties, register  # can be imported when a variant is set
+
+    register()
+    integrator = mi.load_dict({"type": PLUGIN_NAME, **properties, **light_path_properties(settings.light_paths)})
+    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, active=active, before=before)[0]
+
+
+def _compress(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> _Lanes:
     weight = mi.Color3f(weight)
     keep = keep & dr.all(dr.isfinite(weight))
+    wi = hits.si.wi
     dr.eval(wi, wo, weight, keep)
     index = dr.compress(keep)
     return _Lanes(
         dr.gather(mi.Vector3f, wi, index),
         dr.gather(mi.Vector3f, wo, index),
         dr.gather(mi.Color3f, weight, index),
-        dr.gather(mi.UInt32, position, index),
+        dr.gather(mi.UInt32, hits.position, index),
+        tuple(dr.gather(type(value), value, index) for value in hits.held),
     )
 
 
@@ -210,11 +273,9 @@ def _background(
     index = dr.compress(wanted)
     if dr.width(index) > 0:
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
-        integrator = mi.load_dict(
-            {"type": "path", "max_depth": max(settings.depth, 2), "hide_emitters": settings.hide_emitters}
-        )
         ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
-        radiance, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray))
+        depth, hide = max(settings.depth, 2), settings.hide_emitters
+        radiance = _traced(scene, sampler, ray, settings, depth, mi.Bool(True), hide=hide)
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
         dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
         flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
@@ -229,21 +290,25 @@ def _merge(
     covered: NDArray[np.int64],
     coverage: NDArray[np.float32],
     constant: NDArray[np.float32],
+    names: tuple[str, ...],
 ) -> RecordedPaths:
     """One lane array, ordered by tile and pixel."""
     position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
     rank = np.empty(len(position), np.uint32)
     rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
     wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
+    held = [dr.zeros(type(value), len(position)) for value in lanes[0].held] if lanes else []
     begin = 0
     for part in lanes:
         end = begin + dr.width(part.position)
         if end > begin:
             target = mi.UInt32(rank[begin:end])
-            for merged, value in ((wi, part.wi), (wo, part.wo), (weight, part.weight)):
+            pairs = ((wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True))
+            for merged, value in pairs:
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
         begin = end
-    dr.eval(wi, wo, weight)
+    dr.eval(wi, wo, weight, held)
     count = np.bincount(position, minlength=len(rays.pixel))[covered]
     first = np.concatenate([[0], np.cumsum(count)])
-    return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant)
+    values = dict(zip(names, held, strict=False))
+    return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant, values)

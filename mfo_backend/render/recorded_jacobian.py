@@ -45,7 +45,7 @@ class RecordedJacobian:
         The values that vary.
     fixed
         All other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
-        value needs no new kernel.
+        value needs no new kernel. None is a texture's, which the recording holds for each lane.
 
     Notes
     -----
@@ -55,12 +55,13 @@ class RecordedJacobian:
     output is an argument because a frozen function would keep the size it had at the recording.
     """
 
-    def __init__(self, model: RecordedModel, free: ParameterTable, fixed: Mapping[str, Value]) -> None:
+    def __init__(self, model: RecordedModel, free: ParameterTable, fixed: Mapping[str, Value | None]) -> None:
         self.model = model
         self.table = free
         values = {name: value for name, value in fixed.items() if name not in free.names}
         self._absent = [name for name, value in values.items() if value == 0.0]
-        self._fixed_table = [model.table[name] for name in values if name not in self._absent]
+        self._held = [model.table[name] for name, value in values.items() if value is None]
+        self._fixed_table = [model.table[n] for n, value in values.items() if value is not None and value != 0.0]
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
         self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
         dr.eval(self._constants)
@@ -77,18 +78,18 @@ class RecordedJacobian:
         start, stop, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
         dr.eval(theta, out)
+        held = [paths.held[p.name] for p in self._held]
         with _no_garbage_collection():
-            self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, start, stop, scale, out)
+            self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, held, start, stop, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
-    def _kernel(self, theta, constants, wi, wo, weight, start, stop, scale, out):
+    def _kernel(self, theta, constants, wi, wo, weight, held, start, stop, scale, out):
         width = self.table.length + 1
 
         def body(lane, stop, sums):
-            columns = self._columns(
-                theta, constants, *(dr.gather(type(a), a, lane) for a in (wi, wo)), dr.gather(mi.Color3f, weight, lane)
-            )
+            wi_, wo_, weight_, *values = (dr.gather(type(a), a, lane) for a in (wi, wo, mi.Color3f(weight), *held))
+            columns = self._columns(theta, constants, wi_, wo_, weight_, values)
             return (
                 lane + 1,
                 stop,
@@ -106,11 +107,11 @@ class RecordedJacobian:
         for column, total in enumerate(sums):
             dr.scatter(out, total * scale, row + column, mode=dr.ReduceMode.Permute)
 
-    def _columns(self, theta, constants, wi, wo, weight) -> list[mi.Color3f]:
+    def _columns(self, theta, constants, wi, wo, weight, held) -> list[mi.Color3f]:
         """The weighted BSDF value and its derivative by each free value."""
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         dr.enable_grad(*values)
-        result = self._evaluate(self._parameters(values, constants), wi, wo) * weight
+        result = self._evaluate(self._parameters(values, constants, held), wi, wo) * weight
         columns = [dr.detach(result)]
         for value in values:
             dr.set_grad(value, 1.0)
@@ -125,10 +126,12 @@ class RecordedJacobian:
         theta = mi.Float(self.table.pack({}).astype(np.float32))
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         up = mi.Vector3f(0.0, 0.0, 1.0)
-        dr.eval(self._evaluate(self._parameters(values, self._constants), up, up))
+        some = [mi.Color3f(0.5) if p.size == 3 else mi.Float(0.5) for p in self._held]
+        dr.eval(self._evaluate(self._parameters(values, self._constants, some), up, up))
 
-    def _parameters(self, values: list[mi.Float], constants: mi.Float) -> dict[str, Any]:
+    def _parameters(self, values: list[mi.Float], constants: mi.Float, held: list[Any]) -> dict[str, Any]:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)
+        parameters |= {p.name: value for p, value in zip(self._held, held, strict=True)}
         rest = [dr.gather(mi.Float, constants, mi.UInt32(k)) for k in range(sum(p.size for p in self._fixed_table))]
         for table, entries in ((self.table, iter(values)), (self._fixed_table, iter(rest))):
             for p in table:

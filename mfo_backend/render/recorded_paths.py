@@ -12,8 +12,10 @@ rays and no random numbers, so the objective is deterministic.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -139,7 +141,9 @@ class RecordedPaths:
         Share of each covered pixel's filter weight that lies on the target.
     constant
         What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
-        seen in covered pixels; 0 elsewhere.
+        seen in covered pixels, the target's own emission; 0 elsewhere.
+    held
+        Values that a texture gives the material, by name: one number or colour for each lane.
     """
 
     wi: mi.Vector3f
@@ -150,6 +154,7 @@ class RecordedPaths:
     first: NDArray[np.int64]
     coverage: NDArray[np.float32]
     constant: Pixels
+    held: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def lanes(self) -> int:
@@ -159,7 +164,8 @@ class RecordedPaths:
     @property
     def bytes(self) -> int:
         """Memory of the lanes."""
-        return self.lanes * BYTES_PER_LANE
+        floats = sum(3 if isinstance(value, mi.Color3f) else 1 for value in self.held.values())
+        return self.lanes * (BYTES_PER_LANE + 4 * floats)
 
     @property
     def interior(self) -> NDArray[np.bool_]:

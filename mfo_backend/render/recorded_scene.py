@@ -51,14 +51,15 @@ class RecordedScene:
     """
 
     def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
-        if renderer.shape.is_emitter():
-            raise UnrecordableError("The target emits light and recorded paths hold reflected light only.")
+        self._integrator = renderer.scene.integrator()
+        if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
+            raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
         self._covered = covered
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
+        self._held = tuple(name for name, value in self._fixed.items() if value is None)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
-        self._integrator = renderer.scene.integrator()
         self.needs = self._probe()
 
     def _probe(self) -> SceneNeeds:
@@ -69,7 +70,7 @@ class RecordedScene:
         depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
-        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided)
+        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths)
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, 2, (note,))
@@ -85,12 +86,14 @@ class RecordedScene:
         """
         self.renderer.show(vector)
         proposal = DefensiveProposal()
-        if near:
-            proposal = DefensiveProposal.around(float(self._value(vector, self.model.scanned[0])))
+        width = self._value(vector, self.model.scanned[0])
+        if near and isinstance(width, float):
+            proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
-        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, self.model.two_sided)
+        two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
+        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths)
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
@@ -111,28 +114,32 @@ class RecordedScene:
 
         return at
 
-    def _value(self, vector: NDArray[np.float64], name: str) -> Value:
+    def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed[name]
 
 
-def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value]:
-    """The values of the target's material in the scene.
+def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value | None]:
+    """The values of the target's material in the scene, None for those of a texture.
 
     Raises
     ------
     UnrecordableError
-        If one of them is a texture.
+        If one of them is a texture and the material is a plugin that cannot be asked for its values at a point.
     """
     keys = mi.traverse(renderer.shape.bsdf())
-    values: dict[str, Value] = {}
+    values: dict[str, Value | None] = {}
+    asked = hasattr(renderer.shape.bsdf(), "values_at")
     for key in keys.keys():  # noqa: SIM118  the traversed object has no iterator of keys
         parts = key.split(".")
         name = next((part for part in parts if part in model.table.names), None)
         if name is None:
             continue
         if parts[parts.index(name) + 1 :] not in ([], ["value"]):
-            raise UnrecordableError(f"Parameter {name!r} is a texture: recorded paths need one value.")
+            if not asked:
+                raise UnrecordableError(f"Parameter {name!r} is a texture: recorded paths need one value.")
+            values[name] = None
+            continue
         numbers = np.array(keys[key], np.float64).ravel()
         size = model.table[name].size
         values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))

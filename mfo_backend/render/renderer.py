@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.image import Pixels
+from ..types.light_paths import LightPaths
 from ..types.parameter import ParameterTable
 
 Vector = NDArray[np.float64]
@@ -49,6 +50,7 @@ def load_renderer(
     model: str,
     parameters: str | Sequence[str],
     materials: Mapping[str, Mapping[str, Any]] | None = None,
+    light_paths: LightPaths | None = None,
 ) -> Renderer:
     """Load a scene with the material of shape `shape_id` open to change.
 
@@ -60,6 +62,8 @@ def load_renderer(
         Names of its parameters, ``"all"`` or ``"reduced"``.
     materials
         `materials` of request.json, for models that are not described by the scene file.
+    light_paths
+        What Cycles does to indirect light; the model `mitsuba_principled` has none of it.
 
     Raises
     ------
@@ -70,4 +74,11 @@ def load_renderer(
     """
     from .mitsuba_renderer import load_mitsuba_renderer
 
-    return load_mitsuba_renderer(scene_xml, shape_id, model=model, parameters=parameters, materials=materials or {})
+    return load_mitsuba_renderer(
+        scene_xml,
+        shape_id,
+        model=model,
+        parameters=parameters,
+        materials=materials or {},
+        light_paths=light_paths,
+    )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from ..types.errors import SetupError
@@ -42,6 +43,8 @@ def load_variant(name: str | None = None) -> str:
         except (ImportError, AttributeError, RuntimeError) as error:
             reasons.append(f"{candidate}: {str(error).splitlines()[0]}")
         else:
+            if os.environ.get("MFO_THREADS", "").isdecimal():  # several processes share this machine
+                use_threads(max(1, int(os.environ["MFO_THREADS"])))
             return candidate
     raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")
 

@@ -85,6 +85,9 @@ def _figures(result: FitResult) -> str:
         if name in result.errors:
             before, after = result.errors[name]
             figures.append((f"{before:.3f} → {after:.3f}", f"mean {_ERROR_NAMES[name]}"))
+    if result.model_gap is not None:
+        gap = result.model_gap
+        figures.append((f"{100 * gap.relative:.2g} %", f"model gap, at most {100 * gap.at_most:.2g} %"))
     iterations = sum(stage.iterations for stage in result.stages)
     figures.append((f"{result.seconds:.1f} s", f"{iterations} iterations"))
     figures.append((f"{result.passes:.0f}", "passes of one full render"))

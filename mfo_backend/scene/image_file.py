@@ -14,6 +14,7 @@ from ..types.image import Encoding, Image, Pixels
 from .exr_file import read_exr, write_exr
 from .hdr_file import read_hdr
 from .picture_size import Size, check_declared_size
+from .png_file import deep_colour
 from .scene_xml import is_file
 
 __all__ = ["check_reference", "read_image", "write_exr", "write_png"]
@@ -29,7 +30,7 @@ def read_image(path: Path | str, size: Size | None = None) -> Image:
 
     EXR (any compression, half or float; channels RGB, RGBA or Y, also layered as Blender writes them) and Radiance HDR
     are scene-linear. PNG, JPEG and TIFF are taken as sRGB display values in [0, 1]; a grey picture becomes three equal
-    channels. Pillow reads 16-bit colour PNG and TIFF with 8 bits a channel; 16-bit grey keeps its depth. With `size`
+    channels. PNG and grey pictures keep 16 bits a channel; Pillow reads colour TIFF of 16 bits with 8. With `size`
     (width, height) a picture of another one is refused by its header alone.
 
     Raises
@@ -87,6 +88,12 @@ def check_reference(image: Image, width: int, height: int) -> tuple[Image, tuple
 def _read_display(path: Path, size: Size | None) -> Image:
     from PIL import Image as PillowImage
 
+    deep = deep_colour(path, size) if path.suffix.lower() == ".png" else None
+    if deep is not None:
+        values = deep.astype(np.float32) / np.float32(65535)
+        alpha = _contiguous(values[..., -1]) if values.shape[-1] in (2, 4) else None
+        colour = values[..., :3] if values.shape[-1] > 2 else np.repeat(values[..., :1], 3, axis=-1)
+        return Image(_contiguous(colour), Encoding.SRGB, alpha)
     try:
         # Pillow warns about large images; ours is an error, and Pillow's hard limit is one like any other
         with warnings.catch_warnings():

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .certainty import Certainty, WeakCombination
+from .model_gap import ModelGap
 from .parameter import Value
 from .status import Status
 
@@ -42,7 +43,7 @@ class FitResult:
     `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
     well the picture determines each value, where the preset finds out, and `weak_combinations` which values it
     determines together only; `notes` are sentences on what was left out or
-    kept.
+    kept. `model_gap` is None where it could not be measured.
     """
 
     status: Status
@@ -58,3 +59,4 @@ class FitResult:
     certainty: dict[str, Certainty] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     weak_combinations: tuple[WeakCombination, ...] = ()
+    model_gap: ModelGap | None = None

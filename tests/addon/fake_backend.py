@@ -54,7 +54,14 @@ def say(**event: object) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Act as `python -m mfo_backend run JOB ...`."""
+    """Act as `python -m mfo_backend run JOB ...`, as `judge`, or as `doctor --json` where all is well."""
+    if arguments[:3] == ["-m", "mfo_backend", "judge"]:
+        return judge(Path(arguments[3]), Path(arguments[4]))
+    if arguments[2:] == ["doctor", "--json"]:
+        found = {"Python": "3.12.0 on Linux", "mitsuba": "0.0", "drjit": "0.0", "Mitsuba variant": "llvm_ad_rgb"}
+        checks = [{"name": name, "state": "ok", "found": text, "cure": ""} for name, text in found.items()]
+        print(json.dumps({"works": True, "checks": checks}))
+        return 0
     assert arguments[:3] == ["-m", "mfo_backend", "run"], arguments
     folder, control = Path(arguments[3]), json.loads(os.environ.get("MFO_FAKE", "{}"))
     request = json.loads((folder / "request.json").read_text("utf-8"))
@@ -96,7 +103,8 @@ def main(arguments: list[str]) -> int:
             png(
                 pictures / "current.png", (int(120 + 60 * fraction), int(120 - 60 * fraction), int(120 - 80 * fraction))
             )
-            say(event="preview", path="pictures/current.png")
+            png(pictures / "current_difference.png", (int(200 - 180 * fraction), 20, 60))
+            say(event="preview", path="pictures/current.png", difference="pictures/current_difference.png")
         if i % STEPS == STEPS - 1:
             say(
                 event="stage_end", stage=stage, status="stale", iterations=STEPS, loss_start=0.2, loss_best=loss,
@@ -108,6 +116,7 @@ def main(arguments: list[str]) -> int:
     png(pictures / "start.png", (120, 120, 120))
     png(pictures / "result.png", (178, 62, 42))
     png(pictures / "difference.png", (20, 10, 60))
+    png(pictures / "curve.png", (86, 156, 240))
     (folder / "index.html").write_text("<!doctype html><title>report</title>")
     partial = cancelled.is_set()
     status = "cancelled" if partial else "stale"
@@ -116,12 +125,22 @@ def main(arguments: list[str]) -> int:
         "schema_version": 1, "status": status, "sentence": sentence, "model": "mitsuba_principled", "partial": partial,
         "initial": INITIAL, "recovered": RECOVERED, "bounds": {}, "stages": [], "seconds": 1.0, "passes": 1.0,
         "errors": {"flip": [0.21, 0.012], "hdr_flip": [0.3, 0.05], "mse": [0.1, 0.0004]},
-        "notes": [], "versions": {}, "request_fit": request["fit"],
+        "certainty": {"roughness": {"sd": [0.01], "level": "determined"}, "metallic": {"sd": [0.2], "level": "weak"}},
+        "notes": ["Light 'Sun': specular factor is ignored."], "versions": {}, "request_fit": request["fit"],
     }  # fmt: skip
     (folder / "result.tmp").write_text(json.dumps(result))
     os.replace(folder / "result.tmp", folder / "result.json")
     say(event="finished", status=status, sentence=sentence, result="result.json")
     return 4 if partial else 0
+
+
+def judge(folder: Path, picture: Path) -> int:
+    """Act as `python -m mfo_backend judge JOB PICTURE --json`."""
+    assert picture.stat().st_size > 0
+    for name, colour in (("cycles", (175, 64, 44)), ("cycles_difference", (24, 12, 64))):
+        png(folder / "pictures" / f"{name}.png", colour)
+    print(json.dumps({"status": "ok", "metrics": {"flip": 0.0234}, "notes": []}), flush=True)
+    return 0
 
 
 if __name__ == "__main__":

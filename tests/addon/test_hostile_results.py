@@ -86,6 +86,8 @@ def test_numbers_json_does_not_know_are_none() -> None:
 )
 def test_events_with_wrong_values_are_passed_over(scene: SimpleNamespace, tmp_path: Path, event: dict) -> None:
     from blender_addon import running_job
+    from blender_addon.fit_queue import PreparedFit
 
     process = SimpleNamespace(folder=tmp_path, cancelling=False)
-    running_job._handle(running_job.RunningJob(process, "Glaze", 0, (), True), event)
+    prepared = PreparedFit(tmp_path, tmp_path, "Glaze", 0, tmp_path / "reference.exr", (), True)
+    running_job._handle(running_job.RunningJob(process, prepared), event)

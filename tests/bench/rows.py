@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from mfo_backend.bench.row import Row, Task
 from mfo_backend.types.status import Status
@@ -26,11 +29,39 @@ class FakeRunner:
         self._broken = broken or {}
         self._cancelled = cancelled
 
-    def seed(self, task: Task) -> int:
-        return task.scene
-
-    def __call__(self, task: Task, should_stop: Callable[[], bool]) -> Row:
+    def __call__(self, task: Task, should_stop: Callable[[], bool], pictures=None) -> Row:
         self.asked.append(task)
         if task in self._broken:
             raise self._broken[task]
         return row(task, status=Status.CANCELLED.value if task == self._cancelled else Status.CONVERGED.value)
+
+    def pictures(self, task: Task) -> str:
+        return f"{task.scenario} {task.scene}"
+
+
+@dataclass(frozen=True)
+class FakeRecipe:
+    """A runner for workers; it waits, notes every task in a file of its process, and kills its process for `deadly`."""
+
+    folder: str
+    seconds: float = 0.0
+    deadly: Task | None = None
+    size: int = 16
+
+    def make(self):
+        return NotingRunner(self), {"threads": 1}
+
+
+class NotingRunner(FakeRunner):
+    def __init__(self, recipe: FakeRecipe) -> None:
+        super().__init__()
+        self._recipe = recipe
+
+    def __call__(self, task: Task, should_stop: Callable[[], bool], pictures=None) -> Row:
+        assert pictures == f"{task.scenario} {task.scene}"
+        with open(f"{self._recipe.folder}/asked-{os.getpid()}", "a") as file:
+            file.write(f"{task.key}\n")
+        time.sleep(self._recipe.seconds)
+        if task == self._recipe.deadly:
+            os._exit(9)
+        return super().__call__(task, should_stop)

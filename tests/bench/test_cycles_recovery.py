@@ -7,29 +7,37 @@ import dataclasses
 
 import pytest
 
-from bench.cycles_recovery import LIMIT, SCENES, TABLE, Recovery, summary, table_row
+from bench.cycles_recovery import LEAST_JOD, LIMIT, SCENES, TABLE, Recovery, summary, table_row
 
-GOOD = Recovery(before=0.2, after=0.008, floor=0.006, paired=0.004, model=0.007, seconds=12.4, notes=())
-BAD = dataclasses.replace(GOOD, after=0.05, paired=0.045)
-NOISY = dataclasses.replace(GOOD, after=0.021, floor=0.02)
+GOOD = Recovery(
+    before=0.2, after=0.008, floor=0.006, model=0.007, jod=9.95, jod_floor=9.98, gap=0.012, seconds=12.4, notes=()
+)
+BAD = dataclasses.replace(GOOD, after=0.05, jod=9.5)
+UNJUDGED = dataclasses.replace(GOOD, jod=None, jod_floor=None, gap=None)
 HEAD = f"scenes have a mean FLIP of at most {LIMIT} after applying"
+LEAST = f"have a JOD of at least {LEAST_JOD}"
 
 
-def test_row() -> None:
-    row = table_row(4, "point", GOOD)
-    assert row == "| 4 | point | 0.2000 | 0.0080 | 0.0060 | 0.0040 | 0.0070 | 12 s |"
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (GOOD, "| 4 | point | 0.2000 | 0.0080 | 0.0060 | 0.0070 | 9.95 | 9.98 | 1.2 % | 12 s |"),
+        (UNJUDGED, "| 4 | point | 0.2000 | 0.0080 | 0.0060 | 0.0070 | - | - | - | 12 s |"),
+    ],
+)
+def test_row(found: Recovery, expected: str) -> None:
+    assert table_row(4, "point", found) == expected
 
 
 @pytest.mark.parametrize(
     ("found", "tried", "expected"),
     [
-        ([GOOD, BAD], 2, f"1 of 2 {HEAD}, 0 failed. With the same noise the largest is 0.0450."),
-        ([GOOD], 3, f"1 of 3 {HEAD}, 2 failed. With the same noise the largest is 0.0040."),
         (
-            [GOOD, NOISY],
+            [GOOD, BAD],
             2,
-            f"1 of 2 {HEAD}, 0 failed, in 1 noise alone gives more. With the same noise the largest is 0.0040.",
+            f"1 of 2 {HEAD}, 0 failed. 1 of 2 {LEAST}, the lowest is 9.50. The largest FLIP is 0.0500.",
         ),
+        ([UNJUDGED], 3, f"1 of 3 {HEAD}, 2 failed. The largest FLIP is 0.0080."),
         ([], 1, f"0 of 1 {HEAD}, 1 failed."),
     ],
 )
@@ -41,5 +49,5 @@ def test_table_has_every_scene_and_counts_as_its_rows_do() -> None:
     text = TABLE.read_text("utf-8")
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("| ")][1:]
     assert [(int(row[0]), row[1]) for row in rows] == list(SCENES)
-    good = sum(len(row) == 8 and float(row[3]) <= LIMIT for row in rows)
+    good = sum(len(row) == 10 and float(row[3]) <= LIMIT for row in rows)
     assert f"{good} of {len(SCENES)} scenes" in text

@@ -13,7 +13,6 @@ from mfo_backend.bench.fit_runner import FitRunner
 from mfo_backend.bench.method import method_settings
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.summary import SOLVED_FLIP
-from mfo_backend.types.errors import BadInputError
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +46,10 @@ def test_the_truth_itself_has_no_error(runner):
     assert judge.pictures.floor.relative_rmse > 0
 
 
-def test_glass_is_refused_by_our_presets(runner):
-    with pytest.raises(BadInputError, match="spec_trans"):
-        runner(Task("transparency", 0, "fast"), never)
+def test_glass_is_fitted_in_blenders_model(runner):
+    row = runner(Task("transparency_4spp", 0, "fast"), never)
+    assert set(row.recovered) == {"base_color", "roughness", "ior", "transmission_weight"}
+    assert row.flip < row.start_flip
 
 
 def test_the_papers_loop_improves_on_the_start_under_a_probe(runner, monkeypatch):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import re
 from xml.etree import ElementTree
@@ -10,10 +11,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from mfo_backend.bench.gallery import best_median_worst, gallery
 from mfo_backend.bench.plots import pareto, time_to_quality
 from mfo_backend.bench.report import write_report
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.row_file import RowFile
+from mfo_backend.bench.row_pictures import picture_file
 from mfo_backend.bench.summary import comparable, quantile, summaries
 from mfo_backend.bench.svg_axes import decade_ticks
 
@@ -87,8 +90,9 @@ def test_the_report_says_what_raised_and_loads_nothing(tmp_path):
         RowFile(tmp_path).append(one)
     text = write_report(tmp_path, notes=["The machine was shared & busy."])
     assert "| fast | 4 | 1 | 2 (50%) | 3 (75%) | 3 (75%) | 2 | 2.8 | 3 | 30 | 0.0145 | 0.0295 | – |" in text
-    assert "| mfo-hdr | 4 | 0 | 0 (0%) | 4 (100%) | 50 | 50 | – |" in text
-    assert "- 1 x base, fast: ValueError: no <light>" in text
+    assert "| mfo-hdr | 4 | 0 | 0 (0%) | 4 (100%) | 4 (100%) | 50 | 50 | – |" in text
+    assert "| base | fast | 1 | ValueError: no <light> |" in text
+    assert "busy" in write_report(tmp_path)  # kept
     assert (tmp_path / "report.md").read_text("utf-8") == text
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "busy" in page
@@ -96,3 +100,25 @@ def test_the_report_says_what_raised_and_loads_nothing(tmp_path):
     assert not re.search(r"<script|src=|href=|url\(", page)
     for name in re.findall(r"\]\((.*?)\)", text):
         ElementTree.parse(tmp_path / name)
+    assert (tmp_path / "summary.csv").read_text().startswith("scenario,method,runs")
+
+
+def test_pictures_are_of_the_best_median_and_worst_scene(tmp_path):
+    rows = [row(Task("base", scene, "balanced"), flip=flip) for scene, flip in enumerate((0.3, 0.1, None, 0.2, 0.4))]
+    assert [(name, r.scene) for name, r in best_median_worst(rows)] == [("best", 1), ("median", 3), ("worst", 4)]
+    raised = row(Task("base", 5, "balanced"), flip=None, error="no")
+    assert best_median_worst([raised]) == []
+    for one in rows:
+        for method in ("reference", "truth", "balanced"):
+            path = picture_file(tmp_path, Task("base", one.scene, method))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(f"{one.scene} {method}".encode())
+    page = gallery(tmp_path, rows, ["balanced", "mfo-hdr"])
+    pictures = [base64.b64decode(text).decode() for text in re.findall(r"base64,(.*?)\"", page)]
+    assert pictures == [f"{s} {m}" for s in (1, 3, 4) for m in ("reference", "truth", "balanced")]
+
+
+def test_seconds_of_a_busy_machine_are_marked(tmp_path):
+    for scene, share in enumerate((0.5, 0.3, 0.0)):
+        RowFile(tmp_path).append(row(Task("base", scene, "fast"), others_busy=share))
+    assert "While 2 of 3 rows were measured" in write_report(tmp_path)

@@ -12,8 +12,7 @@ from mfo_backend.bench.assets import Assets, generated_probe
 from mfo_backend.bench.bumpy_sphere import bumpy_sphere, write_ply
 from mfo_backend.bench.method import METHODS, OUR_METHODS, PAPER_METHODS, method_settings
 from mfo_backend.bench.scenario import SCENARIOS
-from mfo_backend.bench.scene import write_scene
-from mfo_backend.material.mitsuba_parameters import MITSUBA_PRINCIPLED
+from mfo_backend.bench.scene import TABLES, write_scene
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding
 
@@ -33,13 +32,13 @@ def test_a_scene_is_the_same_every_time_and_another_by_number(tmp_path, scenario
     assert len({file.read_text() for file in files}) == len(files)
     for values in (first.truth, first.start):
         for name, value in values.items():
-            parameter = MITSUBA_PRINCIPLED[name]
+            parameter = TABLES[scenario.model][name]
             assert np.all((np.asarray(value) >= parameter.lower) & (np.asarray(value) <= parameter.upper))
 
 
 def test_the_papers_transparency_has_its_ranges(tmp_path):
     truths = [write_scene(SCENARIOS["transparency"], n, 8, NO_DATA, tmp_path).truth for n in range(30)]
-    assert all(t["spec_trans"] >= 0.75 and t["roughness"] <= 0.6 and "metallic" not in t for t in truths)
+    assert all(t["transmission_weight"] >= 0.75 and t["roughness"] <= 0.6 and "metallic" not in t for t in truths)
 
 
 def test_the_object_is_closed_and_faces_outward():
@@ -97,6 +96,8 @@ def test_methods_are_what_they_are_called(method):
     assert (settings.seed, settings.spp, settings.parameters) == (7, 4, "all")
     if method in OUR_METHODS:
         assert settings.preset == method
+    elif method.startswith("lpips"):
+        assert settings.stage_names(Encoding.LINEAR) == ("lpips_alex-hdr" if "pu" in method else "lpips_alex-ldr",)
     elif method in PAPER_METHODS:
         stages = {"mse": ["mse"], "flip": ["flip"], "mfo": ["mse", "flip"]}[method[:-4]]
         assert list(settings.stage_names(Encoding.LINEAR)) == [f"{stage}-{method[-3:]}" for stage in stages]

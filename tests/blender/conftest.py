@@ -25,12 +25,24 @@ class RealBlender:
     package: Path
 
     def run(
-        self, *arguments: str, check: bool = True, windows: bool = False, **variables: str
+        self,
+        *arguments: str,
+        check: bool = True,
+        windows: bool = False,
+        online: bool = False,
+        factory: bool = True,
+        **variables: str,
     ) -> subprocess.CompletedProcess[str]:
-        """Start it with factory settings, in background unless with `windows`, and wait."""
+        """Start it and wait: in background unless with `windows`; `factory`: not with the profile's preferences."""
         environment = os.environ | {"BLENDER_USER_RESOURCES": str(self.profile)} | variables
         done = subprocess.run(
-            [self.program, *([] if windows else ["--background"]), "--factory-startup", "--offline-mode", *arguments],
+            [
+                self.program,
+                *([] if windows else ["--background"]),
+                *(["--factory-startup"] if factory and not online else []),  # what it keeps goes into the profile
+                "--online-mode" if online else "--offline-mode",
+                *arguments,
+            ],
             capture_output=True, text=True, env=environment, timeout=250, check=False,
         )  # fmt: skip
         if check:

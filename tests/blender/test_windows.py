@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from ..addon import fake_backend
+from ..addon.wheel_folder import write_wheel
 from .conftest import ADDON_ID, RealBlender
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
@@ -18,6 +20,16 @@ def test_in_windows(windowed: RealBlender, tmp_path: Path) -> None:
     fake_backend.png(tmp_path / "reference.png", (180, 60, 40))
     python = str(fake_backend.write_interpreter(tmp_path / "backend_python"))
     out = windowed.script(SCRIPT, ADDON_ID, str(tmp_path), windows=True, MFO_BACKEND_PYTHON=python)
+    assert "ALL GOOD" in out, out[-4000:]
+    assert "script error" not in out, out[-4000:]
+    print(next(line for line in out.splitlines() if "ALL GOOD" in line))
+
+
+def test_backend_set_up_in_windows(windowed: RealBlender, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MFO_BACKEND_PYTHON", raising=False)
+    lock = write_wheel(tmp_path / "wheels")
+    arguments = [ADDON_ID, str(tmp_path / "wheels"), str(lock), os.environ.get("MFO_BASE_PYTHON", "")]
+    out = windowed.script(SCRIPT.with_name("set_up_in_windows.py"), *arguments, windows=True)
     assert "ALL GOOD" in out, out[-4000:]
     assert "script error" not in out, out[-4000:]
     print(next(line for line in out.splitlines() if "ALL GOOD" in line))

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 import pytest
 
 from mfo_backend.bench.row_file import RowFile
-from mfo_backend.bench.run_bench import all_tasks
+from mfo_backend.bench.run_bench import all_tasks, run_bench
 from mfo_backend.cli.bench import work
 from mfo_backend.cli.main import main
 from tests.bench.rows import FakeRunner
@@ -19,7 +20,7 @@ def arguments(folder) -> argparse.Namespace:
 
 
 def test_rows_and_report(tmp_path, capsys):
-    assert work(arguments(tmp_path), FakeRunner(), {"threads": 2}) == 0
+    assert work(arguments(tmp_path), partial(run_bench, runner=FakeRunner(), machine={"threads": 2})) == 0
     assert len(RowFile(tmp_path).read()) == 4
     assert "| fast | 2 | 0 | 2 (100%)" in capsys.readouterr().out
     assert main(["bench", "report", str(tmp_path), "--note", "A remark."]) == 0
@@ -28,7 +29,7 @@ def test_rows_and_report(tmp_path, capsys):
 
 def test_a_stopped_bench_reports_what_is_there_and_exits_with_4(tmp_path, capsys):
     runner = FakeRunner(cancelled=all_tasks(["base"], ["fast", "mfo-hdr"], 2)[3])
-    assert work(arguments(tmp_path), runner, {}) == 4
+    assert work(arguments(tmp_path), partial(run_bench, runner=runner, machine={})) == 4
     captured = capsys.readouterr()
     assert "| fast | 1 |" in captured.out
     assert "goes on where it was" in captured.err

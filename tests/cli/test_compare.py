@@ -16,6 +16,7 @@ from mfo_backend.cli import compare
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.scene.image_file import write_exr, write_png
 from mfo_backend.types.errors import BadInputError
+from tests.scene.test_png_file import write_png16
 
 
 @pytest.fixture(autouse=True)
@@ -41,6 +42,10 @@ def files(tmp_path):
     write_exr(tmp_path / "other.exr", reference[:20])
     write_exr(tmp_path / "black.exr", 0 * reference)
     write_exr(tmp_path / "nan.exr", np.where(reference > 0.5, np.nan, reference))
+    write_exr(tmp_path / "negative.exr", np.where(reference > 0, reference, -0.5))
+    write_exr(tmp_path / "infinite.exr", np.where(reference > 0.8, np.inf, reference))
+    write_exr(tmp_path / "dot.exr", reference[12:13, 12:13])
+    write_exr(tmp_path / "other_dot.exr", test[12:13, 12:13])
     write_png(tmp_path / "mask.png", mask)
     return tmp_path
 
@@ -114,6 +119,51 @@ def test_a_black_reference_is_defined(files, capsys):
     assert found["hdr_flip"] > 0
 
 
+def test_negative_pixels_count_as_zero_but_for_mse_and_are_noted(files, capsys):
+    plain = metrics(capsys, files, "ref.exr", "test.exr")
+    negative = metrics(capsys, files, "negative.exr", "test.exr")
+    changed = [name for name, value in plain["metrics"].items() if negative["metrics"][name] != value]
+    assert changed == ["mse"]
+    assert any(
+        "has 576 pixels with negative values; all metrics but mse took them as 0" in n for n in negative["notes"]
+    )
+
+
+def test_pictures_of_one_pixel_have_every_metric(files, capsys):
+    found = metrics(capsys, files, "dot.exr", "other_dot.exr", "--out", "maps.dir")["metrics"]
+    assert all(value > 0 for name, value in found.items() if "jod" not in name)
+
+
+def display_file(folder, suffix, levels):
+    """One picture in every kind of display file; levels (height, width, 3) in 0 to 255."""
+    path = folder / f"picture.{suffix}"
+    if suffix == "png16":
+        path = folder / "deep.png"
+        write_png16(path, (levels.astype(np.uint16) * 257))
+    else:
+        PillowImage.fromarray(levels).save(path, **({"quality": 95} if suffix == "jpg" else {}))
+    return path.name
+
+
+@pytest.mark.parametrize("suffix", ["png16", "png", "tif", "jpg"])
+def test_every_kind_of_display_file_is_compared(files, capsys, suffix):
+    levels = np.random.default_rng(1).integers(60, 200, (6, 8, 3)).repeat(8, 0).repeat(8, 1).astype(np.uint8)
+    write_png(files / "same.png", levels / 255)
+    found = metrics(capsys, files, "same.png", display_file(files, suffix, levels))["metrics"]
+    # 257 times a level of 8 bits is that level; JPEG at this quality is a few levels off
+    assert found["mse"] == 0 if suffix != "jpg" else 0 < found["mse"] < 4e-3
+
+
+def test_radiance_hdr_files_are_compared(files, capsys):
+    """One pixel of four equal bytes each way: 128 * 2^(129 - 136) = 1 and half of it (Ward, Real Pixels)."""
+    for name, exponent in (("one", 129), ("half", 128)):
+        head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
+        (files / f"{name}.hdr").write_bytes(head + bytes([128, 128, 128, exponent]))
+    found = metrics(capsys, files, "one.hdr", "half.hdr")["metrics"]
+    assert found["mse"] == pytest.approx(0.25, rel=0.02)
+    assert found["hdr_flip"] > 0.1
+
+
 def test_absent_judges_are_one_note(files, capsys):
     notes = metrics(capsys, files, "ref.exr", "test.exr")["notes"]
     assert [note for note in notes if "pip install" in note] == notes[-1:]
@@ -138,6 +188,7 @@ def test_the_judges_score_and_what_they_were_told_is_recorded(files, capsys, end
     [
         (("ref.exr", "other.exr"), "The test image is 30x20 but the reference is 30x24"),
         (("nan.exr", "ref.exr"), r"The reference has \d+ pixels with NaN"),
+        (("ref.exr", "infinite.exr"), r"The test image has 0 pixels with NaN and \d+ with infinite"),
         (("ref.exr", "missing.exr"), "does not exist"),
         (("ref.exr", "test.exr", "--mask", "black.exr"), "The mask is empty"),
         (("ref.exr", "test.exr", "--mask", "other.exr"), "The mask has shape"),

@@ -8,12 +8,14 @@ import os
 import re
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
 
-from mfo_backend.cli import machine_checks
+from mfo_backend.cli import machine_checks, optional_checks
 from mfo_backend.cli.machine_checks import check_machine
+from mfo_backend.cli.optional_checks import check_optional
 from mfo_backend.render.llvm import LlvmVerdict
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,6 +46,7 @@ def test_it_says_what_works_here() -> None:
     assert report["works"] == ("problem" not in states.values())
     assert done.returncode == (0 if report["works"] else 3)
     wanted = {"Python", "mitsuba", "drjit", "OpenEXR", "Mitsuba variant", "GPU", "threads", "cache", "kernel cache"}
+    wanted |= {"judges", "LPIPS weights", "Octave or MATLAB", "HDR-VDP-3"}
     assert wanted <= set(states)
     for check in report["checks"]:
         assert check["found"]
@@ -118,3 +121,51 @@ def test_the_versions_are_those_of_the_package() -> None:
     checked = {f"{name}=={v}" for name, v in machine_checks.PINNED.items()}
     checked |= {f"{name}>={v}" for name, v in machine_checks.LEAST.items()}
     assert listed == checked
+
+
+def optional() -> dict[str, tuple[str, str]]:
+    return {check.name: (check.state, f"{check.found} {check.cure}") for check in check_optional()}
+
+
+def test_what_is_optional_and_missing_is_no_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(optional_checks, "version", missing)
+    for name in ("MFO_LPIPS_WEIGHTS", "MFO_HDRVDP3"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("TORCH_HOME", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    checks = optional()
+    assert {state for state, _ in checks.values()} == {"ok"}
+    assert "cvvdp is not installed; optional" in checks["judges"][1]
+    assert 'pip install "mfo-backend[judges]"' in checks["judges"][1]
+    folder = tmp_path / "hub" / "checkpoints"
+    assert f"put torchvision's alexnet-owt-7be5be79.pth into {folder}" in checks["LPIPS weights"][1]
+    assert "not on the path; optional" in checks["Octave or MATLAB"][1]
+    assert "MFO_HDRVDP3 is not set" in checks["HDR-VDP-3"][1]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a script")
+def test_what_is_optional_and_there_is_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(optional_checks, "version", {"cvvdp": "0.5.7", "lpips": "0.1.4", "torch": "2.13.0"}.get)
+    for name in ("vgg16-397923af.pth", "hdrvdp3.m", "octave-cli"):
+        (tmp_path / name).write_text("")
+        (tmp_path / name).chmod(0o755)
+    for name in ("MFO_LPIPS_WEIGHTS", "MFO_HDRVDP3", "PATH"):
+        monkeypatch.setenv(name, str(tmp_path))
+    checks = optional()
+    assert {state for state, _ in checks.values()} == {"ok"}
+    assert checks["judges"][1].strip() == "cvvdp 0.5.7, lpips 0.1.4, torch 2.13.0"
+    assert "vgg in " in checks["LPIPS weights"][1]
+    assert checks["Octave or MATLAB"][1].strip() == str(tmp_path / "octave-cli")
+    assert checks["HDR-VDP-3"][1].strip() == str(tmp_path)
+
+
+def test_what_does_not_fit_is_a_warning_with_a_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(optional_checks, "version", {"cvvdp": "0.5.6", "lpips": "0.1.4", "torch": "2.13.0"}.get)
+    monkeypatch.setenv("MFO_HDRVDP3", str(tmp_path))
+    checks = optional()
+    assert checks["judges"][0] == checks["HDR-VDP-3"][0] == "warning"
+    assert "run " in checks["judges"][1]
+    assert "name the folder that does" in checks["HDR-VDP-3"][1]

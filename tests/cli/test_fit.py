@@ -197,3 +197,8 @@ def test_values_and_differences_are_a_table() -> None:
         "roughness   0.5          0.3",
         "mean flip   0.2          -",
     ]
+
+
+def test_a_model_gap_is_a_line_of_the_table() -> None:
+    result = {"initial": {}, "recovered": {}, "errors": {}, "model_gap": {"relative": 0.0214, "at_most": 0.03}}
+    assert result_text(result).splitlines()[-1].split() == ["model", "gap", "2.1", "%", "at", "most", "3", "%"]

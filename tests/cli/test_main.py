@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -53,6 +54,38 @@ def test_the_version(capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(SystemExit):
         command.main(["--version"])
     assert capsys.readouterr().out == f"mfo {__version__}\n"
+
+
+@pytest.mark.parametrize("name", ["fit", "blend", "run", "compare", "demo", "bench"])
+def test_a_python_without_packages_is_one_sentence(name: str, tmp_path: Path) -> None:
+    # -S leaves out the packages of this Python, as a fresh one is
+    words = [sys.executable, "-S", "-m", "mfo_backend", name, str(tmp_path), str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=ROOT, env={"PYTHONPATH": str(ROOT)})
+    assert done.returncode == 3, done.stderr
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"mfo: numpy is not installed in {sys.executable}: run ")
+    assert "-m pip install -r" in line
+
+
+def test_a_library_that_cannot_be_loaded_is_one_sentence(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    def broken(words: list[str]) -> None:
+        raise ImportError("libatomic.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(command, "_parser", broken)
+    assert command.main(["fit", "--json"]) == 3
+    shown = capsys.readouterr()
+    assert "libatomic.so.1" in shown.err
+    assert "mfo doctor" in shown.err
+    assert json.loads(shown.out)["status"] == "setup"
+
+
+def test_an_old_python_is_one_sentence(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    monkeypatch.setattr(sys, "version_info", (2, 7, 18))
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("mfo_backend", run_name="__main__")
+    assert ended.value.code == 3
+    assert "is Python 2.7 and the backend needs 3.10 to 3.14: choose another" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [[], ["dance"], ["fit"], ["run"], ["run", "x", "--progress", "loud"]])

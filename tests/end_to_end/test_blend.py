@@ -39,6 +39,8 @@ def test_linear_reference_is_recovered_and_applied(scene: Scene, blend: Blend, t
     saved = tmp_path / "recovered.blend"
     done = blend(scene.exr, "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json")
     assert done.code == 0, done.stderr
+    gap = done.answer["model_gap"]
+    assert 0.0 <= gap["relative"] <= gap["at_most"] < 0.05  # the renderer is Cycles' equal, so little is left
     start, result = done.answer["errors"]["flip"]
     # the floor is the noise of both pictures, about 0.03 at 64 samples; the start is another material altogether
     assert result < 0.06

@@ -126,7 +126,5 @@ def test_depth_and_size(scene: Any, export: Any) -> None:
     report = export(add_quad("Target", 1.0, 0.0, new_material("Target")))
     assert '<integer name="max_depth" value="5" />' in (report.folder / "scene.xml").read_text("utf-8")
     assert (report.request["image"]["width"], report.request["image"]["height"]) == (50, 16)
-    assert report.notes == (
-        "Left out of the fit: Cycles' limit of 2 diffuse bounces, limit of 1 transmission bounces. "
-        "They change indirect light only.",
-    )
+    assert report.request["light_paths"]["diffuse_bounces"] == 2
+    assert report.notes == ()

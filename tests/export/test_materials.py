@@ -12,6 +12,7 @@ import pytest
 from blender_addon.export.job import check_export
 
 from .scenes import add_camera, add_light, add_quad, diffuse_material, emission_material, new_material, world_color
+from .socket_walk import silent_sockets
 
 
 def principled(material: Any) -> Any:
@@ -68,7 +69,8 @@ def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
     add_quad("Wall", 1.0, -2.0, coated)
     notes = export(add_quad("Target", 1.0, 0.0, plain)).notes
     assert [note for note in notes if "mitsuba_principled" not in note] == [
-        "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface.",
+        "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface. "
+        "Its weight has no effect at Diffuse Roughness 0.",
         "Material 'Coated': the emission is not dimmed by Coat Weight, as it is in Cycles.",
     ]
 
@@ -288,3 +290,23 @@ def test_picture_files_of_a_saved_blend(scene: Any, export: Any, tmp_path: Any) 
         "Base Color of material 'Target' is linked to the image 'grey.png' that has no pixels (is its file missing?), "
         "which cannot be exported: unlink it or use an image texture."
     ]
+
+
+def test_no_socket_is_dropped_in_silence(scene: Any) -> None:
+    """Each is a parameter of the model, or a sentence; every link that is not exported is one, too."""
+    assert silent_sockets() == []
+
+
+@pytest.mark.parametrize(("direction", "said"), [("UV_MAP", False), ("RADIAL", True)])
+def test_a_tangent_along_the_uv_map_is_the_fits_own(scene: Any, direction: str, said: bool) -> None:
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    material = new_material("Brushed", Metallic=1.0, Anisotropic=0.5)
+    target = add_quad("Target", 1.0, 0.0, material)
+    assert any("Tangent has no link" in note for note in check_export(bpy.context, target)[1])
+    node = material.node_tree.nodes.new("ShaderNodeTangent")
+    node.direction_type = direction
+    material.node_tree.links.new(node.outputs[0], principled(material).inputs["Tangent"])
+    notes = check_export(bpy.context, target)[1]
+    assert any("what is linked to Tangent is left out" in note for note in notes) == said
+    assert not any("Tangent has no link" in note for note in notes)

@@ -23,6 +23,7 @@ from typing import Any
 from .scene import ROOT, DemoFiles, in_blender, make_demo
 
 ORPHAN_SECONDS = 12.0  # the backend promises ten
+SAVING_SECONDS = 0.15  # apply and save take about this long
 LEFT = (".tmp", ".partial", ".old", "@")  # of the backend, of an export, of Blender's own saving
 
 
@@ -51,7 +52,10 @@ def kill_blender(files: DemoFiles, folder: Path, moments: int, seed: int = 11) -
     steps: dict[str, int] = {}
     orphans = 0
     for index in range(moments):
-        step, backend = _run(files, folder / f"run_{index:03d}", rng.uniform(0.0, 1.1 * whole))
+        # every second one while it applies and saves, which is a small part of the whole
+        since = "fitted" if index % 2 else "begin"
+        at = rng.uniform(0.0, SAVING_SECONDS if index % 2 else 1.1 * whole)
+        step, backend = _run(files, folder / f"run_{index:03d}", at, since)
         steps[step] = steps.get(step, 0) + 1
         orphans += not _ends(backend)
     # the next start cleans up: an export beside what the killed ones left
@@ -93,8 +97,10 @@ def kill_backend(files: DemoFiles, folder: Path, moments: int, longest: float) -
     }
 
 
-def _run(files: DemoFiles, folder: Path, at: float | None, jobs: Path | None = None) -> tuple[str, int]:
-    """One run in a copy of the .blend, killed `at` seconds after its start; its last step and the backend's id."""
+def _run(
+    files: DemoFiles, folder: Path, at: float | None, since: str = "begin", jobs: Path | None = None
+) -> tuple[str, int]:
+    """One run in a copy of the .blend, killed `at` seconds after a step; its last step and the backend's id."""
     folder.mkdir(parents=True)
     blend = folder / "a.blend"
     shutil.copyfile(files.start, blend)
@@ -102,12 +108,15 @@ def _run(files: DemoFiles, folder: Path, at: float | None, jobs: Path | None = N
     last, backend = "none", 0
     with in_blender("fit", blend, files.reference, job, start_new_session=True) as blender:
         timer = threading.Timer(at if at is not None else 600.0, _kill, [blender])
-        timer.start()
+        if since == "begin":
+            timer.start()
         assert blender.stdout is not None
         for line in blender.stdout:
             if line.startswith('{"step"'):
                 event = json.loads(line)
                 last, backend = event["step"], event.get("backend", backend)
+                if last == since:
+                    timer.start()
         timer.cancel()
     assert at is not None or last == "saved", f"a run that nobody killed ended after {last!r}"
     return last, backend

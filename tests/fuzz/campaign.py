@@ -37,24 +37,39 @@ def main() -> None:
     while time.monotonic() < end:
         # the target with the least time so far
         name = min(NAMES, key=lambda n: sums.get(n, {}).get("cpu_seconds", 0.0))
-        inputs, cpu, killed = _fuzz(name, chosen.folder, int(min(SLICE, max(5, end - time.monotonic()))))
-        old = sums.get(name, {"inputs": 0, "cpu_seconds": 0.0, "killed": 0})
-        sums[name] = {
-            "inputs": old["inputs"] + inputs,
-            "cpu_seconds": round(old["cpu_seconds"] + cpu, 1),
-            "killed": old["killed"] + killed,
-        }
+        inputs, cpu = _fuzz(name, chosen.folder, int(min(SLICE, max(5, end - time.monotonic()))))
+        old = sums.get(name, {"inputs": 0, "cpu_seconds": 0.0})
+        sums[name] = {"inputs": old["inputs"] + inputs, "cpu_seconds": round(old["cpu_seconds"] + cpu, 1)}
         kept.write_text(json.dumps(sums, indent=1))
-    places = sorted(p.name for p in (chosen.folder / "crashes").glob("*") if p.suffix != ".txt")
-    print("\n".join(places) or "no crash")
+    found = crashes(chosen.folder)
+    print("\n".join(path.name for path in found) or "no crash")
+    record = {
+        name: sums[name] | {"killed": sum(_is_of(path, name) for path in found)} for name in NAMES if name in sums
+    }
     chosen.record.parent.mkdir(parents=True, exist_ok=True)
-    chosen.record.write_text(json.dumps(sums, indent=1) + "\n")
+    chosen.record.write_text(json.dumps(record, indent=1) + "\n")
 
 
-def _fuzz(name: str, folder: Path, seconds: int) -> tuple[int, float, int]:
-    """Inputs tried, processor seconds, and how many inputs ended the process."""
-    artifacts = folder / "crashes"
-    known = set(artifacts.glob("*_*-*"))
+def crashes(folder: Path) -> list[Path]:
+    """Inputs that raised something unexpected, ended the process, took too long or too much memory.
+
+    An artifact without content is Mitsuba's own threads at the exit that libFuzzer calls, after the last input; slow
+    units are those of a busy machine.
+    """
+    kinds = ("Error-", "Exception-", "_crash-", "_oom-", "_timeout-")
+    found = (folder / "crashes").glob("*")
+    return sorted(
+        path for path in found
+        if path.suffix != ".txt" and path.stat().st_size and any(kind in path.name for kind in kinds)
+    )  # fmt: skip
+
+
+def _is_of(path: Path, name: str) -> bool:
+    return re.match(re.escape(name.replace(" ", "_")) + "(-|_crash|_oom|_timeout)", path.name) is not None
+
+
+def _fuzz(name: str, folder: Path, seconds: int) -> tuple[int, float]:
+    """Inputs tried and processor seconds."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     words = [sys.executable, "-m", "tests.fuzz.fuzz_one", name, str(folder), str(seconds)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, errors="replace", env=dict(os.environ))
@@ -62,12 +77,10 @@ def _fuzz(name: str, folder: Path, seconds: int) -> tuple[int, float, int]:
     log = folder / f"{name.replace(' ', '_')}.log"
     log.write_text((done.stdout + done.stderr)[-20_000:])
     found = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stdout + done.stderr)
+    if not found:
+        print(f"{name}: exit {done.returncode}, see {log}", flush=True)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    # an artifact without content is Mitsuba's own threads at the exit that libFuzzer calls, after the last input
-    killers = [path for path in set(artifacts.glob("*_*-*")) - known if path.suffix != ".txt" and path.stat().st_size]
-    if not found or killers:
-        print(f"{name}: exit {done.returncode}, see {log}; {killers}", flush=True)
-    return (int(found[1]) if found else 0), cpu, len([path for path in killers if "Error-" not in path.name])
+    return (int(found[1]) if found else 0), cpu
 
 
 if __name__ == "__main__":

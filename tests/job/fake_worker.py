@@ -68,6 +68,8 @@ def raise_problem(problem: str) -> None:
         raise BadInputError("Unknown parameter 'rough': this material has roughness.")
     if problem == "setup":
         raise SetupError("No LLVM library was found: get one.")
+    if problem == "import":
+        raise ImportError("libgone.so: cannot allocate memory")
     if problem == "bug":
         raise ZeroDivisionError("a bug\nwith a second line")
     if problem == "memory":

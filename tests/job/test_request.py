@@ -16,6 +16,7 @@ from mfo_backend.job.request import ViewTable, read_request, request_from_json, 
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding
+from mfo_backend.types.light_paths import LightPaths
 
 DELETE = object()
 
@@ -223,3 +224,16 @@ def test_a_job_is_a_folder(tmp_path: Path, name: str, words: str) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BadInputError, match=words):
         JobFolder.open(tmp_path / name)
+
+
+def test_light_paths_come_back_and_are_checked(request_data: dict) -> None:
+    data = request_data
+    given = {"filter_glossy": 1.0, "clamp_indirect": 10.0, "diffuse_bounces": 4}
+    request = request_from_json({**data, "light_paths": given})
+    assert request.light_paths == LightPaths(1.0, 10.0, 4)
+    assert request_from_json(request_to_json(request)).light_paths == request.light_paths
+    assert request_from_json(data).light_paths is None
+    for wrong in ({"filter_glossy": -1}, {"diffuse_bounces": 2.5}, {"blur": 1}, 3):
+        with pytest.raises(BadInputError) as error:
+            request_from_json({**data, "light_paths": wrong})
+        assert_one_sentence(error.value)

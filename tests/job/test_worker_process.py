@@ -97,7 +97,7 @@ def test_a_finished_job_leaves_pictures_report_and_result(start_worker, job: Pat
     assert result["notes"] == ["Light 'Sun' <b>: specular factor is ignored."]
     assert result["partial"] is False
     names = {path.name for path in (job / "pictures").iterdir()}
-    assert names == {"reference.png", "start.png", "result.png", "difference.png", "result.exr"}
+    assert names == {"reference.png", "start.png", "result.png", "difference.png", "curve.png", "result.exr"}
     assert "Glaze on Vase" in (job / "index.html").read_text("utf-8")
     assert not [path for path in job.rglob("*") if path.suffix == ".tmp"]
 
@@ -229,6 +229,7 @@ def test_it_ends_when_its_parent_is_killed(job: Path, deaf: bool) -> None:
         ("bad_input", 2, "bad_input", "Unknown parameter 'rough': this material has roughness."),
         ("setup", 3, "setup", "No LLVM library was found: get one."),
         ("bug", 1, "failed", "The fit failed (ZeroDivisionError: a bug): the log holds the details."),
+        ("import", 3, "setup", "A package cannot be loaded (libgone.so: cannot allocate memory): run `mfo doctor`"),
         ("memory", 1, "failed", "The fit ran out of memory: lower the resolution or the samples per pixel."),
         ("space", 2, "bad_input", "No space left on device"),
     ],

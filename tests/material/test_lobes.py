@@ -14,6 +14,7 @@ from mfo_backend.material.blender_principled import blender_principled
 from mfo_backend.material.lobes import ALL_LOBES, Lobes, needed_lobes
 from mfo_backend.material.principled_parameters import BLENDER_PRINCIPLED
 
+from .kernel_cost import PAIRS, inputs, run
 from .materials import MATERIALS
 
 
@@ -90,3 +91,16 @@ def loaded(parameters: dict[str, Any], **more: Any) -> mi.BSDF:
 def test_kernels_hold_only_the_lobes_in_use(plugin: Any, name: str, share: float) -> None:
     every = operations(loaded(MATERIALS[name], free=",".join(BLENDER_PRINCIPLED.names)))
     assert operations(loaded(MATERIALS[name])) < share * every
+
+
+# For the same lobes as Mitsuba's C++ plugin; measured 0.99 and 1.55. At 1.74 the time was 2.1 times Mitsuba's, at 1.55
+# it is 1.6 to 1.8 times (kernel_cost.py)
+@pytest.mark.parametrize(("name", "most"), [("plain dielectric", 1.05), ("all that both have", 1.6)])
+def test_a_step_takes_no_more_operations_than_promised(plugin: Any, name: str, most: float) -> None:
+    ours, theirs = PAIRS[name]
+    arguments = inputs(256)
+    counts = []
+    for properties in ({"type": "blender_principled", **ours}, {"type": "principled", **theirs}):
+        bsdf = mi.load_dict(properties)
+        counts.append(sum(run(bsdf, what, arguments)[0] for what in ("eval_pdf", "sample")))
+    assert counts[0] < most * counts[1]

@@ -3,6 +3,8 @@
 
     python tests/metrics/bench_flip.py [--sizes 256 512] [--exposures 5] [--published flip_loss.py]
 
+`value` and `value_and_gradient` are those of a loss (float32, the reference's side kept), `reported_value` is that of
+`mfo compare` (float64, both sides).
 Every contestant runs in turn in each round on one thread, so a busy machine slows all of them; the best round counts.
 The package has no gradient. `--published` takes NVlabs/flip's src/pytorch/flip_loss.py and needs torch; its device
 "cuda" is replaced by the processor. One JSON line per size.
@@ -28,7 +30,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from mfo_backend.metrics.exposure_range import ExposureRange
-from mfo_backend.metrics.hdr_flip import HdrFlip
+from mfo_backend.metrics.hdr_flip import HdrFlip, hdr_flip_map
 
 
 def images(size):
@@ -64,10 +66,18 @@ def contestants(size, exposures, published):
     def value_of_a_new_pair():
         return float(HdrFlip(reference, exposures=exposures).map(test).mean(dtype=np.float64))
 
+    def reported_value():
+        return float(hdr_flip_map(reference, test, exposures=exposures).mean(dtype=np.float64))
+
     def gradient():
         return float(cached.map_and_pullback(test, 1 / size**2)[0].mean(dtype=np.float64))
 
-    runs = {"value": value, "value_of_a_new_pair": value_of_a_new_pair, "value_and_gradient": gradient}
+    runs = {
+        "value": value,
+        "value_of_a_new_pair": value_of_a_new_pair,
+        "reported_value": reported_value,
+        "value_and_gradient": gradient,
+    }
     try:
         import flip_evaluator
     except ImportError:
@@ -121,6 +131,7 @@ def main():
         for ours, theirs in (
             ("value", "package_value"),
             ("value_of_a_new_pair", "package_value"),
+            ("reported_value", "package_value"),
             ("value_and_gradient", "published_value_and_gradient"),
         ):
             if theirs in seconds:

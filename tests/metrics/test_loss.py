@@ -179,3 +179,29 @@ def test_a_black_reference_still_gives_a_loss():
         value, gradient = make_loss(name, black).value_and_gradient(np.full((6, 6, 3), 0.5, np.float32))
         assert value > 0
         assert np.isfinite(gradient).all()
+
+
+@pytest.mark.parametrize("name", LOSS_NAMES)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (5, 1)])
+def test_one_pixel_and_one_line_have_a_loss(name, shape):
+    rng = np.random.default_rng(0)
+    reference, image = rng.uniform(0.1, 2, (2, *shape, 3)).astype(np.float32)
+    loss = make_loss(name, Image(reference, Encoding.LINEAR))
+    value, gradient = loss.value_and_gradient(image)
+    assert 0 < value < np.inf
+    assert loss.value(reference) == 0
+    assert np.isfinite(gradient).all()
+
+
+@pytest.mark.parametrize("name", LOSS_NAMES)
+def test_negative_pixels_of_the_reference_count_as_zero_and_those_of_an_image_keep_the_loss_finite(name):
+    reference, image = scene(0), scene(1)
+    negative = np.where(reference > 0, reference, np.float32(-0.5))
+    expected = make_loss(name, Image(reference, Encoding.LINEAR)).value(image)
+    assert make_loss(name, Image(negative, Encoding.LINEAR)).value(image) == pytest.approx(expected, rel=1e-6)
+    loss = make_loss(name, Image(reference, Encoding.LINEAR))
+    value, gradient = loss.value_and_gradient(np.where(image > 0, image, np.float32(-0.5)))
+    assert np.isfinite(value)
+    assert np.isfinite(gradient).all()
+    if name not in ("mse-hdr", "relative-hdr"):  # linear, so that the slope leads back from below zero
+        assert value == pytest.approx(loss.value(image), rel=1e-6)

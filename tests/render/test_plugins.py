@@ -11,7 +11,6 @@ from mfo_backend.render.plugins import OURS, check_plugins
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.scene.scene_xml import read_scene
 from mfo_backend.types.errors import BadInputError
-
 from tests.render.scenes import POINT, write_scene
 
 

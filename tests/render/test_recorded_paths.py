@@ -48,7 +48,7 @@ def test_equals_the_path_traced_picture(tmp_path, lights, depth, rfilter, grid, 
     error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
     assert error < tolerance
     np.testing.assert_allclose(
-        got.sum(axis=0), expected.sum(axis=0), rtol=0.3 * tolerance
+        got.sum(axis=0), expected.sum(axis=0), rtol=0.5 * tolerance
     )  # noise averages out, bias would not
 
 
@@ -106,6 +106,22 @@ def test_a_target_out_of_sight_is_refused(tmp_path):
 
     with pytest.raises(BadInputError, match="No pixel sees the target"):
         RecordedScene(renderer, 1).record(renderer.start, grid=2, seed=0, near=False)
+
+
+def test_the_back_of_a_two_sided_material_is_lit(tmp_path):
+    # a sphere with its normals turned inside is the same picture
+    images = []
+    for shape in ("", '<boolean name="flip_normals" value="true"/>'):
+        renderer = load_renderer(
+            write_scene(tmp_path, POINT, shape=shape), "target", model="mitsuba_principled", parameters=NAMES
+        )
+        from mfo_backend.render.recorded_scene import RecordedScene
+
+        scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+        paths = scene.record(renderer.start, grid=2, seed=3, near=False)
+        images.append(scene.evaluator(paths, paths.tile_groups())(renderer.start)[:, :, 0])
+    assert images[0].max() > 0.1
+    np.testing.assert_allclose(images[1], images[0], rtol=1e-4, atol=1e-6)  # float32 of another frame
 
 
 def test_a_texture_is_refused(tmp_path):

@@ -31,7 +31,7 @@ def test_plugins_come_from_mitsuba_alone(tmp_path: Path) -> None:
     code = (
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from mfo_backend.render.variant import load_variant\nload_variant()\nimport mitsuba as mi\n"
-        "mi.load_string('<scene version=\"3.0.0\"><bsdf type=\"diffuse\"/></scene>')"
+        'mi.load_string(\'<scene version="3.0.0"><bsdf type="diffuse"/></scene>\')'
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

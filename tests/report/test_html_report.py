@@ -18,6 +18,7 @@ from mfo_backend.report.html_report import ReportContent, report_html
 from mfo_backend.report.picture import displayed, displayed_linear, png_bytes
 from mfo_backend.report.value_table import swatch_colour, value_text
 from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.model_gap import ModelGap
 from mfo_backend.types.result import CurvePoint, FitResult, StageReport
 from mfo_backend.types.status import Status
 
@@ -70,6 +71,7 @@ def result() -> FitResult:
         errors={"flip": (0.24, 0.012), "hdr_flip": (0.3, 0.05), "mse": (0.1, 0.0004)},
         seconds=21.04,
         passes=66.0,
+        model_gap=ModelGap(0.0214, 0.0296),
     )
 
 
@@ -98,6 +100,7 @@ def parsed(content: ReportContent) -> WellFormed:
     "words",
     [
         "Glaze on Vase",
+        "model gap, at most 3 %",
         "The fit converged.",
         "0.240 → 0.012",
         "0.300 → 0.050",

@@ -56,7 +56,7 @@ def hdr_vdp_q_jods(
     BadInputError
         For pictures of different size or with NaN or infinite pixels.
     """
-    folder, program = _find_code(), _find_program()
+    folder, program = find_code(), find_program()
     with tempfile.TemporaryDirectory(prefix="mfo-hdrvdp3-") as name:
         job = Path(name)
         shape, count = _write_pairs(job / "pairs.raw", pairs)
@@ -82,7 +82,8 @@ def _write_pairs(path: Path, pairs: Iterable[tuple[Array, Array]]) -> tuple[tupl
     return shape, count
 
 
-def _find_code() -> Path:
+def find_code() -> Path:
+    """The user's folder with hdrvdp3.m, or `SetupError`."""
     chosen = os.environ.get(FOLDER_VARIABLE)
     if not chosen:
         raise SetupError(
@@ -95,7 +96,8 @@ def _find_code() -> Path:
     return folder
 
 
-def _find_program() -> str:
+def find_program() -> str:
+    """The program that runs HDR-VDP-3, or `SetupError`."""
     for name in _PROGRAMS:
         found = shutil.which(name)
         if found is not None:

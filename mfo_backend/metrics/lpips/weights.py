@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import re
 import sys
 from pathlib import Path
@@ -16,15 +15,7 @@ import torch  # pyright: ignore[reportMissingImports]
 from ...types.errors import BadInputError, SetupError
 from ..judges.packages import LPIPS
 from .trunks import CHANNELS, Trunk
-
-FOLDER_VARIABLE = "MFO_LPIPS_WEIGHTS"
-# as torchvision publishes them; the name carries the first digits of the SHA-256. The last one is a file of the
-# user's own making that holds the convolutional part alone.
-TRUNK_FILES = {
-    "alex": ("alexnet-owt-7be5be79.pth", "alexnet-owt-4df8aa71.pth", "alexnet-features.pth"),
-    "vgg": ("vgg16-397923af.pth", "vgg16-features.pth"),
-    "squeeze": ("squeezenet1_1-b8a52dc0.pth", "squeezenet1_1-f364aa15.pth", "squeezenet1_1-features.pth"),
-}
+from .weight_files import FOLDER_VARIABLE, TRUNK_FILES, find_weights, weight_folders
 
 
 def load_trunk(net: str) -> Trunk:
@@ -70,17 +61,13 @@ def load_heads(net: str) -> list[Any]:
 
 
 def _find_trunk(net: str) -> Path:
-    chosen = os.environ.get(FOLDER_VARIABLE)
-    folders = [Path(chosen)] if chosen else []
-    folders.append(Path(torch.hub.get_dir()) / "checkpoints")
-    for folder in folders:
-        for name in TRUNK_FILES[net]:
-            if (folder / name).is_file():
-                return folder / name
-    raise SetupError(
-        f"LPIPS ({net}) needs the weights of its network, which are not part of this program: put torchvision's "
-        f"{TRUNK_FILES[net][0]} into {folders[0]}, or into a folder that {FOLDER_VARIABLE} names."
-    )
+    path = find_weights(net)
+    if path is None:
+        raise SetupError(
+            f"LPIPS ({net}) needs the weights of its network, which are not part of this program: put torchvision's "
+            f"{TRUNK_FILES[net][0]} into {weight_folders()[0]}, or into a folder that {FOLDER_VARIABLE} names."
+        )
+    return path
 
 
 def _check_digest(path: Path) -> None:

@@ -20,15 +20,30 @@ def leftovers() -> list[str]:
     return found
 
 
+def in_german(text: str) -> str:
+    view, before = bpy.context.preferences.view, bpy.context.preferences.view.language
+    view.language = next((name for name in ("de_DE", "de") if name in bpy.app.translations.locales), before)
+    try:
+        return bpy.app.translations.pgettext(text, "Operator")
+    finally:
+        view.language = before
+
+
 assert leftovers(), "the extension is not enabled"
+has_german = bool({"de", "de_DE"} & set(bpy.app.translations.locales))
+assert in_german("Fit Material") == ("Material anpassen" if has_german else "Fit Material")
 package = sys.modules[addon_id].blender_addon
 for _ in range(3):
     addon_utils.disable(addon_id)
     assert not leftovers(), leftovers()
+    assert in_german("Fit Material") == "Fit Material"
     addon_utils.enable(addon_id)
     assert hasattr(bpy.types.Scene, "mfo")
 package.unregister()
 package.register()
 addon_utils.disable(addon_id)
 assert not leftovers(), leftovers()
-print("ALL GOOD")
+timers = [package.running_job._tick, package.backend_state._tick, package.backend_state._first_look]
+assert not any(map(bpy.app.timers.is_registered, timers))
+assert not {"mitsuba", "drjit", "OpenEXR", "scipy"} & set(sys.modules)
+print("ALL GOOD", "with German" if has_german else "without German")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import logging
+import os
 import subprocess
 import sys
 
@@ -12,8 +13,9 @@ import numpy as np
 import pytest
 import scipy.ndimage
 
-from mfo_backend.metrics.judges.viewing import HDR_VIEWING
+from mfo_backend.metrics.judges.viewing import HDR_VIEWING, Viewing
 from mfo_backend.metrics.loss import make_loss
+from mfo_backend.scene.image_file import read_image
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
 
@@ -23,6 +25,7 @@ if not all(map(importlib.util.find_spec, ("torch", "pycvvdp"))):
 
 from mfo_backend.metrics.judges.color_video_vdp import ColorVideoVdp, color_video_vdp_jod  # noqa: E402
 from mfo_backend.metrics.judges.gaussian_blur import GaussianBlur  # noqa: E402
+from mfo_backend.metrics.judges.packages import require_pycvvdp  # noqa: E402
 
 
 def test_scores_of_a_generated_pair_stay(lit_ball):
@@ -33,6 +36,17 @@ def test_scores_of_a_generated_pair_stay(lit_ball):
         for test in (reference, lit_ball(hue=1.2), lit_ball(width=0.03), lit_ball(width=0.06))
     ]
     assert scores == pytest.approx([10, 9.9055, 9.1648, 8.0898], abs=1e-3)
+
+
+@pytest.mark.skipif("MFO_CVVDP_EXAMPLE" not in os.environ, reason="MFO_CVVDP_EXAMPLE names no nancy_church.hdr")
+def test_the_documented_example():
+    """The blurred picture of the authors' examples/ex_hdr_images.py scores 8.696 (gfxdisp/ColorVideoVDP, 0.5.7)."""
+    geometry = require_pycvvdp().vvdp_display_geometry.load("standard_hdr_linear")
+    pixels = read_image(os.environ["MFO_CVVDP_EXAMPLE"]).pixels
+    viewing = Viewing(peak_nits=4000, contrast=1e6, ambient_lux=100, pixels_per_degree=float(geometry.get_ppd()))
+    reference = pixels / pixels.max() * 4 * 4000
+    test = scipy.ndimage.gaussian_filter(reference, (2, 2, 0), mode="nearest", truncate=2.0)
+    assert color_video_vdp_jod(reference, test, viewing) == pytest.approx(8.696, abs=5e-4)
 
 
 def test_the_same_factor_on_all_pixels_is_not_seen(lit_ball):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ if not all(map(importlib.util.find_spec, ("torch", "lpips"))):
     pytest.skip("the extra `judges` is not installed", allow_module_level=True)
 torch = require_torch("LPIPS", LPIPS)
 
-from mfo_backend.metrics.lpips import weights  # noqa: E402
+from mfo_backend.metrics.lpips import weight_files, weights  # noqa: E402
 from mfo_backend.metrics.lpips.distance import Lpips, _unit  # noqa: E402
 from mfo_backend.metrics.lpips.pu_values import PuValues  # noqa: E402
 from mfo_backend.metrics.lpips.trunks import CHANNELS, LEAST_SIZE, Trunk  # noqa: E402
@@ -245,3 +246,12 @@ def test_pu_values_are_the_authors():
     numeric = (PuValues(200.0).apply(x + 1e-6) - PuValues(200.0).apply(x - 1e-6)) / 2e-6
     np.testing.assert_allclose(PuValues(200.0).slope(x), numeric, rtol=1e-6)
     assert (PuValues(200.0).slope(np.array([-1.0, 0.0, 9.0])) == [0, 0, 0]).all()
+
+
+@pytest.mark.parametrize("variables", [{}, {"XDG_CACHE_HOME": "/x"}, {"TORCH_HOME": "/y"}, {"TORCH_HOME": "~/z"}])
+def test_the_cache_is_where_torch_has_it(monkeypatch, variables):
+    for name in ("TORCH_HOME", "XDG_CACHE_HOME", "MFO_LPIPS_WEIGHTS"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert weight_files.weight_folders() == [Path(torch.hub.get_dir()) / "checkpoints"]

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The state of the backend as preferences and panel draw it. Reads what `backend_state` knows, touches nothing."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from . import backend_state
+from .backend_install import SIZE
+
+_ICONS = {"UNKNOWN": "QUESTION", "NOT_INSTALLED": "IMPORT", "TESTING": "TIME", "READY": "CHECKMARK", "BROKEN": "ERROR"}
+_TITLES = {
+    "UNKNOWN": "Backend: not tested",
+    "NOT_INSTALLED": "Backend: not installed",
+    "INSTALLING": "Backend: installing",
+    "TESTING": "Backend: being tested",
+    "READY": "Backend: ready",
+    "BROKEN": "Backend: broken",
+}
+
+
+def needs_setup() -> bool:
+    """Whether a panel must show the set-up instead of the button that starts a fit."""
+    return backend_state.current.name in {"NOT_INSTALLED", "INSTALLING"}
+
+
+def has_trouble() -> bool:
+    """Whether a panel should show what is wrong with the backend."""
+    return backend_state.current.name in {"NOT_INSTALLED", "INSTALLING", "BROKEN"}
+
+
+def draw_setup(layout: bpy.types.UILayout, *, width: int) -> None:
+    """Draw state, reasons, log and buttons; `width` is the number of letters a line holds."""
+    state = backend_state.current
+    box = layout.box()
+    box.alert = state.name == "BROKEN"
+    box.label(text=_TITLES[state.name], icon=_ICONS.get(state.name, "IMPORT"))
+    box.alert = False
+    if state.name == "INSTALLING":
+        row = box.row(align=True)
+        row.progress(factor=state.fraction, type="BAR", text=state.step)
+        row.operator("mfo.cancel_install", text="", icon="X")
+        _lines(box, state.log, width)
+        return
+    if state.name == "NOT_INSTALLED":
+        text = bpy.app.translations.pgettext_iface(
+            "Fits run beside Blender, in a Python environment of their own. Blender's Python stays as it is."
+        )
+        _wrapped(box, text, width)
+        _wrapped(box, SIZE[:1].upper() + SIZE[1:] + ".", width)
+    else:
+        _wrapped(box, state.sentence, width)
+    for problem in state.problems:
+        _wrapped(box, problem, width)
+    if state.name != "READY":
+        row = box.row()
+        row.scale_y = 1.2
+        row.operator("mfo.install_backend", text="Install Again" if state.has_folder else "Install", icon="IMPORT")
+    row = box.row(align=True)
+    if state.python:
+        row.operator("mfo.test_backend", text="Test", icon="FILE_REFRESH")
+    if state.has_folder:
+        row.operator("mfo.remove_backend", text="Remove", icon="TRASH")
+    if state.log_file:
+        row.operator("mfo.open_install_log", text="", icon="TEXT")
+
+
+def _wrapped(layout: bpy.types.UILayout, text: str, width: int) -> None:
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in textwrap.wrap(text, width):
+        column.label(text=line, translate=False)
+
+
+def _lines(layout: bpy.types.UILayout, lines: list[str], width: int) -> None:
+    column = layout.column(align=True)
+    column.scale_y = 0.7
+    column.enabled = False
+    for line in lines:
+        column.label(text=line if len(line) <= width else line[: width - 1] + "…", translate=False)

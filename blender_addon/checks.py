@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is fine, what is ignored and what stops a fit, as plain data; looks at no mesh and no pixel, so it is quick.
+
+The export itself checks more (geometry, lights, visibility): `mfo.check` adds what it says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from .export.findings import ExportError, Findings, Fix
+from .export.image_pixels import UnreadableImageError, is_data, read_pixels, without_pixels
+from .export.read_camera import has_camera, note_picture_settings, picture_size
+from .export.read_material import principled_node, read_target
+from .export.read_scene import MESH_TYPES
+from .export.reference import LINEAR_SUFFIXES, holds_display_colours, needs_table, refuse_size, refuse_suffix
+from .export.render_state import rendered_objects
+from .export.shader_graph import source_of
+from .picture_header import read_header
+from .properties import SOCKET_ITEMS, crossed_limits
+from .versions import overrides_of
+
+FINE, IGNORED, STOPS = "fine", "ignored", "stops"
+_FITTED = {name for _, name, *_ in SOCKET_ITEMS}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the check: a level, a sentence, and what one press could do about it."""
+
+    level: str
+    sentence: str
+    fixes: tuple[Fix, ...] = ()
+
+
+def quick_check(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple[Finding, ...]:
+    """Everything that can be known about the next fit of the active object without reading geometry; worst first."""
+    found = [*_target(scene, view_layer), *_picture(scene, view_layer), *_reference(scene)]
+    return in_order(found)
+
+
+def from_export(findings: Findings) -> tuple[Finding, ...]:
+    """The sentences of an export as lines of the check."""
+    levels = [(STOPS, findings.errors), (IGNORED, findings.notes)]
+    return tuple(Finding(level, s, findings.fixes[s]) for level, sentences in levels for s in sentences)
+
+
+def in_order(found: list[Finding]) -> tuple[Finding, ...]:
+    """Each sentence once: what stops the fit, then what is ignored, then what is fine."""
+    once = {finding.sentence: finding for finding in reversed(found)}
+    return tuple(f for level in (STOPS, IGNORED, FINE) for f in reversed(list(once.values())) if f.level == level)
+
+
+def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:
+    target = view_layer.objects.active
+    if target is None or target.type not in MESH_TYPES:
+        what = "No object is active" if target is None else f"'{target.name}' has no faces"
+        fixes = [Fix("select", item.name) for item in scene.objects if _can_be_fitted(item, view_layer)]
+        return [Finding(STOPS, f"{what}: select the object whose material is to be fitted.", tuple(fixes[:3]))]
+    findings = Findings()
+    if target.name_full not in rendered_objects(view_layer):
+        findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
+    slot = target.active_material_index
+    material = target.material_slots[slot].material if slot < len(target.material_slots) else None
+    with without_pixels():
+        read_target(material, target.name, slot, findings)
+    found = list(from_export(findings))
+    if material is None or principled_node(material) is None:
+        return found
+    if not material.is_editable:
+        sentence = f"Material '{material.name}' comes from a library: a fit runs, but its values cannot be applied."
+        found.append(Finding(IGNORED, sentence, (Fix("make_local"),)))
+    found += _free_values(scene, material, "".join(findings.errors))
+    return found
+
+
+def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str) -> list[Finding]:
+    node = principled_node(material)
+    assert node is not None
+    linked = [s.name for s in node.inputs if s.name in _FITTED and source_of(s) is not None]
+    settings = scene.mfo
+    found = [Finding(FINE, f"'{material.name}' has a Principled BSDF.")]
+    if settings.parameter_set == "chosen" and settings.model == "blender_principled":
+        chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets}
+        if not chosen - set(linked):
+            fix = (Fix("all_parameters"),)
+            return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
+        linked = [name for name in linked if name in chosen]
+        for name in crossed_limits(settings):
+            found.append(Finding(STOPS, f"The limits of {name} leave nothing: the least must be below the most."))
+    linked = [name for name in linked if f"{name} of material" not in said]
+    if linked:
+        sentence = f"Linked and therefore not fitted: {', '.join(linked)}."
+        found.append(Finding(IGNORED, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
+    return found
+
+
+def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:
+    findings = Findings()
+    if has_camera(scene, findings):
+        note_picture_settings(scene, findings)
+    replaced = overrides_of(view_layer)
+    if replaced:
+        sentence = f"View layer '{view_layer.name}' replaces materials or the world by '{replaced[0]}'"
+        findings.error(f"{sentence}: remove the override.", Fix("no_override"))
+    found = list(from_export(findings))
+    if scene.render.engine != "CYCLES":
+        engine = scene.render.engine.removeprefix("BLENDER_").replace("_", " ").title()
+        sentence = f"The render engine is {engine}; the fit reproduces what Cycles shows."
+        found.append(Finding(IGNORED, sentence, (Fix("cycles"),)))
+    if not findings.errors:
+        width, height = picture_size(scene.render)
+        found.append(Finding(FINE, f"Camera '{scene.camera.name}', {width} x {height} pixels."))
+    return found
+
+
+def _reference(scene: bpy.types.Scene) -> list[Finding]:
+    settings = scene.mfo
+    try:
+        found = _image_reference(settings) if settings.reference_source == "IMAGE" else _file_reference(settings)
+    except ExportError as problem:
+        return [Finding(STOPS, str(problem), problem.fixes)]
+    except OSError as problem:
+        return [Finding(STOPS, f"The reference cannot be read ({problem.strerror or problem}): choose another file.")]
+    problems = []
+    if all(found.size):
+        problems += _refused(refuse_size, found.name, found.size, picture_size(scene.render))
+    words = "scene-linear Rec.709"
+    if not found.is_linear:
+        problems += _refused(needs_table, scene, found.name, settings.bake_view)
+        view = scene.view_settings.view_transform
+        words = f"display colours under the {'baked ' if settings.bake_view and view != 'Standard' else ''}view {view}"
+    return problems or [Finding(FINE, f"Reference: {found.words}, {words}.")]
+
+
+@dataclass(frozen=True)
+class _Picture:
+    name: str
+    size: tuple[int, int]  # width and height, 0 where unknown
+    words: str
+    is_linear: bool
+
+
+def _file_reference(settings: bpy.types.PropertyGroup) -> _Picture:
+    if not settings.reference_path:
+        raise ExportError("No reference is chosen: give the picture whose material is to be recovered.")
+    path = Path(bpy.path.abspath(settings.reference_path))
+    if not path.is_file():
+        raise ExportError(f"The reference {path} does not exist: choose another file.")
+    refuse_suffix(path)
+    header = read_header(path)
+    if header is None:
+        raise ExportError(f"The reference {path.name} holds no picture its name promises: choose another file.")
+    words = f"{header.width} x {header.height}, {header.depth} {header.kind}" if header.width else header.kind
+    is_linear = path.suffix.lower() in LINEAR_SUFFIXES
+    return _Picture(path.name, (header.width, header.height), words, is_linear)
+
+
+def _image_reference(settings: bpy.types.PropertyGroup) -> _Picture:
+    image = settings.reference_image
+    if image is None:
+        raise ExportError("No reference is chosen: choose an image of this file, or a picture on disk.")
+    try:
+        with without_pixels():
+            read_pixels(image)
+    except UnreadableImageError as problem:
+        fixes = (Fix("colorspace", "sRGB"), Fix("colorspace", "Linear Rec.709")) if "colour" in str(problem) else ()
+        raise ExportError(f"The reference '{image.name}' {problem}.", *fixes) from None
+    width, height = image.size
+    space = "raw numbers taken as colours" if is_data(image) else image.colorspace_settings.name
+    return _Picture(image.name, (width, height), f"{width} x {height}, {space}", not holds_display_colours(image))
+
+
+def _refused(check: Callable[..., object], *arguments: object) -> list[Finding]:
+    """What a check of the export refuses, as lines."""
+    try:
+        check(*arguments)
+    except ExportError as problem:
+        return [Finding(STOPS, str(problem), problem.fixes)]
+    return []
+
+
+def _can_be_fitted(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
+    has_faces = item.type in MESH_TYPES and item.name in view_layer.objects
+    return has_faces and principled_node(item.active_material) is not None

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`mfo.check`, the buttons that mend what it finds, and the limits of values."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+from contextlib import suppress
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import preflight, running_job
+from ..checks import from_export, in_order, quick_check
+from ..export.job import ExportError, export_findings
+from ..mending import KINDS, MendingError
+from ..properties import toggle_bound
+
+_BUTTON = {"HIDDEN", "SKIP_SAVE"}
+
+
+class MFO_OT_check(bpy.types.Operator):
+    """List what will be left out and what stops a fit, with everything an export would say"""
+
+    bl_idname = "mfo.check"
+    bl_label = "Check Everything"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs an object."""
+        if not bpy.app.background and context.view_layer.objects.active is None:
+            cls.poll_message_set("Select the object whose material is to be fitted")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Read the whole scene as an export does, without writing anything."""
+        thorough_check(context)
+        runtime = context.window_manager.mfo_runtime
+        if runtime.state == "FAILED":
+            runtime.state, runtime.sentence = "IDLE", ""
+        running_job.redraw()
+        return {"FINISHED"}
+
+
+class MFO_OT_mend(bpy.types.Operator):
+    """Mend what a check has found"""
+
+    bl_idname = "mfo.mend"
+    bl_label = "Mend"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    kind: StringProperty(options=_BUTTON)
+    argument: StringProperty(options=_BUTTON)
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        """The tooltip of the button's own kind."""
+        kind = KINDS.get(properties.kind)
+        return kind.tooltip if kind else ""
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Change the one thing and check again."""
+        kind = KINDS.get(self.kind)
+        try:
+            if kind is None:
+                raise MendingError(f"There is no remedy {self.kind!r}: give one of {', '.join(KINDS)}.")
+            kind.mend(context, self.argument)
+        except (MendingError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        preflight.check_now(context.scene, context.view_layer)
+        running_job.redraw()
+        return {"FINISHED"}
+
+
+class MFO_OT_limit_value(bpy.types.Operator):
+    """Give this value limits that the fit keeps, or take them away"""
+
+    bl_idname = "mfo.limit_value"
+    bl_label = "Limit Value"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    name: StringProperty(options=_BUTTON)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Switch the limits."""
+        toggle_bound(context.scene.mfo, self.name)
+        return {"FINISHED"}
+
+
+def thorough_check(context: bpy.types.Context) -> None:
+    """Make the quick check and add what an export would say."""
+    scene, view_layer = context.scene, context.view_layer
+    preflight.check_now(scene, view_layer)
+    found = list(quick_check(scene, view_layer))
+    target = view_layer.objects.active
+    if target is not None:
+        with suppress(ExportError):  # the quick check names it
+            found += from_export(export_findings(context, target))
+    preflight.show_thorough(in_order(found))
+
+
+CLASSES = (MFO_OT_check, MFO_OT_mend, MFO_OT_limit_value)

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every operator that starts fits has: the settings a script may give, the export, the start."""
+
+# pyright: reportInvalidTypeForm=false, reportArgumentType=false
+# Blender reads properties from annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, IntProperty, StringProperty
+
+from .. import fit_queue, running_job
+from ..backend_python import BackendPythonError
+from ..export.job import ExportError, export_job
+from ..export.read_material import principled_node as find_principled
+from ..fit_queue import PreparedFit
+from ..preferences import chosen_python, new_job_folder
+from ..properties import chosen_of, crossed_limits
+from ..write_back import WriteBackError, principled_node
+
+# what a script gives; buttons start with the defaults every time and the redo panel does not show them
+_SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+
+
+class FitError(Exception):
+    """The fit cannot start; the message is one sentence for the user."""
+
+
+class FitOptions:
+    """Settings of a fit, empty for those of the scene, and what follows from them."""
+
+    reference: StringProperty(
+        name="Reference", description="Picture to reproduce; empty: the scene's setting", options=_SCRIPT
+    )
+    preset: StringProperty(name="Preset", description="How to search; empty: the scene's setting", options=_SCRIPT)
+    parameters: StringProperty(
+        name="Parameters",
+        description='"all", "reduced" or names with commas; empty: the scene\'s setting',
+        options=_SCRIPT,
+    )
+    model: StringProperty(name="Model", description="Material model; empty: the scene's setting", options=_SCRIPT)
+    range: StringProperty(
+        name="Range", description='"hdr", "ldr" or "auto"; empty: the scene\'s setting', options=_SCRIPT
+    )
+    max_iterations: IntProperty(
+        name="Iterations", description="Most iterations of a stage; 0: the scene's setting", min=0, options=_SCRIPT
+    )
+    bake_view: BoolProperty(
+        name="Bake View", description="Take a display picture under any view; off: the scene's setting", options=_SCRIPT
+    )
+    wait: BoolProperty(
+        name="Wait", description="Return when the fit has ended; always so by default in background", options=_SCRIPT
+    )
+
+    def blocks(self) -> bool:
+        """Whether the operator returns only when the fit has ended."""
+        return self.wait or (bpy.app.background and not self.properties.is_property_set("wait"))
+
+    def start(self, fit: PreparedFit) -> None:
+        """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
+        fit_queue.begin()
+        try:
+            running_job.start(fit, timer=not self.blocks() and not bpy.app.background)
+        except OSError as error:
+            if fit.is_new:
+                shutil.rmtree(fit.folder, ignore_errors=True)
+            raise FitError(
+                f"The backend could not be started with {fit.python} in {fit.folder} ({error.strerror or error})."
+            ) from error
+
+    def prepare(self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str) -> PreparedFit:
+        """Export the job folder of the object's active material; raises `FitError` where it cannot be."""
+        settings = context.scene.mfo
+        material = _active_material(obj)
+        reference = _reference(settings, self.reference)
+        python = python_of(context)
+        given = bpy.path.abspath(job_folder)
+        folder = Path(given) if given else new_job_folder(context, material.name)
+        is_new = not folder.exists()
+        windows, chosen = context.window_manager, self._fit(settings)
+        windows.progress_begin(0.0, 100.0)  # a number beside the pointer, while nothing else can be drawn
+        try:
+            report = export_job(
+                context,
+                obj,
+                folder,
+                reference=reference,
+                fit=chosen,
+                bake_view=self.bake_view or settings.bake_view,
+                tell=lambda share: windows.progress_update(100.0 * share),
+            )
+        except ExportError as error:
+            raise FitError(str(error)) from error
+        finally:
+            windows.progress_end()
+        picture = folder / report.request["reference"]["path"]
+        return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
+
+    def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
+        model = self.model or settings.model
+        parameters: object = self.parameters or settings.parameter_set
+        if parameters == "chosen":
+            parameters = ",".join(_chosen(settings, model))
+            if not parameters:
+                raise FitError("No parameter is chosen: choose at least one, or All.")
+        if parameters not in ("all", "reduced"):
+            parameters = [name.strip() for name in str(parameters).split(",") if name.strip()]
+            if not parameters:
+                raise FitError(f"parameters is {self.parameters!r}: give 'all', 'reduced' or names with commas.")
+        fit = {
+            "model": model,
+            "preset": self.preset or settings.preset,
+            "parameters": parameters,
+            "max_iterations": self.max_iterations or settings.max_iterations,
+        }
+        chosen = {bound.name: [bound.lower, bound.upper] for bound in settings.bounds if bound.name in parameters}
+        if settings.parameter_set == "chosen" and not self.parameters and chosen:
+            if crossed_limits(settings):
+                name = crossed_limits(settings)[0]
+                raise FitError(f"The limits of {name} leave nothing: the least must be below the most.")
+            fit["bounds"] = chosen
+        compared = self.range or settings.range
+        if compared not in ("auto", "hdr", "ldr"):
+            raise FitError(f"range is {compared!r}: give 'hdr', 'ldr' or 'auto'.")
+        return fit if compared == "auto" else fit | {"range": compared}
+
+
+def python_of(context: bpy.types.Context) -> Path:
+    """The interpreter of the backend; raises `FitError` where there is none."""
+    try:
+        return chosen_python(context)
+    except BackendPythonError as error:
+        raise FitError(str(error)) from error
+
+
+def target_of(context: bpy.types.Context, name: str) -> bpy.types.Object:
+    """The object of that name, or the active one; raises `FitError` where there is none."""
+    if name:
+        obj = context.scene.objects.get(name)
+        if obj is None:
+            raise FitError(
+                f"The scene {context.scene.name!r} has no object {name!r}: give the name of one of its objects."
+            )
+        return obj
+    obj = context.view_layer.objects.active
+    if obj is None:
+        raise FitError("No object is active: select the object whose material is to be fitted, or give its name.")
+    return obj
+
+
+def selected_targets(context: bpy.types.Context, most: int = 1000) -> list[bpy.types.Object]:
+    """One selected object for each active material with a Principled BSDF, at most `most`."""
+    chosen: dict[int, bpy.types.Object] = {}
+    for obj in context.selected_objects:
+        material = obj.active_material
+        if find_principled(material) is not None:
+            chosen.setdefault(material.session_uid, obj)
+        if len(chosen) == most:
+            break
+    return list(chosen.values())
+
+
+def _active_material(obj: bpy.types.Object) -> bpy.types.Material:
+    material = obj.active_material
+    if material is None:
+        raise FitError(f"Object {obj.name!r} has no material in its active slot: give it one with a Principled BSDF.")
+    try:
+        principled_node(material)
+    except WriteBackError as error:
+        raise FitError(str(error)) from error
+    return material
+
+
+def _reference(settings: bpy.types.PropertyGroup, given: str) -> Path | bpy.types.Image:
+    if not given and settings.reference_source == "IMAGE":
+        if settings.reference_image is None:
+            raise FitError("No reference is chosen: choose an image of this file, or a picture on disk.")
+        return settings.reference_image
+    path = given or settings.reference_path
+    if not path:
+        raise FitError("No reference is chosen: give the picture whose material is to be recovered.")
+    return Path(bpy.path.abspath(path))
+
+
+def _chosen(settings: bpy.types.PropertyGroup, model: str) -> list[str]:
+    """The chosen parameters of a model in the order of its list; the property itself is a set."""
+    name = chosen_of(model)
+    items = settings.bl_rna.properties[name].enum_items
+    return [item.identifier for item in items if item.identifier in getattr(settings, name)]

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The history of a material: record a result, apply, show or remove an earlier one, open a job folder from disk."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import history, preflight, running_job, shown_result
+from ..job_result import JobResultError, read_job_result
+from ..write_back import WriteBackError, apply_values
+
+_SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+
+
+class MFO_OT_record_results(bpy.types.Operator):
+    """Put new results into the histories of their materials"""
+
+    bl_idname = "mfo.record_results"
+    bl_label = "Record Fit Result"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Record what waits."""
+        return {"FINISHED"} if running_job.record_results() else {"CANCELLED"}
+
+
+class _PastResult:
+    """Works on the result that is marked in the history of the active material."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only with a marked result."""
+        if history.chosen(_material(context)) is None:
+            cls.poll_message_set("The active material has no earlier results")  # type: ignore[attr-defined]
+            return False
+        return True
+
+
+class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
+    """Put the values of the marked result on the material; sockets with a link stay as they are"""
+
+    bl_idname = "mfo.apply_past"
+    bl_label = "Apply Earlier Result"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the sockets from the values in the .blend; the job folder may be gone."""
+        material = _material(context)
+        entry = history.chosen(material)
+        assert material is not None
+        assert entry is not None  # see poll
+        try:
+            notes = apply_values(material, history.values_of(entry), Path(entry.job_folder))
+        except WriteBackError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for note in notes:
+            self.report({"WARNING"}, note)
+        return {"FINISHED"}
+
+
+class MFO_OT_show_past(_PastResult, bpy.types.Operator):
+    """Show pictures and numbers of the marked result in the panel"""
+
+    bl_idname = "mfo.show_past"
+    bl_label = "Show Earlier Result"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Not while a fit uses the panel."""
+        if running_job.current is not None:
+            cls.poll_message_set("A fit is running; its pictures are shown")
+            return False
+        return super().poll(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Read its job folder."""
+        material = _material(context)
+        entry = history.chosen(material)
+        assert material is not None
+        assert entry is not None
+        try:
+            _show(Path(entry.job_folder), material.session_uid)
+        except (JobResultError, WriteBackError) as error:
+            self.report({"ERROR"}, f"{error} Its values are kept here and can be applied.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class MFO_OT_remove_past(_PastResult, bpy.types.Operator):
+    """Remove the marked result from the history; its job folder stays"""
+
+    bl_idname = "mfo.remove_past"
+    bl_label = "Remove Earlier Result"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove it and mark the one before."""
+        material = _material(context)
+        assert material is not None
+        kept = material.mfo
+        kept.history.remove(kept.history_index)
+        kept.history_index = max(0, min(kept.history_index, len(kept.history) - 1))
+        return {"FINISHED"}
+
+
+class MFO_OT_open_job(bpy.types.Operator):
+    """Open the folder of a finished fit: show it here and add it to the history of its material"""
+
+    bl_idname = "mfo.open_job"
+    bl_label = "Open Job Folder"
+    bl_options = {"REGISTER", "UNDO"}
+
+    directory: StringProperty(name="Job Folder", subtype="DIR_PATH", options=_SCRIPT)
+    material: StringProperty(name="Material", description="Empty: the one that was fitted", options=_SCRIPT)
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Not while a fit uses the panel."""
+        if running_job.current is not None:
+            cls.poll_message_set("A fit is running; wait for it or cancel it")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Ask for the folder."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Show its result; without its material in this file there is nothing to add it to."""
+        folder = Path(bpy.path.abspath(self.directory))
+        try:
+            found = read_job_result(folder)
+            material = bpy.data.materials.get(self.material or found.material_name)
+            _show(folder, material.session_uid if material else 0)
+            if material is not None and material.is_editable:
+                history.record(material, found)
+        except (JobResultError, WriteBackError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if material is None:
+            self.report({"WARNING"}, f"Material {found.material_name!r} is not in this file.")
+        return {"FINISHED"}
+
+
+def _material(context: bpy.types.Context) -> bpy.types.Material | None:
+    return context.object.active_material if context.object else None
+
+
+def _show(folder: Path, uid: int) -> None:
+    found = read_job_result(folder)
+    runtime = bpy.context.window_manager.mfo_runtime
+    shown_result.clear(runtime)
+    shown_result.show(found, uid)
+    runtime.state, runtime.sentence = "DONE", found.sentence
+    preflight.redraw()
+
+
+CLASSES = (MFO_OT_record_results, MFO_OT_apply_past, MFO_OT_show_past, MFO_OT_remove_past, MFO_OT_open_job)

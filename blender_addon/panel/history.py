@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The results the active material had."""
+
+from __future__ import annotations
+
+import bpy
+
+
+class MFO_UL_history(bpy.types.UIList):
+    """One line for each result: when, how, and the FLIP it reached."""
+
+    bl_idname = "MFO_UL_history"
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: bpy.types.PropertyGroup,
+        item: bpy.types.PropertyGroup,
+        _icon: int,
+        _active_data: object,
+        _active_property: str,
+    ) -> None:
+        """Draw one result; the one on the material has a check mark."""
+        applied = item.job_folder == data.job_folder and not data.shows_original
+        split = layout.split(factor=0.5)
+        split.label(text=item.name[5:16], icon="CHECKMARK" if applied else "TIME")
+        right = split.split(factor=0.58)
+        right.label(text="cancelled" if item.partial else item.preset)
+        right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
+
+
+class History:
+    """Go back to an earlier result."""
+
+    bl_label = "History"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Hidden until the material has results."""
+        material = context.object.active_material if context.object else None
+        return material is not None and bool(material.mfo.history)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the list and what can be done with the marked result."""
+        layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
+        layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
+        row = layout.row(align=True)
+        row.operator("mfo.apply_past", text="Apply", icon="CHECKMARK")
+        row.operator("mfo.show_past", text="Show", icon="IMAGE_DATA")
+        row.operator("mfo.remove_past", text="", icon="TRASH")

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pieces the panels are made of: sentences that wrap and pictures with a name below."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from .. import previews
+
+_LABELS = {"cycles": "In Cycles", "cycles_difference": "Difference"}
+
+
+def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
+    """A sentence over as many lines as the region needs; labels do not wrap."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for i, line in enumerate(textwrap.wrap(text, letters(context)) or [""]):
+        column.label(text=line, icon=icon if i == 0 else "BLANK1")
+
+
+def letters(context: bpy.types.Context) -> int:
+    """How many letters a line of the region holds."""
+    scale = context.preferences.system.ui_scale
+    return max(16, int((context.region.width / scale - 80) / 5.8))  # 5.8 px is an average letter at scale 1
+
+
+def draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...], *, clickable: bool = False) -> None:
+    """Pictures side by side; with `clickable` their names are buttons that show them at full size."""
+    row = layout.row(align=True)
+    for name in names:
+        column = row.column(align=True)
+        if previews.icon(name):
+            column.template_icon(icon_value=previews.icon(name), scale=5.0)
+        label = _LABELS.get(name, name.title())
+        if clickable:
+            column.operator("mfo.show_pictures", text=label).show = name
+        else:
+            line = column.row()
+            line.alignment = "CENTER"
+            line.label(text=label)
+
+
+def draw_messages(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
+    """The notes of a fit."""
+    column = layout.column(align=True)
+    for message in runtime.messages:
+        draw_sentence(column, context, message.name, message.icon or "INFO")

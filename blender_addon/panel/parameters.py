@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which values may change: all, the paper's four, or a list with a box for each."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import running_job
+from ..export.read_material import principled_node
+from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
+
+
+class Parameters:
+    """What is fitted, and what stays locked."""
+
+    bl_label = "Values to Fit"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Hidden while a fit runs."""
+        return running_job.current is None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the choice and, for Chosen, a line for each value."""
+        layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
+        layout.row().prop(settings, "parameter_set", expand=True)
+        if settings.parameter_set != "chosen":
+            return
+        column = layout.column(align=True)
+        if settings.model == "blender_principled":
+            node = principled_node(context.object.active_material if context.object else None)
+            for key, name, *_ in SOCKET_ITEMS:
+                _draw_value(column, settings, key, name, node)
+        else:
+            for key, name, *_ in PARAMETER_ITEMS:
+                column.prop_enum(settings, chosen_of(settings.model), key, text=name)
+
+
+def _draw_value(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, key: str, name: str, node: bpy.types.Node | None
+) -> None:
+    """A box that unlocks the value, its name, and the value itself to set where the fit starts."""
+    socket = node.inputs.get(name) if node is not None else None
+    if node is not None and socket is None:
+        return  # not in this version of Blender
+    split = layout.split(factor=0.6, align=True)
+    is_linked = socket is not None and socket.is_linked
+    icon = "LINKED" if is_linked else "CHECKBOX_HLT" if key in settings.sockets else "LOCKED"
+    box = split.row(align=True)
+    box.enabled = not is_linked
+    box.prop_enum(settings, "sockets", key, text=name, icon=icon)
+    value = split.row(align=True)
+    if is_linked:
+        value.label(text="linked")
+    elif socket is not None:
+        value.prop(socket, "default_value", text="")
+    if is_linked or key not in settings.sockets:
+        return
+    bound = settings.bounds.get(key)
+    value.operator("mfo.limit_value", text="", icon="NOCURVE", depress=bound is not None).name = key
+    if bound is not None:
+        limits = layout.row(align=True)
+        limits.prop(bound, "lower")
+        limits.prop(bound, "upper")

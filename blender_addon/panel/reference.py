@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first panel: which material, and the reference with what was understood of it."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import preflight, running_job
+
+
+class Reference:
+    """What is fitted and to which picture."""
+
+    bl_label = "Material Fit"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the target and the choice of the reference."""
+        preflight.watch(context)
+        layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
+        _draw_target(layout, context)
+        column = layout.column()
+        column.enabled = running_job.current is None
+        column.row().prop(settings, "reference_source", expand=True)
+        if settings.reference_source == "FILE":
+            column.prop(settings, "reference_path", text="")
+        else:
+            column.template_ID(settings, "reference_image", open="image.open")
+
+
+def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    obj = context.object
+    if obj is None:
+        layout.label(text="Select an object", icon="ERROR")
+        return
+    material = obj.active_material
+    row = layout.row()
+    row.label(text=obj.name, icon="OBJECT_DATA")
+    row.label(text=material.name if material else "No material", icon="MATERIAL" if material else "ERROR")

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Preset, Fit and Cancel, progress with live pictures, the queue."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import fit_queue, previews, running_job
+from ..backend_section import draw_setup, has_trouble, needs_setup
+from ..operators.fit_options import selected_targets
+from .layout import draw_pictures, draw_sentence, letters
+
+
+class Run:
+    """Start, watch and stop a fit."""
+
+    bl_label = "Fit"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw settings and button, or the progress."""
+        layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
+        runtime = context.window_manager.mfo_runtime
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(settings, "preset")
+        header, body = column.panel("mfo_advanced", default_closed=True)
+        header.label(text="Advanced")
+        if body:
+            body.prop(settings, "model")
+            body.prop(settings, "range")
+            body.prop(settings, "bake_view")
+            body.prop(settings, "max_iterations")
+        if running_job.current is not None:
+            _draw_progress(layout, context)
+        elif needs_setup():
+            draw_setup(layout, width=letters(context))
+            return
+        _draw_buttons(layout, context)
+        _draw_queue(layout, context)
+        if has_trouble():
+            draw_setup(layout, width=letters(context))
+        if runtime.state in {"DONE", "FAILED"}:
+            box = layout.box()
+            box.alert = runtime.state == "FAILED"
+            draw_sentence(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
+            for message in runtime.messages if runtime.state == "FAILED" else ():
+                if message.icon == "ERROR":  # the others are notes of the export
+                    draw_sentence(box, context, message.name, message.icon)
+
+
+def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    running = running_job.current is not None
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.scale_y = 1.0 if running else 1.4
+    row.operator("mfo.fit", text="Add to Queue" if running else "Fit Material", icon="ADD" if running else "PLAY")
+    if len(selected_targets(context, most=2)) > 1:
+        column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
+
+
+def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    runtime = context.window_manager.mfo_runtime
+    column = layout.column()
+    row = column.row(align=True)
+    row.scale_y = 1.4
+    row.progress(factor=runtime.fraction, type="BAR", text=runtime.progress_text)
+    row.operator("mfo.cancel", text="", icon="X")
+    if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
+        column.label(text=f"Of material {runtime.material}", icon="MATERIAL")
+    column.label(text=runtime.detail)
+    shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
+    if "current" in shown:
+        draw_pictures(column, shown)
+
+
+def _draw_queue(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    if not fit_queue.waiting and not fit_queue.finished:
+        return
+    box = layout.box()
+    box.label(text=f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended", icon="SEQUENCE")
+    for ended in fit_queue.finished:
+        draw_sentence(box, context, f"{ended.material_name}: {ended.sentence}", ended.icon)
+    for index, fit in enumerate(fit_queue.waiting):
+        row = box.row(align=True)
+        row.label(text=fit.material_name, icon="TIME")
+        row.operator("mfo.drop_queued", text="", icon="X").index = index

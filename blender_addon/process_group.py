@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Child processes in a group of their own, so that what they start ends with them. No bpy here."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+from typing import Any
+
+TERMINATE = signal.SIGTERM
+KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has no SIGKILL; taskkill /F is one anyway
+
+
+def own_group() -> dict[str, Any]:
+    """Arguments of `subprocess.Popen` that make a group (and on Windows no window)."""
+    if os.name == "nt":
+        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}
+
+
+def signal_group(pid: int, number: int) -> None:
+    """Signal the group that process `pid` leads; nothing happens where it is gone."""
+    with contextlib.suppress(OSError):
+        if os.name == "nt":
+            subprocess.run(["taskkill", "/T", "/F", "/PID", str(pid)], capture_output=True, check=False)
+        else:
+            os.killpg(pid, number)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The one result the panel shows and `mfo.apply` takes: of the last fit, of a history, or of a job folder."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import previews
+from .job_result import JobResult, Value
+from .write_back import result_to_sockets, socket_to_parameter
+
+PICTURES = ("reference", "start", "result", "difference", "curve", "cycles", "cycles_difference")
+_ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
+_KEPT = ("split",)  # settings of the view, not of a fit
+
+result: JobResult | None = None
+material_uid = 0  # session_uid of its material, 0 when it came from another session
+
+
+def show(found: JobResult, uid: int) -> None:
+    """Make `found` the result; `uid` is its material's session_uid or 0.
+
+    Raises
+    ------
+    WriteBackError
+        If the fitted model is unknown.
+    """
+    global result, material_uid
+    sockets = result_to_sockets(found)
+    result, material_uid = found, uid
+    runtime = bpy.context.window_manager.mfo_runtime
+    runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
+    for name, (before, after) in found.errors.items():
+        _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
+    for name, value in sockets.items():
+        _add_row(runtime.values, name, found.sockets_start.get(name), value)
+        runtime.values[-1].certainty = found.certainty.get(socket_to_parameter(name), "")
+    for note in found.notes:
+        if note not in runtime.messages:
+            add_message(runtime, note, "INFO")
+    for name in PICTURES:
+        previews.show(name, found.folder / "pictures" / f"{name}.png")
+
+
+def clear(runtime: bpy.types.PropertyGroup) -> None:
+    """Show no result, no messages and no pictures."""
+    global result, material_uid
+    result, material_uid = None, 0
+    previews.clear()
+    for prop in runtime.bl_rna.properties:
+        if prop.type == "COLLECTION":
+            getattr(runtime, prop.identifier).clear()
+        elif not prop.is_readonly and prop.identifier not in _KEPT:
+            runtime.property_unset(prop.identifier)
+
+
+def material() -> bpy.types.Material | None:
+    """The material of the result under whatever name it has by now, if it was fitted in this session."""
+    return next((m for m in bpy.data.materials if m.session_uid == material_uid), None) if material_uid else None
+
+
+def add_message(runtime: bpy.types.PropertyGroup, text: str, icon: str) -> None:
+    """Add one line to the panel's notes."""
+    message = runtime.messages.add()
+    message.name, message.icon = text, icon
+
+
+def _add_row(rows: bpy.types.bpy_prop_collection, label: str, before: Value | None, after: Value) -> None:
+    row = rows.add()
+    row.name = label
+    row.start, row.result = _shown(before), _shown(after)
+
+
+def _shown(value: Value | None) -> str:
+    if value is None:
+        return ""
+    return previews.swatch(value) if isinstance(value, tuple) else f"{value:.3g}"

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfo judge JOB PICTURE`: how far a picture is from the reference of a job, seen through the job's own view."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from ..job.atomic_file import write_atomically
+from ..job.job_folder import JobFolder
+from ..job.job_view import view_of
+from ..job.request import read_request
+from ..job.run_job import read_reference
+from ..metrics.compare import compare_images
+from ..report.difference_map import magma
+from ..report.picture import displayed, png_bytes
+from ..scene.image_file import read_image
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `judge` to the parser of `mfo`."""
+    parser = subparsers.add_parser(
+        "judge",
+        help="measure a picture against the reference of a job",
+        description="Measure PICTURE, as a render of the recovered material in Cycles, against the reference of a job "
+        "under the job's view. Writes NAME.png and NAME_difference.png (FLIP) into the job's folder pictures.",
+    )
+    parser.add_argument("job", metavar="JOB", type=Path)
+    parser.add_argument("picture", metavar="PICTURE", type=Path)
+    parser.add_argument("--name", default="cycles", help="of the pictures that are written (default: cycles)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(func=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the metrics and write both pictures; returns 0, or raises `BadInputError`."""
+    folder = JobFolder.open(arguments.job)
+    request = read_request(folder)
+    reference, _notes = read_reference(folder, request)
+    view = view_of(folder, request, reference)
+    picture = read_image(arguments.picture)
+    comparison = compare_images(reference, picture, display=view)
+    folder.pictures.mkdir(exist_ok=True)
+    name = Path(arguments.name).name
+    write_atomically(folder.pictures / f"{name}.png", png_bytes(displayed(picture, view)))
+    difference = png_bytes(magma(comparison.maps["flip"]))
+    write_atomically(folder.pictures / f"{name}_difference.png", difference)
+    if arguments.json:
+        print(json.dumps({"status": "ok", "metrics": comparison.metrics, "notes": list(comparison.notes)}))
+        return 0
+    for metric, value in comparison.metrics.items():
+        print(f"{metric:13} {'-' if value is None else f'{value:.6g}':>12}")
+    return 0

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The presets `fast` and `balanced` for materials whose light passes through them: least squares on traced paths."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metrics.pixel_check import check_finite
+from ..metrics.tone_mapping import DisplayView, View
+from ..render.mitsuba_renderer import MitsubaRenderer
+from ..types.certainty import Certainty, Level
+from ..types.event import Listener, Preview, Started
+from ..types.image import Encoding, Image
+from ..types.parameter import ParameterTable
+from ..types.result import FitResult
+from ..types.status import Status
+from .course import Course
+from .fit_material import FitOutcome
+from .fit_recorded import CANCELLED_SPP, clipped_pixels, linear_pixels
+from .settings import FitSettings
+from .stages import Candidate
+from .transmission_stages import Polished, TransmissionFit, TransmissionPlan
+from .uncertainty import WEAK_BELOW, certainties
+from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
+
+STAGES = ("scan", "race", "polish")
+Vector = NDArray[np.float64]
+
+
+def fit_transmission(
+    renderer: MitsubaRenderer,
+    reference: Image,
+    settings: FitSettings,
+    *,
+    display: View | None = None,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+    plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
+) -> FitOutcome:
+    """Recover the renderer's parameters from a picture of the same scene by whole light paths.
+
+    Parameters and errors are those of `fit_material`. Ends of the stages are compared on paths no stage has seen, and
+    the best of them with the scene's own values on path-traced pictures under yet another seed, by mean FLIP.
+
+    Raises
+    ------
+    BadInputError
+        As `fit_material`.
+    UnrecordableError
+        If the model has no traced version.
+    """
+    from ..render.traced_paths import TracedPaths
+
+    began = time.monotonic()
+    mask = renderer.target_mask()
+    check_reference(reference, mask)
+    check_finite(reference.pixels, "The reference")
+    ldr = reference.encoding is Encoding.SRGB or settings.range == "ldr"
+    scene_view = DisplayView.for_scene(reference.pixels, mask) if reference.encoding is Encoding.LINEAR else None
+    view = scene_view or display or DisplayView()
+    paths = TracedPaths(renderer)
+    listener(Started(stages=STAGES, parameters=renderer.table.names, seconds=time.monotonic() - began))
+    course = Course(renderer, STAGES, listener, should_stop, began)
+    light, clipped = linear_pixels(reference, view), clipped_pixels(reference, view)
+    fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
+
+    certainty: dict[str, Certainty] = {}
+    notes: list[str] = []
+    nodes = fit.scan()
+    found = fit.race(nodes) if not should_stop() else nodes[0][1]
+    if not should_stop():
+        ends = fit.polish(found)
+        candidates = [end.x for end in reversed(ends)] + [found]
+        chosen = fit.choose(candidates)
+        found = candidates[chosen]
+        certainty = _certainty(ends, renderer.table)
+        unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
+        if chosen == 0 and len(ends) == 2:
+            notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
+    seed = settings.seed ^ VERIFY_STREAM
+    stopped = should_stop()
+    spp = min(CANCELLED_SPP, settings.verify_spp) if stopped else settings.verify_spp
+    pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in (renderer.start, found)]
+    listener(Preview(pictures[-1].image))
+    name = "flip-ldr" if ldr else "flip-hdr"
+    loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
+    best = int(np.argmin([loss.value(picture.image) for picture in pictures]))
+    status = Status.CANCELLED if stopped or should_stop() else Status.CONVERGED
+    message = status.sentence
+    if best == 0:
+        message += " Nothing was better than the start, so the start was kept."
+    result = FitResult(
+        status=status,
+        message=message,
+        model=renderer.model,
+        initial=renderer.table.unpack(renderer.start),
+        recovered=renderer.table.unpack(pictures[best].vector),
+        bounds={p.name: (p.lower, p.upper) for p in renderer.table},
+        stages=tuple(course.reports),
+        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
+        seconds=time.monotonic() - began,
+        passes=renderer.passes,
+        certainty=certainty,
+        notes=tuple(notes),
+    )
+    return FitOutcome(result, pictures[0].image, pictures[best].image)
+
+
+def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certainty]:
+    """How sure each value is; those that were kept are as unsure as before, the others are so given the kept ones."""
+    variance = [np.maximum(np.diag(end.covariance), 0.0) for end in ends]
+    width = table.upper - table.lower
+    unsure = np.maximum(variance[0], (WEAK_BELOW * width) ** 2)
+    return certainties(np.sqrt(np.where(ends[-1].kept, unsure, variance[-1])), table)

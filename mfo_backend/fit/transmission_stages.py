@@ -1,0 +1,390 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The stages of a fit on traced paths: a scan, a race of the best nodes, a polish on pooled samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solve.bounded_least_squares import NormalEquations
+from ..solve.noisy_least_squares import CrossProducts, SafeMatrix, cautious_step, cross_equations
+from ..types.image import Pixels
+from .course import Course, Stage
+from .tile_rows import TileRows
+from .uncertainty import WEAK_BELOW
+
+if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
+    from ..render.traced_paths import TracedPaths
+
+Vector = NDArray[np.float64]
+Samples = list[NDArray[np.float32]]
+
+CORE = ("base_color", "transmission_weight", "roughness", "ior")
+GEOMETRIC = ("roughness", "ior")  # they move the paths
+ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
+IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
+SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
+FAR, NEAR = {"roughness": 0.12, "ior": 0.06}, {"roughness": 0.06, "ior": 0.03}
+TILE_SIZES = (1, 2, 4, 8)
+TRUST = 0.25  # of the range: the longest step
+
+
+@dataclass(frozen=True)
+class TransmissionPlan:
+    """How much a fit on traced paths does.
+
+    `*_pixels` bounds the pixels a stage looks at, `*_samples` are paths a pixel in each of the two halves; `race_steps`
+    and `polish_steps` bound the iterations, `starts` the nodes that race, besides the scene's own material. The polish
+    ends when the error that is left is expected to be below the share `enough` of the reference's noise (squares;
+    0.02 is one per cent of the root).
+    """
+
+    scan_pixels: int = 500
+    scan_samples: int = 4
+    scan_steps: int = 3
+    starts: int = 2
+    race_pixels: int = 4000
+    race_samples: int = 8
+    race_steps: int = 7
+    polish_pixels: int = 16_000
+    polish_samples: int = 8
+    polish_steps: int = 24
+    guard_samples: int = 16
+    enough: float = 0.006
+
+
+@dataclass
+class Runner:
+    """A point of the race with the equations there."""
+
+    x: Vector
+    equations: NormalEquations | None = None
+    damping: float = 0.01
+    growth: float = 2.0
+
+
+@dataclass(frozen=True)
+class Polished:
+    """The end of a polish: its point, the covariance of its values, which of them stayed as in the scene, and the last
+    equations with the covariance of their gradient (None if there was no time for any)."""
+
+    x: Vector
+    covariance: Vector
+    kept: NDArray[np.bool_]
+    equations: NormalEquations | None
+    noise: Vector
+
+
+class TransmissionFit:
+    """The stages of one fit; `reference` is scene-linear, `mask` holds the pixels to look at."""
+
+    def __init__(
+        self,
+        paths: TracedPaths,
+        start: Vector,
+        reference: Pixels,
+        mask: NDArray[np.bool_],
+        plan: TransmissionPlan,
+        seed: int,
+        course: Course,
+        clipped: NDArray[np.float32] | None = None,
+    ) -> None:
+        self.paths, self.start, self.reference, self.mask = paths, start, reference, mask
+        self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
+        self.table = paths.table
+        self._width = self.table.upper - self.table.lower
+        # values besides those of the glass stay as in the scene until the polish; without glass none does
+        self._extras = np.ones(self.table.length, bool)
+        for name in CORE:
+            if name in self.table.names:
+                self._extras[self.table.slice_of(name)] = False
+        if "transmission_weight" not in self.table.names:
+            self._extras[:] = False
+
+    def tiles(self, size: int, most: int) -> TileRows:
+        """Tiles of the reference."""
+        return TileRows.of(self.reference, self.mask, size, self.clipped, most)
+
+    def halves(
+        self,
+        tiles: TileRows,
+        xs: Vector,
+        *,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        near: bool = False,
+        moving: bool = True,
+    ) -> list[Samples]:
+        """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
+
+        Without `moving` the derivatives by roughness and index stay those of fixed paths; `near` takes shorter secants.
+        """
+        tables = self._tables(tiles, xs, seed, samples, jacobian, near, moving)
+        return [[tiles.rows(half) for half in np.split(table, 2)] for table in tables]
+
+    def _tables(
+        self, tiles: TileRows, xs: Vector, seed: int, samples: int, jacobian: bool, near: bool, moving: bool
+    ) -> NDArray[np.float32]:
+        """Pictures with derivatives (m, 2 p, 3, 1 + k), the pixels twice."""
+        pixels = np.concatenate([tiles.pixels, tiles.pixels])  # the second time with other random numbers
+
+        def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
+            return self.paths.images(
+                vectors, pixels, seed=seed, samples=samples, jacobian=derivatives, should_stop=self.course.should_stop
+            )
+
+        tables = trace(xs, jacobian)
+        if jacobian and moving:
+            self._secants(tables, xs, trace, near)
+        return tables
+
+    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable, near: bool) -> None:
+        """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
+        moved, where = [], []
+        for i, x in enumerate(xs):
+            if self.paths.roughness(x) >= SECANT_BELOW:
+                continue
+            for name in GEOMETRIC:
+                if name not in self.table.names:
+                    continue
+                k = self.table.slice_of(name).start
+                h = (NEAR if near else FAR)[name]
+                h = -h if x[k] + h > self.table.upper[k] else h
+                trial = x.copy()
+                trial[k] += h
+                moved.append(trial)
+                where.append((i, k, h))
+        if moved:
+            images = trace(np.array(moved), False)[..., 0]
+            for image, (i, k, h) in zip(images, where, strict=True):
+                tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
+
+    def scan(self) -> list[tuple[float, Vector]]:
+        """Stage `scan`: all nodes of roughness and index with the best other values, best first."""
+        plan, table = self.plan, self.table
+        with self.course.stage("scan") as stage:
+            tiles = self.tiles(4, plan.scan_pixels)
+            nodes = {"roughness": ROUGHNESS_NODES, "ior": IOR_NODES}
+            held = [name for name in GEOMETRIC if name in table.names]
+            middle = self.start.copy()
+            for name in ("base_color", "transmission_weight"):
+                if name in table.names:
+                    part = table.slice_of(name)
+                    middle[part] = table.lower[part] + 0.75 * self._width[part]
+            xs = []
+            for values in product(*(nodes[name] for name in held)):
+                x = middle.copy()
+                for name, value in zip(held, values, strict=True):
+                    x[table.slice_of(name)] = value
+                xs.append(x)
+            xs = table.clip(np.array(xs))
+            frozen = self._extras.copy()
+            for name in held:
+                frozen[table.slice_of(name)] = True
+            for turn in range(plan.scan_steps + 1):
+                rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
+                equations = [_two_half(*pair) for pair in rows]
+                best = int(np.argmin([e.cost for e in equations]))
+                self._note(stage, equations[best].cost)
+                if turn == plan.scan_steps or frozen.all() or self.course.should_stop():
+                    break
+                for i, e in enumerate(equations):
+                    xs[i] += self._step(e, xs[i], 0.02, 0.5, frozen)
+            order = np.argsort([e.cost for e in equations])
+            stage.vector = xs[order[0]]
+            return [(equations[i].cost, xs[i]) for i in order]
+
+    def race(self, nodes: list[tuple[float, Vector]]) -> Vector:
+        """Stage `race`: damped steps from the best different nodes and the scene's material, all in one launch."""
+        plan = self.plan
+        with self.course.stage("race") as stage:
+            tiles = self.tiles(4, plan.race_pixels)
+            runners = [Runner(x.copy()) for x in self._different(nodes, plan.starts)]
+            runners.append(Runner(self.table.clip(self.start)))
+            best = runners[0]
+            for turn in range(plan.race_steps + 1):
+                trials = [r.x if r.equations is None else r.x + self._damped(r) for r in runners]
+                rows = self.halves(
+                    tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples, near=turn > 3
+                )
+                if self.course.should_stop():
+                    break
+                for runner, trial, pair in zip(runners, trials, rows, strict=True):
+                    self._accept(runner, trial, _two_half(*pair))
+                runners.sort(key=lambda r: r.equations.cost if r.equations else np.inf)
+                best = runners[0]
+                stage.vector = best.x
+                assert best.equations is not None
+                self._note(stage, best.equations.cost)
+                # those that fall behind are given up
+                if turn >= 2:
+                    least = abs(best.equations.cost)
+                    runners = [r for r in runners if r.equations and r.equations.cost < best.equations.cost + 2 * least]
+                    runners = runners[:2]
+                if turn >= 4:
+                    runners = runners[:1]
+            return best.x
+
+    def _damped(self, runner: Runner) -> Vector:
+        assert runner.equations is not None
+        return self._step(runner.equations, runner.x, runner.damping, TRUST, self._extras)
+
+    def _accept(self, runner: Runner, x: Vector, equations: NormalEquations) -> None:
+        if not equations.finite:
+            runner.damping *= 10.0
+        elif runner.equations is None or equations.cost < runner.equations.cost:
+            runner.x, runner.equations = x, equations
+            runner.damping = max(runner.damping / 3.0, 1e-3)
+        else:
+            runner.damping = max(runner.damping * 6.0, 0.05)
+
+    def polish(self, start: Vector) -> list[Polished]:
+        """Stage `polish`: Gauss-Newton steps on all samples so far, each with new random numbers.
+
+        Where the picture does not determine some values, a second end follows, fitted with those as in the scene.
+        """
+        with self.course.stage("polish") as stage:
+            core = start
+            if self._extras.any():
+                core = self._pool(stage, start, self._extras, stream=50).x
+            ends = [self._pool(stage, core, np.zeros(self.table.length, bool), stream=10)]
+            unseen = self._unseen(ends[0])
+            if unseen.any() and not unseen.all() and not self.course.should_stop():
+                kept = np.where(unseen, self.table.clip(self.start), ends[0].x)
+                ends.append(self._pool(stage, kept, unseen, stream=100))
+            stage.vector = ends[-1].x
+        return ends
+
+    def _pool(self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int) -> Polished:
+        plan, columns = self.plan, 1 + self.table.length
+        x, variance, floor = start.copy(), np.diag(self._width**2), 0.0
+        equations, noise = None, variance
+        single = self.tiles(1, plan.polish_pixels)
+        tiles, pool = single, CrossProducts(3, columns)
+        for turn in range(plan.polish_steps):
+            seed = self._seed(stream + turn)
+            if turn == 0:
+                (table,) = self._tables(single, x[None], seed, plan.polish_samples, True, True, True)
+                halves = np.split(table, 2)
+                floor = 2.0 * _two_half(*(single.rows(half) for half in halves)).cost
+                tiles, pair = self._best_tiles(single, halves)
+                pool = CrossProducts(3 * len(tiles), columns)
+            else:
+                (pair,) = self.halves(tiles, x[None], seed=seed, samples=plan.polish_samples, near=True)
+            if self.course.should_stop():
+                break
+            if turn in (1, 2):
+                pool.fade(0.25)
+            for sample in pair:
+                sample[:, 1:][:, frozen] = 0.0
+                pool.add(sample)
+            equations, noise = cross_equations(pool.gram()), pool.gradient_noise(3)
+            self._note(stage, equations.cost)
+            step = self._step(equations, x, 1e-3, 0.1 if turn < 2 else 0.05, frozen, noise)
+            x = x + step
+            pool.shifted(step)
+            stage.vector = x
+            matrix = SafeMatrix(equations, self._width)
+            variance = matrix.covariance(noise)
+            if turn >= 3 and matrix.expected_error(noise) < plan.enough * floor:
+                break
+        return Polished(x, variance, frozen, equations, noise)
+
+    def _unseen(self, end: Polished) -> NDArray[np.bool_]:
+        """Values that are not determined: the least sure one is taken for known until the rest is sure."""
+        held = np.zeros(self.table.length, bool)
+        if end.equations is None:
+            return held
+        e, names = end.equations, list(self.table.names)
+        while names:
+            free = ~held
+            part = NormalEquations(e.cost, e.gradient[free], e.hessian[np.ix_(free, free)])
+            spread = np.zeros(self.table.length)
+            sandwich = SafeMatrix(part, self._width[free]).covariance(end.noise[np.ix_(free, free)])
+            spread[free] = np.sqrt(np.maximum(np.diag(sandwich), 0.0)) / self._width[free]
+            width = {name: float(spread[self.table.slice_of(name)].max()) for name in names}
+            # the glass itself is given up last: with the others known it is often seen well
+            unsure = sorted((name in CORE, -width[name], name) for name in names if width[name] >= WEAK_BELOW)
+            if not unsure:
+                break
+            worst = unsure[0][2]
+            held[self.table.slice_of(worst)] = True
+            names.remove(worst)
+        return held
+
+    def _best_tiles(self, single: TileRows, halves: Samples) -> tuple[TileRows, Samples]:
+        """The size of tiles that leaves the least uncertainty, with the rows of both halves.
+
+        Small tiles show more of a sharp picture's detail, large ones average the noise before it is multiplied.
+        """
+        best: tuple[float, TileRows, Samples] | None = None
+        for size in TILE_SIZES:
+            tiles = self.tiles(size, self.plan.polish_pixels)
+            order = np.searchsorted(single.pixels, tiles.pixels)
+            rows = [tiles.rows(half[order]) for half in halves]
+            pool = CrossProducts(3 * len(tiles), 1 + self.table.length)
+            for sample in rows:
+                pool.add(sample)
+            matrix = SafeMatrix(cross_equations(pool.gram()), self._width)
+            variance = matrix.covariance(pool.gradient_noise(3))
+            total = float(np.minimum(np.diag(variance) / self._width**2, 1.0).sum())
+            if best is None or total < best[0]:
+                best = total, tiles, rows
+        assert best is not None
+        return best[1], best[2]
+
+    def choose(self, candidates: list[Vector]) -> int:
+        """The first candidate, unless another is better by two standard errors on paths that none has seen."""
+        tiles = self.tiles(4, self.plan.polish_pixels)
+        rows = self.halves(
+            tiles, np.array(candidates), seed=self._seed(999), samples=self.plan.guard_samples, jacobian=False
+        )
+        if self.course.should_stop():
+            return 0
+        costs = np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])
+        gain = costs[0] - costs
+        error = gain.std(axis=1) / np.sqrt(gain.shape[1])
+        sure = gain.mean(axis=1) > 2.0 * error
+        return int(np.argmax(np.where(sure, gain.mean(axis=1), 0.0)))
+
+    def _step(
+        self,
+        equations: NormalEquations,
+        x: Vector,
+        damping: float,
+        trust: float,
+        frozen: NDArray[np.bool_] | None = None,
+        noise: Vector | None = None,
+    ) -> Vector:
+        reach = trust * self._width
+        lower, upper = np.maximum(self.table.lower - x, -reach), np.minimum(self.table.upper - x, reach)
+        if frozen is not None:
+            lower, upper = np.where(frozen, 0.0, lower), np.where(frozen, 0.0, upper)
+        return cautious_step(equations, np.minimum(lower, 0.0), np.maximum(upper, 0.0), self._width, damping, noise)
+
+    def _different(self, nodes: list[tuple[float, Vector]], count: int) -> list[Vector]:
+        chosen: list[Vector] = []
+        for _, x in nodes:
+            if all(np.max(np.abs(x - other) / self._width) > 0.12 for other in chosen):
+                chosen.append(x)
+            if len(chosen) == count:
+                break
+        return chosen
+
+    def _seed(self, stream: int) -> int:
+        return (self.seed * 1009 + stream) & 0xFFFFFFFF
+
+    def _note(self, stage: Stage, cost: float) -> None:
+        self.course.note(stage, float(np.sqrt(max(2.0 * cost, 0.0))))
+
+
+def _two_half(a: NDArray[np.float32], b: NDArray[np.float32]) -> NormalEquations:
+    """The normal equations of two independent samples of the rows."""
+    product_ = a.astype(np.float64).T @ b.astype(np.float64) / len(a)
+    return cross_equations(0.5 * (product_ + product_.T))

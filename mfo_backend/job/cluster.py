@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work spread over processes or machines with Dask; `docs/cluster.md` says how to start one.
+
+Dask's messages hold pickles: a scheduler trusts everyone who can reach it.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from ..types.errors import BadInputError, SetupError
+
+RETRIES = 2  # of work that raises; a lost worker's work goes to another one without counting here
+POLL_SECONDS = 0.2
+NO_WORKER_SECONDS = 120.0  # a cluster may take this long to replace one
+_CONNECT_SECONDS = 15
+
+
+def cores() -> int:
+    """Processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads_each(workers: int) -> int:
+    """Threads of each of some workers on one machine."""
+    return max(1, cores() // workers)
+
+
+@contextmanager
+def open_client(scheduler: str | None, workers: int) -> Iterator[Any]:
+    """A Dask client of a running scheduler, or of `workers` processes on this machine that end with the block.
+
+    Raises
+    ------
+    SetupError
+        If the extra `cluster` is not installed.
+    BadInputError
+        If nothing answers at the scheduler's address.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise SetupError(f"Dask cannot be imported ({error}): install distributed (the extra `cluster`).") from None
+    for name in (
+        "distributed",
+        "distributed.client",
+        "distributed.worker",
+        "distributed.nanny",
+        "distributed.scheduler",
+    ):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # a lost worker is told once, by us
+    if scheduler is None:
+        quiet: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
+        # one task at a time: Mitsuba's variant and its scenes belong to one thread
+        with LocalCluster(n_workers=workers, threads_per_worker=1, **quiet) as cluster, Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=_CONNECT_SECONDS)
+    except (OSError, ValueError) as error:
+        words = " ".join(str(error).split())
+        raise BadInputError(
+            f"No Dask scheduler answers at {scheduler!r} ({words}): check address and network."
+        ) from None
+    with client:
+        yield client
+
+
+def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[[], bool]) -> Iterator[tuple[Any, Any]]:
+    """(key, future) of every future that has ended, in the order of their ends; stops early when asked to.
+
+    Raises
+    ------
+    SetupError
+        If there has been no worker for two minutes, or the scheduler is gone.
+    """
+    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    keys = {future.key: name for name, future in futures.items()}
+    for future in futures.values():
+        future.add_done_callback(ended.put)
+    left, alive = len(futures), time.monotonic()
+    while left and not should_stop():
+        try:
+            future = ended.get(timeout=POLL_SECONDS)
+        except queue.Empty:
+            if client.scheduler_info()["workers"]:
+                alive = time.monotonic()
+            elif time.monotonic() - alive > NO_WORKER_SECONDS:
+                raise SetupError(
+                    "No Dask worker is left: start workers, then the same command goes on where it was."
+                ) from None
+            continue
+        if future.status not in ("finished", "error"):  # nothing came of it, and it is nobody's error
+            raise SetupError(
+                f"The Dask scheduler gave up ({future.status}): start it, then the same command goes on where it was."
+            )
+        left -= 1
+        yield keys[future.key], future

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Mitsuba integrator `cycles_path`: a path tracer that treats indirect light as Cycles does.
+
+What differs from Mitsuba's `prb` is Filter Glossy, the clamping of indirect light and limits for one kind of bounce
+(Cycles 5.0: kernel/integrator/surface_shader.h, path_state.h, film/light_passes.h). Derivatives are those of path
+replay (Vicini, Speierer, Jakob 2021, "Path Replay Backpropagation"), for materials only: lights and shapes are held.
+Choose the variant before importing this.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
+
+from ..types.light_paths import NO_LIMIT, LightPaths
+
+PLUGIN_NAME = "cycles_path"
+_CERTAIN = 1e30  # density before the first bounce
+_LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
+TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
+
+
+class CyclesPath(RBIntegrator):
+    """`max_depth`, `hide_emitters` as `prb`, further the numbers of `LightPaths` by name."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        super().__init__(props)
+        self.filter_glossy = float(props.get("filter_glossy", 0.0))
+        self.clamp_indirect = float(props.get("clamp_indirect", 0.0))
+        self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
+
+    @dr.syntax
+    def sample(
+        self,
+        mode: dr.ADMode,
+        scene: mi.Scene,
+        sampler: mi.Sampler,
+        ray: mi.Ray3f,
+        δL: Any = None,  # the name is that of Mitsuba's base class
+        state_in: Any = None,
+        active: Any = True,
+        before: tuple[Any, Any] | None = None,
+        **_: Any,
+    ) -> tuple[Any, Any, list[Any], Any]:
+        """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it."""
+        primal = mode == dr.ADMode.Primal
+        context = mi.BSDFContext()
+        ray = mi.Ray3f(dr.detach(ray))
+        radiance = mi.Spectrum(0 if primal else state_in)
+        change = mi.Spectrum(0 if δL is None else δL)
+        throughput = mi.Spectrum(1)
+        first = mi.Spectrum(1 if before is None else dr.detach(before[1]))
+        least = mi.Float(_CERTAIN if before is None else dr.detach(before[0]))
+        bounce = mi.UInt32(0 if before is None else 1)
+        left = mi.UInt32(self.max_depth)
+        diffuse, glossy, through = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        previous = dr.zeros(mi.Interaction3f)
+        density = mi.Float(1)
+        delta = mi.Bool(True)
+        active = mi.Bool(active)
+        valid = mi.Bool(False)
+        hidden = self.hide_emitters and before is None
+
+        while dr.hint(active, label=f"cycles_path ({mode.name})"):
+            si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=bounce == 0, active=active)
+            if dr.hint(hidden, mode="scalar"):
+                skip = active & (bounce == 0) & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711
+                further = self.skip_area_emitters(scene, si.spawn_ray(ray.d), True, skip)
+                behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
+                si[skip] = behind
+            valid |= (bounce == 0) & si.is_valid()
+            si.duv_dx = mi.Point2f(self._blur(least), 0)
+            bsdf = si.bsdf(ray)
+
+            # light that the last direction meets
+            ds = mi.DirectionSample3f(scene, si, previous)
+            seen = active & ~((bounce == 0) & hidden & ~si.is_valid())
+            light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
+            weight = dr.select(delta, 1, density / dr.maximum(density + light_density, 1e-30))
+            met = throughput * weight * ds.emitter.eval(si, seen)
+            met *= self._clamp(first * met, bounce >= 2)
+
+            goes_on = active & si.is_valid() & (left > 1)
+            ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, goes_on)
+            lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            with dr.resume_grad(when=not primal):
+                value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+                weight = dr.detach(dr.select(ds.delta, 1, ds.pdf / dr.maximum(ds.pdf + chance, 1e-30)))
+                direct = dr.select(lit, throughput * value * light * weight, 0)
+                direct = direct * self._clamp(first * direct, bounce >= 1)
+
+            bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
+            onward = si.spawn_ray(si.to_world(bs.wo))
+            goes_on &= dr.any(throughput * ratio != 0)
+
+            if dr.hint(primal, mode="scalar"):
+                radiance += met + direct
+            else:
+                radiance -= met + dr.detach(direct)
+                with dr.resume_grad():
+                    again = bsdf.eval(context, si, si.to_local(onward.d), goes_on)
+                    out = met + direct + radiance * dr.relative_grad(again)
+                    if dr.hint(mode == dr.ADMode.Backward, mode="scalar"):
+                        dr.backward_from(change * out)
+                    else:
+                        change += dr.forward_to(out)
+
+            # a straight passage is no bounce of any kind
+            counts = goes_on & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            is_through = (bs.sampled_type & TRANSMITS) != 0
+            is_diffuse = ((bs.sampled_type & DIFFUSE) != 0) & ~is_through
+            diffuse[counts & is_diffuse] += 1
+            glossy[counts & ~is_diffuse & ~is_through] += 1
+            through[counts & is_through] += 1
+            left -= 1
+            done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
+            left = dr.select(done, dr.minimum(left, 1), left)
+            least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
+            bounce += 1
+            throughput *= ratio
+            density, delta = mi.Float(bs.pdf), mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            previous = mi.Interaction3f(si)
+            ray = mi.Ray3f(onward)
+            active = goes_on
+
+        return radiance if primal else change, valid, [], radiance
+
+    def _blur(self, least: Any) -> Any:
+        """The least alpha of the microfacet lobes after bounces of which the unlikeliest had density `least`."""
+        if self.filter_glossy <= 0.0:
+            return mi.Float(0)
+        return 0.5 * dr.safe_sqrt(1 - least / self.filter_glossy)
+
+    def _clamp(self, sample: Any, indirect: Any) -> Any:
+        """What to scale a sample by whose channels add up to more than allowed."""
+        if self.clamp_indirect <= 0.0:
+            return mi.Float(1)
+        total = dr.detach(dr.sum(dr.abs(sample)))
+        limit = 3.0 * self.clamp_indirect
+        return dr.select(indirect & (total > limit), limit / total, 1)
+
+
+def light_path_properties(light_paths: LightPaths) -> dict[str, float | int]:
+    """Properties of the integrator."""
+    numbers = {name: getattr(light_paths, name) for name in _LIMITS}
+    return {"filter_glossy": light_paths.filter_glossy, "clamp_indirect": light_paths.clamp_indirect, **numbers}
+
+
+def register() -> None:
+    """Make `cycles_path` known to Mitsuba in the current variant."""
+    mi.register_integrator(PLUGIN_NAME, CyclesPath)

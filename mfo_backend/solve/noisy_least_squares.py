@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Least squares where residuals and derivatives are Monte Carlo estimates themselves.
+
+Products of two noisy numbers are biased: own noise makes J^T J too large, so that steps are too short, and pulls J^T r
+towards solutions with less noise. Products of independent samples are not. `cross_equations` averages the products of
+every pair of different samples (a U-statistic, W. Hoeffding 1948); two samples are enough. What is left is noise, so the
+matrix may be indefinite and `cautious_step` raises its eigenvalues.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bounded_least_squares import NormalEquations
+from .box_quadratic import minimise_in_box
+
+Array = NDArray[np.floating]
+Vector = NDArray[np.float64]
+
+
+class CrossProducts:
+    """Sums over samples X (n, 1 + k), the residual and its derivatives, that give every product of two of them.
+
+    `fade` makes all samples so far count less: a sample of long ago was taken where the derivatives were others.
+    """
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.total: Vector = np.zeros((rows, columns))
+        self._own: Vector = np.zeros((columns, columns))
+        self._weight = 0.0
+        self._weight_squares = 0.0
+
+    def add(self, sample: Array) -> None:
+        """Take one more sample."""
+        sample = sample.astype(np.float64)
+        self.total += sample
+        self._own += sample.T @ sample
+        self._weight += 1.0
+        self._weight_squares += 1.0
+
+    def fade(self, factor: float) -> None:
+        """Multiply the weight of all samples so far."""
+        self.total *= factor
+        self._own *= factor**2
+        self._weight *= factor
+        self._weight_squares *= factor**2
+
+    @property
+    def mean(self) -> Vector:
+        """The mean sample (n, 1 + k)."""
+        return self.total / max(self._weight, 1e-30)
+
+    def gram(self) -> Vector:
+        """The mean product of two different samples (1 + k, 1 + k), per row."""
+        pairs = self._weight**2 - self._weight_squares
+        return (self.total.T @ self.total - self._own) / (max(pairs, 1e-30) * len(self.total))
+
+    def gradient_noise(self, rows_of_group: int) -> Vector:
+        """Covariance (k, k) of the gradient of `cross_equations`, from its scatter over groups of rows.
+
+        Rows that share their noise, such as the channels of a tile, belong to one group of `rows_of_group`.
+        """
+        mean = self.mean
+        products = mean[:, 1:] * mean[:, :1]
+        groups = products.reshape(-1, rows_of_group, products.shape[1]).sum(axis=1)
+        groups = groups - groups.mean(axis=0)
+        count = len(groups)
+        return groups.T @ groups * (count / max(count - 1, 1)) / len(mean) ** 2
+
+    def shifted(self, step: Vector) -> None:
+        """Count the residuals from a point `step` further on, by the samples' own derivatives."""
+        # sums of X T with T = [[1, 0], [step, 1]] instead of X
+        change = np.eye(len(self._own))
+        change[1:, 0] = step
+        self.total = self.total @ change
+        self._own = change.T @ self._own @ change
+
+
+def cross_equations(gram: Vector) -> NormalEquations:
+    """Half the squared residual, its gradient and matrix from a gram matrix (1 + k, 1 + k)."""
+    return NormalEquations(0.5 * float(gram[0, 0]), gram[1:, 0].copy(), gram[1:, 1:].copy())
+
+
+class SafeMatrix:
+    """The matrix of noisy equations with its eigenvalues raised, so that it can be inverted.
+
+    `width` scales the unknowns. After scaling by the diagonal no eigenvalue is below `FLOOR`; a column whose product
+    with itself is negative counts as one without effect.
+    """
+
+    FLOOR = 0.03
+
+    def __init__(self, equations: NormalEquations, width: Vector) -> None:
+        hessian = equations.hessian * np.outer(width, width)
+        diagonal = np.diag(hessian)
+        self._blind = diagonal <= 1e-6 * max(float(diagonal.max()), 1e-12)
+        self._width = width
+        self.scale: Vector = np.sqrt(np.maximum(diagonal, 1e-4 * max(float(diagonal.max()), 1e-12))) / width
+        values, self.vectors = np.linalg.eigh(equations.hessian / np.outer(self.scale, self.scale))
+        self.values = np.maximum(values, self.FLOOR)
+
+    def covariance(self, noise: Vector) -> Vector:
+        """Covariance (k, k) of the solution: the sandwich H^-1 noise H^-1 (P. Huber 1967; H. White 1980).
+
+        A column without effect may lie anywhere in its width, and none is less sure than that.
+        """
+        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
+        result = inverse @ noise @ inverse
+        sd = np.sqrt(np.maximum(np.diag(result), 1e-300))
+        shrink = np.minimum(self._width / sd, 1.0)
+        result *= np.outer(shrink, shrink)
+        result[self._blind] = result[:, self._blind] = 0.0
+        result[self._blind, self._blind] = self._width[self._blind] ** 2
+        return result
+
+    def expected_error(self, noise: Vector) -> float:
+        """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""
+        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
+        return float(np.trace(inverse @ noise))
+
+
+def cautious_step(
+    equations: NormalEquations,
+    lower: Vector,
+    upper: Vector,
+    width: Vector,
+    damping: float,
+    noise: Vector | None = None,
+) -> Vector:
+    """The step within lower <= s <= upper (0 inside) that minimises the damped quadratic of the safe matrix.
+
+    Along each eigenvector the gradient is shrunk by 1 - 1 / z^2, z its size in standard deviations by its covariance
+    `noise`: what noise alone explains moves nothing.
+    """
+    safe = SafeMatrix(equations, width)
+    matrix = (safe.vectors * safe.values) @ safe.vectors.T + damping * np.eye(len(width))
+    gradient = equations.gradient / safe.scale
+    if noise is not None:
+        along = safe.vectors.T @ gradient
+        spread = np.diag(safe.vectors.T @ (noise / np.outer(safe.scale, safe.scale)) @ safe.vectors)
+        gradient = safe.vectors @ (along * np.maximum(1.0 - spread / np.maximum(along**2, 1e-300), 0.0))
+    return minimise_in_box(matrix, gradient, lower * safe.scale, upper * safe.scale) / safe.scale

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The check before a run: it finds what an export refuses, and its buttons mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+
+def check(scene: SimpleNamespace):
+    from blender_addon.checks import quick_check
+
+    context = scene.bpy.context
+    context.scene.mfo.reference_path = context.scene.mfo.reference_path or scene.reference
+    context.scene.render.engine = "CYCLES"
+    return quick_check(context.scene, context.view_layer)
+
+
+def stopping(scene: SimpleNamespace) -> dict[str, set[str]]:
+    return {f.sentence: {fix.kind for fix in f.fixes} for f in check(scene) if f.level == "stops"}
+
+
+def tree(scene: SimpleNamespace):
+    return scene.bpy.data.materials["Glaze"].node_tree
+
+
+def principled(scene: SimpleNamespace):
+    return next((n for n in tree(scene).nodes if n.type == "BSDF_PRINCIPLED"), None)
+
+
+def no_camera(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.camera = None
+
+
+def no_camera_at_all(scene: SimpleNamespace) -> None:
+    scene.bpy.data.objects.remove(scene.bpy.data.objects["Camera"])
+
+
+def panorama(scene: SimpleNamespace) -> None:
+    scene.bpy.data.cameras["Camera"].type = "PANO"
+
+
+def render_region(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.render.use_border = True
+
+
+def stereo(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.render.use_multiview = True
+
+
+def override(scene: SimpleNamespace) -> None:
+    scene.bpy.context.view_layer.material_override = scene.bpy.data.materials["Glaze"]
+
+
+def hidden(scene: SimpleNamespace) -> None:
+    scene.bpy.data.objects["Väse"].hide_render = True
+
+
+def hidden_collection(scene: SimpleNamespace) -> None:
+    scene.bpy.data.collections["Collection"].hide_render = True
+
+
+def another_size(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.render.resolution_x = 100
+
+
+def another_view(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.view_settings.view_transform = "AgX"
+
+
+def no_material(scene: SimpleNamespace) -> None:
+    scene.bpy.data.objects["Väse"].data.materials.clear()
+
+
+def diffuse(scene: SimpleNamespace) -> None:
+    nodes = tree(scene).nodes
+    nodes.remove(principled(scene))
+    shader = nodes.new("ShaderNodeBsdfDiffuse")
+    shader.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1.0)
+    output = next(n for n in nodes if n.type == "OUTPUT_MATERIAL")
+    tree(scene).links.new(shader.outputs[0], output.inputs["Surface"])
+
+
+def noise(scene: SimpleNamespace) -> None:
+    node = tree(scene).nodes.new("ShaderNodeTexNoise")
+    tree(scene).links.new(node.outputs[0], principled(scene).inputs["Roughness"])
+
+
+def nothing_active(scene: SimpleNamespace) -> None:
+    scene.bpy.context.view_layer.objects.active = None
+
+
+def the_light_is_active(scene: SimpleNamespace) -> None:
+    scene.bpy.context.view_layer.objects.active = scene.bpy.data.objects["Light"]
+
+
+def nothing_chosen(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.mfo.parameter_set = "chosen"
+    scene.bpy.context.scene.mfo.sockets = set()
+
+
+SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
+    (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (render_region, "whole_frame"),
+    (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
+    (another_size, "resolution"), (another_view, "bake_view"), (another_view, "standard_view"),
+    (no_material, "new_material"), (diffuse, "principled"), (noise, "unlink"), (nothing_active, "select"),
+    (the_light_is_active, "select"), (nothing_chosen, "all_parameters"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("spoil", "kind"), SPOILED, ids=lambda p: getattr(p, "__name__", p))
+def test_each_problem_is_found_and_mended_by_its_button(
+    scene: SimpleNamespace, spoil: Callable[[SimpleNamespace], None], kind: str
+) -> None:
+    assert stopping(scene) == {}
+    spoil(scene)
+    found = next((f for f in check(scene) if kind in {fix.kind for fix in f.fixes}), None)
+    assert found is not None, check(scene)
+    assert found.level == "stops"
+    argument = next(fix.argument for fix in found.fixes if fix.kind == kind)
+    assert scene.bpy.ops.mfo.mend(kind=kind, argument=argument) == {"FINISHED"}
+    assert found.sentence not in stopping(scene)
+    if kind != "new_material":  # a new material has a new name
+        assert stopping(scene) == {}
+
+
+def test_a_mended_shader_keeps_its_colour_and_the_old_node(scene: SimpleNamespace) -> None:
+    diffuse(scene)
+    scene.bpy.ops.mfo.mend(kind="principled")
+    assert tuple(principled(scene).inputs["Base Color"].default_value) == pytest.approx((0.1, 0.2, 0.3, 1.0))
+    assert any(n.type == "BSDF_DIFFUSE" for n in tree(scene).nodes)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("", "No reference is chosen"), ("/nowhere/a.exr", "does not exist"), ("text.txt", "no picture we read"),
+     ("text.png", "no picture its name promises")],
+)  # fmt: skip
+def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: str, words: str) -> None:
+    path = tmp_path / name
+    if name.startswith("text"):
+        path.write_text("words")
+    check(scene)
+    scene.bpy.context.scene.mfo.reference_path = str(path) if name else ""
+    from blender_addon.checks import quick_check
+
+    found = quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer)
+    assert any(f.level == "stops" and words in f.sentence for f in found), found
+
+
+def test_colours_of_an_image_datablock(scene: SimpleNamespace) -> None:
+    bpy = scene.bpy
+    settings = bpy.context.scene.mfo
+    settings.reference_source = "IMAGE"
+    assert any("No reference" in sentence for sentence in stopping(scene))
+    image = settings.reference_image = bpy.data.images.load(scene.reference)
+    assert stopping(scene) == {}
+    assert any("96 x 64, sRGB, display colours under the view Standard" in f.sentence for f in check(scene))
+    image.colorspace_settings.name = "Linear Rec.2020"
+    assert list(stopping(scene).values()) == [{"colorspace"}]
+    bpy.ops.mfo.mend(kind="colorspace", argument="sRGB")
+    assert stopping(scene) == {}
+
+
+def test_linked_values_are_ignored_not_refused(scene: SimpleNamespace) -> None:
+    value = tree(scene).nodes.new("ShaderNodeValue")
+    tree(scene).links.new(value.outputs[0], principled(scene).inputs["Roughness"])
+    assert stopping(scene) == {}
+    assert any(f.level == "ignored" and f.sentence.endswith("not fitted: Roughness.") for f in check(scene))
+
+
+def test_no_pixel_is_read(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A check must not take longer for a large picture: reading one raises here."""
+    bpy = scene.bpy
+    image = bpy.data.images.new("large", 64, 64, float_buffer=True)
+    node = tree(scene).nodes.new("ShaderNodeTexImage")
+    node.image = image
+    tree(scene).links.new(node.outputs[0], principled(scene).inputs["Base Color"])
+    from blender_addon.export import image_pixels
+
+    monkeypatch.setattr(image_pixels, "to_rec709", lambda *_: pytest.fail("pixels were read"))
+    check(scene)
+
+
+def test_everything_an_export_says_comes_with_the_button(scene: SimpleNamespace) -> None:
+    from blender_addon import preflight
+
+    assert scene.bpy.ops.mfo.check() == {"FINISHED"}
+    assert preflight.is_thorough
+    assert any("Soft Falloff" in f.sentence for f in preflight.by_export())
+    check(scene)
+    preflight.check_now(scene.bpy.context.scene, scene.bpy.context.view_layer)
+    assert preflight.by_export() or not preflight.is_thorough
+
+
+def test_an_unknown_remedy_is_refused(scene: SimpleNamespace) -> None:
+    with pytest.raises(RuntimeError, match="no remedy 'magic'"):
+        scene.bpy.ops.mfo.mend(kind="magic")
+
+
+def test_every_fix_has_a_button() -> None:
+    import re
+
+    from blender_addon.mending import KINDS
+
+    root = Path(__file__).resolve().parents[2] / "blender_addon"
+    named = {name for path in root.rglob("*.py") for name in re.findall(r'Fix\(\s*"(\w+)"', path.read_text("utf-8"))}
+    assert named == set(KINDS)
+
+
+def test_an_export_tells_how_far_it_is(scene: SimpleNamespace) -> None:
+    from blender_addon.export.job import export_job
+
+    shares: list[float] = []
+    bpy = scene.bpy
+    reference = Path(scene.reference)
+    export_job(bpy.context, bpy.data.objects["Väse"], Path(scene.job), reference=reference, fit={}, tell=shares.append)
+    assert len(shares) >= 3
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < shares[-1] < 1.0

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables beyond error and time, from rows whose figures are known."""
+
+from __future__ import annotations
+
+import pytest
+
+from mfo_backend.bench.findings import ablations, calibration, stage_gains, time_parts
+from mfo_backend.bench.paper_figures import PAPER_NAMES, paper_figure
+from mfo_backend.bench.paper_tables import paper_tables
+from mfo_backend.bench.row import Task
+from mfo_backend.bench.table import Table, minutes, number
+
+from .rows import row
+
+SD = {"roughness": {"sd": [0.01], "level": "determined"}, "base_color": {"sd": [0.1, 0.1, 0.1], "level": "weak"}}
+TRUTH = {"roughness": 0.5, "base_color": [0.5, 0.5, 0.5]}
+
+
+def fitted(scene, roughness, colour):
+    found = {"roughness": roughness, "base_color": colour}
+    return row(Task("noise", scene, "balanced"), certainty=SD, truth=TRUTH, recovered=found)
+
+
+def test_coverage_counts_every_component():
+    table = calibration([fitted(0, 0.505, [0.5, 0.65, 0.9]), fitted(1, 0.525, [0.45, 0.5, 0.5])])
+    assert table is not None
+    cells = {line[2]: line[3:7] for line in table.rows}
+    assert cells["determined"] == ("2", "50%", "50%", "100%")  # errors of 0.5 and 2.5 sd
+    assert cells["weak"] == ("6", "67%", "83%", "83%")  # 0, 1.5, 4, 0.5, 0, 0
+    assert calibration([row(Task("noise", 0, "mfo-hdr"))]) is None
+
+
+def test_an_ablation_is_compared_on_common_scenes():
+    rows = [row(Task("noise", scene, "balanced"), flip=0.01, passes=100.0) for scene in range(4)]
+    rows += [row(Task("noise", scene, "balanced-no-scan"), flip=0.03 + scene, passes=50.0) for scene in (2, 3)]
+    table = ablations(rows)
+    assert table is not None
+    assert table.rows == [
+        ("noise", "balanced", "2 of 2", "0.01", "0.01", "100"),
+        ("noise", "balanced-no-scan", "0 of 2", "2.53", "2.93", "50"),
+    ]
+    assert ablations(rows[:4]) is None
+
+
+def test_the_first_fit_costs_its_kernels_more():
+    first = row(Task("base", 0, "fast"), warm_up_seconds=5.0, seconds=2.0, load_seconds=0.5, parts={"solve": 2.0})
+    second = row(Task("base", 1, "fast"), seconds=4.0, load_seconds=0.7, parts={"solve": 1.0, "record": 3.0})
+    table = time_parts([first, second])
+    assert table is not None
+    cells = dict(zip(table.heads, table.rows[0], strict=True))
+    assert (cells["load"], cells["solve"], cells["record"], cells["fit"]) == ("0.6", "1.5", "1.5", "3")
+    assert cells["kernels, once"] == "2.5"
+
+
+def test_stages_have_their_flip():
+    stages = [{"name": "mse-hdr", "flip": 0.2, "passes": 10.0}, {"name": "flip-hdr", "flip": 0.1, "passes": None}]
+    table = stage_gains([row(Task("base", 0, "mfo-hdr"), stages=stages)])
+    assert table is not None
+    assert [line[2:] for line in table.rows] == [("mse-hdr", "0.2", "0.2", "10"), ("flip-hdr", "0.1", "0.1", "–")]
+
+
+def test_paper_cells_are_those_of_its_tables():
+    figure = paper_figure("transparency", "mfo-hdr")
+    assert figure is not None
+    assert (figure.seconds, figure.q_jod, figure.solved) == (14 * 60 + 6, (8.17, 4.89, 9.99), 0.33)
+    four = paper_figure("transparency_4spp", "lpips-pu")
+    assert four is not None
+    assert (four.seconds, four.q_jod, four.solved) == (42, (7.01, 4.06, 9.22), None)
+    assert paper_figure("relighting", "mfo-hdr") is None
+    assert len(PAPER_NAMES) == 8
+    assert all(paper_figure(s, m) for s in ("base", "noise", "parameters", "transparency") for m in PAPER_NAMES)
+
+
+def test_failures_stay_in_shares_and_in_the_time_of_all_runs():
+    rows = [
+        row(Task("base", 0, "mfo-hdr"), seconds=60.0, jod=9.5, flip=0.001),
+        row(Task("base", 1, "mfo-hdr"), seconds=180.0, jod=5.0, flip=0.5),
+        row(Task("base", 2, "mfo-hdr"), seconds=None, jod=None, flip=None, error="ValueError: no"),
+        row(Task("base", 3, "mfo-hdr"), seconds=180.0, jod=9.1, flip=0.03),
+    ]
+    tables = dict(paper_tables(rows))
+    lines = {title.split(":")[0]: next(x for x in t.rows if "mfo-hdr" in x[0]) for title, t in tables.items()}
+    assert lines["Table 1"][1:] == ["03:08", "02:00 (02:20)"]
+    assert lines["Table 2"][1:] == ["9.83 (7.58/9.99)", "7.87 (5.00/9.50)"]
+    assert lines["Table 3"][1:] == ["92%", "JOD 50%, FLIP 25% of 4"]
+
+
+@pytest.mark.parametrize(("value", "text"), [(None, "–"), (float("inf"), "–"), (0.01234, "0.0123"), (1234.4, "1234")])
+def test_numbers_have_three_digits(value, text):
+    assert number(value) == text
+
+
+def test_minutes_are_the_papers():
+    assert [minutes(s) for s in (3.14, 59.7, 846.0, float("nan"))] == ["3.1 s", "01:00", "14:06", "–"]
+
+
+def test_a_table_is_markdown_html_and_csv():
+    table = Table(("a", "b"), [("x <", "1,5")])
+    assert table.markdown() == ["| a | b |", "| --- | --: |", "| x < | 1,5 |"]
+    assert "x &lt;" in table.html()
+    assert table.csv() == 'a,b\nx <,"1,5"\n'

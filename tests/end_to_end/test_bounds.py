@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Limits of a user hold in a real fit, also where the best value lies outside them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from .conftest import Done, Scene, run_mfo
+
+
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_recovered_values_stay_inside(scene: Scene, blend: Callable[..., Done], tmp_path: Path, preset: str) -> None:
+    job = tmp_path / "job"
+    assert blend(scene.exr, "--out", job, "--preset", "fast", "--json").code == 0
+    free = json.loads((job / "result.json").read_text("utf-8"))["recovered"]["roughness"]
+    limits = [0.7, 0.9] if free < 0.6 else [0.1, 0.3]
+    request = json.loads((job / "request.json").read_text("utf-8"))
+    request["fit"] |= {"bounds": {"roughness": limits}, "preset": preset, "parameters": ["roughness", "base_color"]}
+    request["fit"] |= {"max_iterations": 3, "spp": 4}
+    (job / "request.json").write_text(json.dumps(request), "utf-8")
+    done = run_mfo("run", job, "--progress", "none")
+    assert done.code == 0, done.stderr
+    result = json.loads((job / "result.json").read_text("utf-8"))
+    assert limits[0] <= result["recovered"]["roughness"] <= limits[1]
+    assert result["bounds"]["roughness"] == limits

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole fits of glass without the preset `paper`. Oracle: the values the reference was rendered with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.recover_material import recover_material
+from mfo_backend.fit.settings import FitSettings
+from mfo_backend.render.renderer import load_renderer
+from mfo_backend.types.certainty import Level
+from mfo_backend.types.event import Preview, Progress, StageEnd, Started
+from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.status import Status
+from tests.render.scenes import AREA, FLOOR, SKY, write_scene
+
+NAMES = ["base_color", "roughness", "ior", "transmission_weight"]
+TRUTH = {"base_color": (0.9, 0.6, 0.3), "roughness": 0.35, "ior": 1.4, "transmission_weight": 0.9}
+
+
+def load(folder, names=NAMES, sockets=None, **options):
+    sockets = {"Transmission Weight": {"value": 0.5, "linked": False}} if sockets is None else sockets
+    materials = {"target_bsdf": {"name": "Glass", "distribution": "MULTI_GGX", "sockets": sockets}}
+    path = write_scene(folder, SKY + AREA + FLOOR, depth=8, **options)
+    return load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
+
+
+def fit(renderer, reference, *, preset="fast", stop=lambda: False):
+    events = []
+    outcome = recover_material(
+        renderer,
+        Image(reference, Encoding.LINEAR),
+        FitSettings(model="blender_principled", preset=preset, verify_spp=32),
+        listener=events.append,
+        should_stop=stop,
+    )
+    return outcome.result, events
+
+
+def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
+    renderer = load(tmp_path, size=40)
+    x = renderer.table.pack(TRUTH)
+    result, events = fit(renderer, renderer.image(x, seed=5, spp=32), preset="balanced")
+    assert result.status is Status.CONVERGED and not result.notes
+    assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "race", "polish"]
+    assert sum(isinstance(e, Started) for e in events) == 1
+    assert any(isinstance(e, Progress) for e in events) and any(isinstance(e, Preview) for e in events)
+    found = renderer.table.pack(result.recovered)
+    sd = np.concatenate([result.certainty[name].sd for name in renderer.table.names])
+    assert np.all(np.abs(found - x) < 4.0 * sd + 0.005)
+    np.testing.assert_allclose(found[:3], x[:3], atol=0.05)
+    mask = renderer.target_mask()
+    clean, got, again = (renderer.image(v, seed=s, spp=256)[mask] for v, s in ((x, 8), (found, 9), (x, 10)))
+    weight = 1.0 / (clean + 0.1 * clean.mean())
+    error, noise = (float(np.mean(((image - clean) * weight) ** 2)) for image in (got, again))
+    assert error < 1.3 * noise  # of two pictures with 256 samples; the reference's noise is eight times as large
+    assert result.errors["flip"][1] < result.errors["flip"][0]
+
+
+def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
+    sockets = {"Sheen Tint": {"value": [0.3, 0.3, 0.3], "linked": False}}
+    renderer = load(tmp_path, [*NAMES, "sheen_weight", "sheen_tint"], sockets, size=32)
+    reference = renderer.image(renderer.table.pack({**TRUTH, "sheen_tint": (0.9, 0.1, 0.1)}), seed=5, spp=64)
+    result, _ = fit(renderer, reference)
+    assert result.certainty["sheen_tint"].level is Level.NOT_VISIBLE
+    assert result.recovered["sheen_tint"] == pytest.approx((0.3, 0.3, 0.3))
+    assert "sheen_tint" in result.notes[-1]
+    assert result.recovered["sheen_weight"] == pytest.approx(0.0, abs=0.03)
+
+
+def test_the_start_is_kept_where_nothing_is_better(tmp_path):
+    renderer = load(tmp_path, size=24)
+    result, _ = fit(renderer, renderer.image(renderer.start, seed=5, spp=512))
+    assert result.errors["flip"][1] <= result.errors["flip"][0]
+
+
+@pytest.mark.parametrize("calls", [2, 30, 60])
+def test_cancel_returns_the_best_so_far(tmp_path, calls):
+    renderer = load(tmp_path, size=24)
+    left = iter(range(10**6))
+    result, _ = fit(renderer, renderer.image(renderer.start, seed=5, spp=16), stop=lambda: next(left) > calls)
+    assert result.status is Status.CANCELLED
+    assert np.isfinite(renderer.table.pack(result.recovered)).all()
+
+
+def test_an_opaque_surface_with_alpha_needs_no_other_preset(tmp_path):
+    sockets = {"Alpha": {"value": 0.6, "linked": False}}
+    renderer = load(tmp_path, ["base_color", "roughness", "metallic"], sockets, size=40)
+    x = renderer.table.pack({"base_color": (0.7, 0.4, 0.2), "roughness": 0.4, "metallic": 0.7})
+    result, _ = fit(renderer, renderer.image(x, seed=5, spp=64))
+    assert [stage.name for stage in result.stages] == ["scan", "race", "polish"]
+    np.testing.assert_allclose(renderer.table.pack(result.recovered), x, atol=0.06)

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A target that glows, on recorded paths. Oracle: Mitsuba's own integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mfo_backend.render.renderer import load_renderer
+from tests.render.scenes import POINT, write_scene
+
+GLOW = '<emitter type="area"><rgb name="radiance" value="0.3, 0.2, 0.1"/></emitter>'
+
+
+def test_the_targets_own_light_is_part_of_the_constant_picture(tmp_path):
+    materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": {}}}
+    path = write_scene(tmp_path, POINT, shape=GLOW)
+    names = ["base_color", "roughness"]
+    renderer = load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    x = renderer.table.pack({"base_color": (0.7, 0.3, 0.1), "roughness": 0.4})
+    paths = scene.record(x, grid=10, seed=3, near=False)
+    groups = paths.tile_groups(paths.interior)
+    got = scene.evaluator(paths, groups)(x)[:, :, 0]
+    expected = groups.average(renderer.image(x, seed=7, spp=256))
+    error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
+    assert error < 0.02  # `path` picks one of two lights: 1.6 % in a tile of 4096 samples
+    assert got.min() > 0.09  # nothing is darker than the glow

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Least squares on Monte Carlo rows. Oracle: the same problem without noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.solve.noisy_least_squares import CrossProducts, SafeMatrix, cautious_step, cross_equations
+
+TRUE = np.array([0.3, -0.2, 0.5])
+WIDTH = np.ones(3)
+
+
+def samples(rng, jacobian, count, noise, reference_noise=None):
+    """Rows of residual and derivatives at 0 of the linear model J (x - TRUE), each with its own noise."""
+    exact = np.column_stack([-jacobian @ TRUE, jacobian])
+    if reference_noise is not None:
+        exact[:, 0] += reference_noise
+    return [exact + noise * rng.normal(size=exact.shape) for _ in range(count)]
+
+
+def pooled(parts):
+    pool = CrossProducts(*parts[0].shape)
+    for part in parts:
+        pool.add(part)
+    return pool
+
+
+@pytest.fixture
+def problem():
+    rng = np.random.default_rng(0)
+    return rng, rng.normal(size=(3000, 3))
+
+
+def test_products_of_different_samples_have_no_bias(problem):
+    rng, jacobian = problem
+    parts = samples(rng, jacobian, 6, 3.0)
+    exact = samples(rng, jacobian, 1, 0.0)[0]
+    gram = pooled(parts).gram()
+    # each entry is a mean over 3000 rows and 15 pairs of products with a spread of about 9
+    np.testing.assert_allclose(gram, exact.T @ exact / 3000, atol=0.3)
+    plain = np.mean([part.T @ part for part in parts], axis=0) / 3000
+    assert np.diag(plain).min() > 8.0  # what the own noise would add
+
+
+def test_a_faded_sample_counts_less(problem):
+    rng, jacobian = problem
+    old, new = samples(rng, jacobian, 2, 0.0), samples(rng, 2.0 * jacobian, 2, 0.0)
+    pool = pooled(old)
+    pool.fade(1e-6)
+    for part in new:
+        pool.add(part)
+    np.testing.assert_allclose(pool.gram(), new[0].T @ new[0] / 3000, rtol=1e-4)
+    np.testing.assert_allclose(pool.mean, new[0], rtol=1e-4)
+
+
+def test_moving_the_samples_is_taking_them_elsewhere(problem):
+    rng, jacobian = problem
+    parts = samples(rng, jacobian, 3, 0.0)
+    pool = pooled(parts)
+    pool.shifted(TRUE)
+    equations = cross_equations(pool.gram())
+    assert equations.cost == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(equations.gradient, 0.0, atol=1e-9)
+
+
+def test_one_step_solves_a_noisy_linear_problem(problem):
+    rng, jacobian = problem
+    equations = cross_equations(pooled(samples(rng, jacobian, 8, 2.0)).gram())
+    step = cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0)
+    np.testing.assert_allclose(step, TRUE, atol=0.12)  # four times the spread over seeds
+    bounded = cautious_step(equations, np.full(3, -0.1), np.full(3, 0.1), WIDTH, 0.0)
+    assert np.abs(bounded).max() <= 0.1 + 1e-12
+
+
+def test_what_noise_explains_moves_nothing():
+    equations = cross_equations(np.array([[1.0, 0.01], [0.01, 1.0]]))
+    one = np.ones(1)
+    assert cautious_step(equations, -one, one, one, 0.0, noise=np.array([[0.02**2]]))[0] == 0.0
+    assert cautious_step(equations, -one, one, one, 0.0, noise=np.array([[0.001**2]]))[0] == pytest.approx(-0.0099)
+
+
+def test_an_indefinite_matrix_gives_a_bounded_step_downhill():
+    gram = np.array([[1.0, 0.2, 0.1], [0.2, 1.0, 0.3], [0.1, 0.3, -0.5]])
+    step = cautious_step(cross_equations(gram), -np.ones(2), np.ones(2), np.ones(2), 0.0)
+    assert np.isfinite(step).all() and step @ gram[0, 1:] < 0.0
+
+
+def test_the_covariance_covers_the_scatter_of_solutions(problem):
+    rng, jacobian = problem
+    found, stated = [], []
+    for _ in range(60):
+        pool = pooled(samples(rng, jacobian, 4, 0.5, 2.0 * rng.normal(size=3000)))
+        equations, noise = cross_equations(pool.gram()), pool.gradient_noise(3)
+        step = cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0)
+        pool.shifted(step)
+        found.append(step)
+        stated.append(np.diag(SafeMatrix(equations, WIDTH).covariance(pool.gradient_noise(3))))
+    ratio = np.mean(stated, axis=0) / np.var(found, axis=0)
+    assert np.all((ratio > 0.5) & (ratio < 2.0))  # the variance of 60 solutions is known to a fifth
+
+
+def test_a_column_without_effect_is_as_unsure_as_its_range():
+    gram = np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    matrix = SafeMatrix(cross_equations(gram), np.array([1.0, 2.0]))
+    covariance = matrix.covariance(np.diag([1e-4, 0.0]))
+    np.testing.assert_allclose(np.diag(covariance), [1e-4, 4.0])
