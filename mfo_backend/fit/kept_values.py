@@ -50,10 +50,10 @@ def keep_values(fit: RecordedFit, problem: Problem, found: Vector, *, weighted: 
     if moved:
         allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / _independent(problem)
         simpler = _solve_holding(fit, problem, found, off)
-        simpler_cost, *rest = judged(simpler)
+        simpler_cost, surer, narrower = judged(simpler)
         if simpler_cost <= allowed + 1e-12:
             found, cost = simpler, simpler_cost
-            certainty, spread = rest
+            certainty, spread = surer, narrower
         else:
             off = [name for name in off if name not in moved]
 

@@ -74,4 +74,4 @@ class _MaskedBlur:
     def _gaussian(image: Pixels) -> Pixels:
         from scipy.ndimage import gaussian_filter
 
-        return gaussian_filter(image, (BLUR, BLUR, 0.0), mode="constant", truncate=3.0)
+        return np.asarray(gaussian_filter(image, (BLUR, BLUR, 0.0), mode="constant", truncate=3.0), np.float32)

@@ -30,7 +30,6 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 
 # Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
 LEAST_NOISE = 0.002
-WEIGHT_ROUNDS = 2  # the first weights come from a model that is still off
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
@@ -274,12 +273,14 @@ class RecordedFit:
         if weigh is None:
             problem = self.problem(groups, make)
             return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
-        for _ in range(WEIGHT_ROUNDS):
-            self.noise = self._noise(start, groups)
+
+        def solve(x: Vector) -> tuple[Solution, Problem]:
+            self.noise = self._noise(x, groups)
             problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
-            solution = self._solve(self.course.watch(stage, problem.equations), start, 12)
-            start = solution.x
-        return solution, problem
+            return self._solve(self.course.watch(stage, problem.equations), x, 12), problem
+
+        # the first weights come from a model that is still off
+        return solve(solve(start)[0].x)
 
     def _noise(self, x: Vector, groups: LaneGroups) -> TileNoise:
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)[:, :, 0]
