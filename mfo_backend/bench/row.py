@@ -55,6 +55,8 @@ class Row:
         Of the reference and the picture of the recovered values: less `floor_flip` it is the error above the noise.
     start_flip, floor_flip, floor_relative_rmse
         The same for the start, and for the reference itself: its noise.
+    gap_flip
+        FLIP of our own picture of the true values, where Cycles made the truth.
     relit_relative_rmse, relit_flips
         The same under lights that the fit did not see, the first their mean.
     stages
@@ -92,6 +94,7 @@ class Row:
     start_flip: float | None = None
     floor_flip: float | None = None
     floor_relative_rmse: float | None = None
+    gap_flip: float | None = None
     stages: list[dict[str, Any]] = field(default_factory=list)
     parameter_errors: dict[str, float] = field(default_factory=dict)
     truth: dict[str, Value] = field(default_factory=dict)
