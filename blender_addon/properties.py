@@ -61,6 +61,7 @@ PARAMETER_ITEMS = tuple((name, label, text, 1 << i) for i, (name, label, text) i
 REDUCED = {"base_color", "roughness", "metallic", "specular"}
 PRESET_ITEMS = (
     ("balanced", "Balanced", "Least squares on recorded light paths, then on perceptual differences; no start needed"),
+    ("best", "Best", "As Balanced, then FLIP itself is lowered from the best few solutions; a second or two longer"),
     ("fast", "Fast", "Least squares on recorded light paths only"),
     ("paper", "Paper", "Adam on the mean squared error until it stops improving, then a new optimisation on FLIP"),
 )

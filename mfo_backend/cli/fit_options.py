@@ -15,7 +15,7 @@ _OPTIONS = ("preset", "model", "range", "seed", "max_iterations", "spp", "learni
 def add_fit_options(parser: argparse.ArgumentParser) -> None:
     """Add the options; none has a default here, so that what is not given stays with `FitSettings`."""
     group = parser.add_argument_group("how to fit")
-    group.add_argument("--preset", help="fast, balanced or paper (default: balanced)")
+    group.add_argument("--preset", help="fast, balanced, best or paper (default: balanced)")
     group.add_argument("--model", help="blender_principled or mitsuba_principled (default: what the scene holds)")
     group.add_argument("--parameters", metavar="LIST", help="all, reduced, or names with commas between (default: all)")
     group.add_argument(

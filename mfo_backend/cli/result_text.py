@@ -19,6 +19,7 @@ def result_text(result: Mapping[str, Any]) -> str:
         rows.append(("model gap", "", f"{100 * gap['relative']:.2g} %", f"at most {100 * gap['at_most']:.2g} %"))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines += [weak["sentence"] for weak in result.get("weak_combinations", [])]
     return "\n".join(lines)
 
 

@@ -13,12 +13,26 @@ from numpy.typing import NDArray
 
 from ..render.renderer import Renderer
 from ..solve.bounded_least_squares import NormalEquations
-from ..types.event import Listener, Progress, StageEnd
+from ..types.event import Listener, Preview, Progress, StageEnd
+from ..types.image import Pixels
 from ..types.result import CurvePoint, StageReport
 from ..types.status import Status
 
 Vector = NDArray[np.float64]
 _QUIET_SECONDS = 0.05  # between two progress events; an iteration takes about a millisecond
+_PREVIEW_SECONDS = 1.0  # no more than one preview in this time
+
+# What the stages take of the time of a fit, and how many evaluations they need: rough means for the time left
+_EXPECTED = {
+    "scan": (2.0, 90),
+    "start": (3.0, 80),
+    "refine": (3.0, 20),
+    "display": (1.0, 10),
+    "itp": (1.0, 10),
+    "pu21": (1.0, 10),
+    "flip": (4.0, 20),
+}
+_VERIFICATION = 1.5  # the pictures after the last stage, in the same unit
 
 
 @dataclass
@@ -31,6 +45,7 @@ class Stage:
     vector: Vector | None = None
     loss_start: float = np.nan
     loss_best: float = np.inf
+    best: Vector | None = None  # of the lowest loss, until it has been shown
 
 
 class Course:
@@ -48,7 +63,8 @@ class Course:
         self.should_stop = should_stop
         self.reports: list[StageReport] = []
         self._renderer, self._listener, self._began = renderer, listener, began
-        self._told = -np.inf
+        self._told = self._shown = -np.inf
+        self.picture: Callable[[Vector], Pixels] | None = None  # of a vector, for previews
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Stage]:
@@ -81,12 +97,34 @@ class Course:
     ) -> Callable[[Vector], NormalEquations]:
         """`residuals`, with every evaluation noted in `stage`."""
 
+        noted = self.values(stage)
+
         def watched(x: Vector) -> NormalEquations:
             equations = residuals(x)
-            self.note(stage, float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf)
+            noted(x, float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf)
             return equations
 
         return watched
+
+    def values(self, stage: Stage) -> Callable[[Vector, float], None]:
+        """A function that notes the loss of every vector it is told in `stage`."""
+
+        def noted(x: Vector, loss: float) -> None:
+            if loss < stage.loss_best:
+                stage.best = x.copy()
+            self.note(stage, loss)
+            self._show(stage, time.monotonic())
+
+        return noted
+
+    def _show(self, stage: Stage, now: float) -> None:
+        """Tell a preview of the stage's best, where that is new."""
+        if self._shown == -np.inf:
+            self._shown = self._began
+        if self.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
+            return
+        self._listener(Preview(self.picture(stage.best)))
+        stage.best, self._shown = None, time.monotonic()
 
     def note(self, stage: Stage, loss: float) -> None:
         """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard."""
@@ -102,14 +140,16 @@ class Course:
 
     def _tell(self, stage: Stage, loss: float, seconds: float) -> None:
         index = self.names.index(stage.name)
-        # the stages have no known length: half of the running one is a fair guess
-        fraction = (index + 0.5) / len(self.names)
+        shares = [_EXPECTED.get(name, (1.0, 10))[0] for name in self.names]
+        count = len(stage.curve)
+        within = count / (count + _EXPECTED.get(stage.name, (1.0, 10))[1])
+        fraction = (sum(shares[:index]) + shares[index] * within) / (sum(shares) + _VERIFICATION)
         self._listener(
             Progress(
                 stage=stage.name,
                 stage_index=index,
                 stage_count=len(self.names),
-                iteration=len(stage.curve),
+                iteration=count,
                 loss=loss,
                 best=stage.loss_best,
                 fraction=fraction,

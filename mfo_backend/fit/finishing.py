@@ -22,7 +22,7 @@ def finishing_residuals(
 ) -> dict[str, MakeResidual]:
     """How to make the residuals of each stage, by its name, in order.
 
-    Those are the settings' losses; without them the preset ``balanced`` has two perceptual ones and ``fast`` has none.
+    Those are the settings' losses; without them `fast` has none and the other presets have two perceptual ones.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def finishing_residuals(
     if settings.losses is not None:
         names = settings.stage_names(encoding)
         return {name: _residual(name, light, mask, view) for name in names}
-    if settings.preset != "balanced":
+    if settings.preset == "fast":
         return {}
     if encoding is Encoding.SRGB or settings.range == "ldr":
         return {"display": _residual("mse-ldr", light, mask, view), "itp": _residual("itp-ldr", light, mask, view)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The presets `fast` and `balanced`: a global start and bounded least squares on recorded light paths."""
+"""The presets `fast`, `balanced` and `best`: a global start and bounded least squares on recorded light paths."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..metrics.baked_view import HALF_LEVEL, BakedView
 from ..metrics.pixel_check import check_finite
 from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
-from ..types.certainty import Certainty, Level
 from ..types.event import Listener, Preview, Started
 from ..types.image import Encoding, Image, Pixels
 from ..types.result import FitResult
@@ -22,17 +20,20 @@ from .course import Course
 from .displayed_residual import DisplayedResidual
 from .finishing import finishing_residuals
 from .fit_material import FitOutcome
-from .recorded_stages import MakeResidual, Problem, RecordedFit, RecordedPlan, Vector
-from .residuals import CensoredResidual, RelativeResidual, log_residual, residual_rows
+from .kept_values import box_holding, keep_values
+from .perceptual_stages import perceptual_ends
+from .picture_judge import NOISY, PictureJudge
+from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan
+from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .stages import Candidate
-from .uncertainty import certainties, standard_deviations
-from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
+from .verification import VERIFY_STREAM, check_reference, picture_errors
+from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
 CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
-# Values the picture does not determine go back to the user's if that costs no more than this share of the residual
-KEEP_TOLERANCE = 1.01
+# Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
+AT_NOISE = 1.5
 
 
 def fit_recorded(
@@ -48,8 +49,9 @@ def fit_recorded(
     """Recover the renderer's parameters from a picture of the same scene, with no use of their start but as one guess.
 
     Parameters and errors are those of `fit_material`. The result is the best of the scene's own values and the end of
-    every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the log difference
-    of tiles for `fast`, by true FLIP for `balanced`, by the last of the losses where the settings name them.
+    every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the least-squares
+    residual of tiles for `fast` and where the picture's noise is reached, by the last of the losses where the settings
+    name them, else by FLIP (`fit.picture_judge`).
 
     Raises
     ------
@@ -70,56 +72,87 @@ def fit_recorded(
         if reference.encoding is Encoding.SRGB
         else DisplayView.for_scene(reference.pixels, mask)
     )
+    named = None if settings.losses is None else settings.stage_names(reference.encoding)
+    measure = named[-1] if named else "flip-ldr" if ldr else "flip-hdr"
     light = linear_pixels(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
-    names = (*STAGES, *finishing)
+    names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
-    clipped = clipped_pixels(reference, view)
-    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped)
+    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped_pixels(reference, view))
 
-    compressed = _censored(log_residual, reference, view)
-    found = fit.start_from_nothing(compressed).x
-    candidates: list[Vector] = [renderer.start]
-    certainty: dict[str, Certainty] = {}
+    basins = fit.start_from_nothing(_censored(log_residual, reference, view))
+    ends = [End("start", renderer.start)]
+    kept = None
     notes = list(scene.needs.notes)
-    if not should_stop():
-        make = RelativeResidual if scene.needs.sampled else log_residual
-        solution, last = fit.refine(found, _censored(make, reference, view))
-        found, certainty = _keep_unseen(fit, last, solution.x, notes)
-        candidates.append(found)
-        for name, finish in finishing.items():
-            # named losses are a ladder, each from the one before; the preset's own are alternatives
-            begin = found if settings.losses is None else candidates[-1]
-            candidates.append(fit.polish(name, last.groups, finish, begin).x)
+    counts: Callable[[Pixels], float] | None = None  # what the result is chosen by
+    if should_stop():
+        ends.append(End("start", basins[0].x))
     else:
-        candidates.append(found)
+        make = RelativeResidual if scene.needs.sampled else log_residual
+        solution, last = fit.refine(basins[0].x, _censored(make, reference, view), _weighted(reference, view))
+        weighted = scene.needs.sampled and not isinstance(view, BakedView)
+        kept = keep_values(fit, last, solution.x, weighted=weighted)
+        fit.box = box_holding(fit.table, renderer.start, kept.held)
+        ends.append(End("refine", kept.x))
+        notes += kept.notes
+        linear = reference.encoding is Encoding.LINEAR
+        alternatives = finishing and settings.losses is None
+        at_noise = alternatives and linear and fit.misfit(kept.x) < AT_NOISE
+        noise = fit.noise.level if fit.noise else 0.0
+        if at_noise:
+            notes.append(
+                f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
+                "perceptual stages would fit that noise and were left out."
+            )
+        elif finishing:
+            blurred = linear and settings.losses is None and (scene.needs.sampled or noise > NOISY)
+            judge = PictureJudge(measure, reference, light, mask, settings, view, blurred=blurred)
+            counts = judge.value
+            others = [basin.x for basin in basins[1:]] if settings.preset == "best" else []
+            ends += perceptual_ends(fit, last, kept.x, others, finishing, judge, settings, notes)
+        if fit.fireflies:
+            notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
+        if fit.recordings > 1:
+            notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
+        if counts is None:
+            counts = _misfit(fit, last, _censored(log_residual, reference, view))
 
     seed = settings.seed ^ VERIFY_STREAM
     spp = min(CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
-    pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in candidates]
+    pictures = [Candidate(end.x, renderer.image(end.x, seed=seed, spp=spp)) for end in ends]
     listener(Preview(pictures[-1].image))
-    best = int(np.argmin(_judge(pictures, fit, reference, mask, settings, view, bool(finishing), ldr, compressed)))
+    counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
+    best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     message = status.sentence
     if best == 0:
         message += " Nothing was better than the start, so the start was kept."
+    elif best == 1 and len(ends) > 2:
+        notes.append("No perceptual stage was better in a picture of its own, so the end of 'refine' was kept.")
     result = FitResult(
         status=status,
         message=message,
         model=renderer.model,
         initial=renderer.table.unpack(renderer.start),
-        recovered=renderer.table.unpack(candidates[best]),
+        recovered=renderer.table.unpack(ends[best].x),
         bounds={p.name: (p.lower, p.upper) for p in renderer.table},
         stages=tuple(course.reports),
         errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
         seconds=time.monotonic() - began,
         passes=renderer.passes,
-        certainty=certainty,
+        certainty=kept.certainty if kept else {},
         notes=tuple(notes),
+        weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
     return FitOutcome(result, pictures[0].image, pictures[best].image)
+
+
+def best_of(errors: Sequence[float]) -> int:
+    """The number of the smallest error; one that is not finite never wins, and without any the start stays."""
+    values = [error if np.isfinite(error) else np.inf for error in errors]
+    return int(np.argmin(values))
 
 
 def linear_pixels(reference: Image, view: View) -> Pixels:
@@ -149,52 +182,17 @@ def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:
     return lambda target: CensoredResidual(make(target), target, limit)
 
 
-def _keep_unseen(
-    fit: RecordedFit, problem: Problem, found: Vector, notes: list[str]
-) -> tuple[Vector, dict[str, Certainty]]:
-    """Give values that the picture does not determine back to the user, if the rest can make up for it."""
-    table, user = fit.table, fit.scene.renderer.start
-
-    def judge(x: Vector) -> tuple[float, dict[str, Certainty]]:
-        image = problem.evaluate(x)
-        rows = residual_rows(image, problem.residual)
-        relative = residual_rows(image, RelativeResidual(problem.groups.average(fit.reference)))
-        sd = standard_deviations(relative[:, :, 1:], relative[:, :, 0], table)
-        return float(np.mean(rows[:, :, 0] ** 2)), certainties(sd, table)
-
-    cost, certainty = judge(found)
-    unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
-    if not unseen or len(unseen) == len(table):
-        return found, certainty
-    kept = found.copy()
-    lower, upper = table.lower, table.upper
-    for name in unseen:
-        part = table.slice_of(name)
-        kept[part] = lower[part] = upper[part] = user[part]
-    kept = fit.solve_within(problem, kept, lower, upper)
-    if judge(kept)[0] > KEEP_TOLERANCE * cost + 1e-8:
-        return found, certainty
-    notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
-    return kept, certainty
+def _weighted(reference: Image, view: View) -> MakeWeighted | None:
+    """Residuals in standard deviations of the noise; None for a view that is no formula."""
+    if isinstance(view, BakedView):
+        return None
+    return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), reference, view)(target)
 
 
-def _judge(
-    pictures: Sequence[Candidate],
-    fit: RecordedFit,
-    reference: Image,
-    mask: NDArray[np.bool_],
-    settings: FitSettings,
-    view: View,
-    perceptual: bool,
-    ldr: bool,
-    compressed: MakeResidual,
-) -> list[float]:
-    """An error for each picture."""
-    if perceptual:
-        names = None if settings.losses is None else settings.stage_names(reference.encoding)
-        name = names[-1] if names else "flip-ldr" if ldr else "flip-hdr"
-        loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
-        return [loss.value(picture.image) for picture in pictures]
-    groups = fit.paths.tile_groups()
-    residual = compressed(groups.average(fit.reference))
-    return [float(np.sqrt(np.mean(residual(groups.average(p.image))[0] ** 2))) for p in pictures]
+def _misfit(fit: RecordedFit, problem: Problem, compressed: MakeResidual) -> Callable[[Pixels], float]:
+    """The least-squares measure of a path-traced picture: of the last problem where it knows the noise, else in log."""
+    residual, groups = problem.residual, problem.groups
+    if not fit.scene.needs.sampled:
+        groups = fit.paths.tile_groups()
+        residual = compressed(groups.average(fit.reference))
+    return lambda image: float(np.sqrt(np.mean(residual(groups.average(image))[0] ** 2)))

@@ -57,7 +57,11 @@ def scan(
                 part = table.slice_of(name)
                 start[part] = lower[part] = upper[part] = value
             limits = SolveLimits(evaluations=evaluations, cost_change=1e-3, damping=1e-3)
-            solution = solve_bounded(residuals, start, lower, upper, limits)
+            try:
+                solution = solve_bounded(residuals, start, lower, upper, limits)
+            except ValueError:  # no finite numbers there: the node comes last
+                nodes.append(ScanNode(values, metal, start, np.inf))
+                continue
             nodes.append(ScanNode(values, metal, solution.x, solution.equations.cost))
     return sorted(nodes, key=lambda node: node.cost)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The least-squares stages of the presets `fast` and `balanced`, from a scan to the last refinement."""
+"""The stages of the presets `fast`, `balanced` and `best`, from a scan to FLIP."""
 
 from __future__ import annotations
 
@@ -12,14 +12,29 @@ from numpy.typing import NDArray
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
+from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
-from .course import Course
+from .course import Course, Stage
+from .fireflies import without_fireflies
+from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
-from .residuals import ImageAndJacobian, OneSidedResidual, Residual, normal_equations
+from .picture_judge import PictureJudge
+from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual, normal_equations
+from .tile_noise import TileNoise, tile_noise
 
 Vector = NDArray[np.float64]
 MakeResidual = Callable[[NDArray[np.float32]], Residual]
+# a residual from a reference and one over the deviation of its noise
+MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
+
+# Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
+LEAST_NOISE = 0.002
+MOST_RECORDINGS = 3  # at the solution, until it holds still
+FINER = 2  # rays along each axis at the solution, relative to those a start is found with
+FINEST = 60
+MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
+MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
 
 
 @dataclass(frozen=True)
@@ -42,6 +57,8 @@ class RecordedPlan:
         After as many only starts within `keep_factor` of the best cost go on.
     solved_rms
         Root mean square of the log residual at which no other start is tried: half a per cent cannot be seen.
+    basins, basin_factor
+        Solutions the preset `best` keeps alive to the end, and how much more than the best one they may cost.
     """
 
     scan: bool = True
@@ -54,6 +71,8 @@ class RecordedPlan:
     trial_evaluations: int = 10
     keep_factor: float = 10.0
     solved_rms: float = 5e-3
+    basins: int = 3
+    basin_factor: float = 1.5
 
 
 @dataclass(frozen=True)
@@ -68,6 +87,14 @@ class Problem:
     def equations(self) -> Callable[[Vector], NormalEquations]:
         """The normal equations as a function of the vector."""
         return normal_equations(self.evaluate, self.residual)
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a stage ended."""
+
+    stage: str
+    x: Vector
 
 
 class RecordedFit:
@@ -89,17 +116,41 @@ class RecordedFit:
         self.scene, self.reference, self.mask = scene, reference, mask
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
+        self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
+        self.recordings = 0
+        # light with extent is noisy: what a start is found on and noise is measured on; elsewhere a highlight may well
+        # be a pixel wide
+        self.calm, self.fireflies = without_fireflies(reference, mask) if scene.needs.sampled else (reference, 0)
+        self.box = self.table.lower, self.table.upper  # of the perceptual stages, which hold what the user keeps
+        course.picture = self.picture
 
-    def problem(self, groups: LaneGroups, make: MakeResidual) -> Problem:
-        """The residuals of these groups of the present recording."""
-        residual = make(groups.average(self.reference))
+    @property
+    def complete(self) -> bool:
+        """Whether the recording holds the pixels that see the target and not only some of its tiles."""
+        return len(self.paths.pixel) > 0.9 * int(self.mask.sum())  # the mask has other rays at the silhouette
+
+    def picture(self, x: Vector) -> Pixels:
+        """The recorded picture of a vector, linear; the reference where nothing is recorded."""
+        return self._shown(self.scene.evaluator(self.paths, self.paths.pixel_groups())(x))
+
+    def _shown(self, table: NDArray[np.float32]) -> Pixels:
+        image = self.reference.astype(np.float32).copy()
+        image.reshape(-1, 3)[self.paths.pixel] = table[:, :, 0]
+        return image
+
+    def problem(self, groups: LaneGroups, make: MakeResidual, *, calm: bool = False) -> Problem:
+        """The residuals of these groups of the present recording, to the reference or to it without fireflies."""
+        residual = make(groups.average(self.calm if calm else self.reference))
         if self.clipped is not None:
             residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
         return Problem(self.scene.evaluator(self.paths, groups), residual, groups)
 
-    def start_from_nothing(self, make: MakeResidual) -> Solution:
-        """Stages `scan` and `start`: the best solution from the scan's nodes, the scene's material and a random one."""
+    def start_from_nothing(self, make: MakeResidual) -> list[Solution]:
+        """Stages `scan` and `start`: solutions from the scan's nodes, the scene's material and a random one.
+
+        The best one comes first; the others are different and cost little more.
+        """
         plan, renderer = self.plan, self.scene.renderer
         sampled = self.scene.needs.sampled
         with self.course.stage("scan") as stage:
@@ -107,23 +158,25 @@ class RecordedFit:
             grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
             groups = all_groups(self.paths, tiles=sampled)
-            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make)
+            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make, calm=True)
             nodes = []
             if plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
                 stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
-            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make)
+            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make, calm=True)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             metals = [node for node in nodes if node.metal]
             starts += [node.x for node in metals[:2] if not any(node.x is x for x in starts)]
             starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
-            best = self._race(watched, starts)
-            stage.vector = best.x
-        return best
+            basins = self._race(watched, starts)
+            if not np.isfinite(basins[0].equations.cost):
+                raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
+            stage.vector = basins[0].x
+        return basins
 
-    def _race(self, residuals: Callable[[Vector], NormalEquations], starts: list[Vector]) -> Solution:
+    def _race(self, residuals: Callable[[Vector], NormalEquations], starts: list[Vector]) -> list[Solution]:
         """Bounded fits from all starts; those that fall behind are given up, and all others once one has solved it."""
         plan, found = self.plan, []
         for start in starts:
@@ -133,50 +186,155 @@ class RecordedFit:
                 break
         found.sort(key=lambda solution: solution.equations.cost)
         leader = found[0]
-        for candidate in list(found):
+        for place, candidate in enumerate(list(found)):
             behind = candidate.equations.cost > plan.keep_factor * leader.equations.cost
             if candidate.converged or behind or self._solved(leader) or self.course.should_stop():
                 continue
             longer = self._solve(residuals, candidate.x, 40)
+            found[place] = longer
             if longer.equations.cost < leader.equations.cost:
                 leader = longer
-        return leader
+        others = [] if self._solved(leader) else sorted(found, key=lambda solution: solution.equations.cost)
+        return self._different([leader, *others])
+
+    def _different(self, solutions: list[Solution]) -> list[Solution]:
+        """The best solutions that are further apart than a tenth of the box in some value and cost little more."""
+        chosen = solutions[:1]
+        width = self.table.upper - self.table.lower
+        for solution in solutions[1:]:
+            apart = all(np.max(np.abs(solution.x - other.x) / width) > 0.1 for other in chosen)
+            if apart and solution.equations.cost <= self.plan.basin_factor * chosen[0].equations.cost:
+                chosen.append(solution)
+        return chosen[: self.plan.basins]
 
     def _solved(self, solution: Solution) -> bool:
         return np.sqrt(2.0 * solution.equations.cost) < self.plan.solved_rms
 
-    def _solve(self, residuals: Callable[[Vector], NormalEquations], start: Vector, evaluations: int) -> Solution:
+    def _solve(
+        self,
+        residuals: Callable[[Vector], NormalEquations],
+        start: Vector,
+        evaluations: int,
+        box: tuple[Vector, Vector] | None = None,
+    ) -> Solution:
         # a cost of 1e-11 is a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
         limits = SolveLimits(evaluations=evaluations, cost_change=1e-5, cost_floor=1e-11)
-        return solve_bounded(residuals, start, self.table.lower, self.table.upper, limits, self.course.should_stop)
+        lower, upper = box or (self.table.lower, self.table.upper)
+        try:
+            return solve_bounded(residuals, start, lower, upper, limits, self.course.should_stop)
+        except ValueError:  # a start without finite numbers: every other one is better
+            nothing = np.zeros(len(start))
+            return Solution(start, NormalEquations(np.inf, nothing, np.diag(nothing)), (np.inf,), True)
 
     def solve_within(self, problem: Problem, start: Vector, lower: Vector, upper: Vector) -> Vector:
         """A few steps with other bounds."""
         limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
-    def refine(self, start: Vector, make: MakeResidual) -> tuple[Solution, Problem]:
-        """Stage `refine`: all residuals, on a new and finer recording near the solution where the light is sampled."""
+    def refine(self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> tuple[Solution, Problem]:
+        """Stage `refine`: all residuals, on a new and finer recording near the solution where the light is sampled.
+
+        There, residuals count in standard deviations of the reference's noise by `weigh` if given.
+        """
         with self.course.stage("refine") as stage:
-            sampled = self.scene.needs.sampled
-            if sampled:
-                self.paths = self.scene.record(start, grid=self.plan.grid_last, seed=self.seed + 1, near=True)
-            groups = all_groups(self.paths, tiles=sampled)
-            if not sampled:
-                groups = fewer_groups(groups, self.reference, self.plan.refine_lanes)
-            problem = self.problem(groups, make)
-            solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
-            stage.vector = solution.x
+            if not self.scene.needs.sampled:
+                grid = np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
+                grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
+                if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
+                    self._record(start, grid, 1)
+                groups = fewer_groups(all_groups(self.paths, tiles=False), self.reference, self.plan.refine_lanes)
+                problem = self.problem(groups, make)
+                solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
+                stage.vector = solution.x
+                return solution, problem
+            solution = problem = None
+            for number in range(1, MOST_RECORDINGS + 1):
+                problem = None  # and with it the recording before
+                self._record(start, self.plan.grid_last, number)
+                solution, problem = self._refine_sampled(stage, start, make, weigh)
+                stage.vector = solution.x
+                if self._moved(problem, start, solution.x) < MOVED or self.course.should_stop():
+                    break
+                start = solution.x
+        assert solution is not None
+        assert problem is not None
         return solution, problem
 
-    def polish(self, name: str, groups: LaneGroups, make: MakeResidual, start: Vector) -> Solution:
-        """A stage with another residual on the same recording."""
+    def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
+        """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
+        del self.paths
+        self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
+        self.recordings = number
+
+    def _refine_sampled(
+        self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
+    ) -> tuple[Solution, Problem]:
+        groups = all_groups(self.paths, tiles=True)
+        if weigh is None:
+            problem = self.problem(groups, make)
+            return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
+
+        def solve(x: Vector) -> tuple[Solution, Problem]:
+            self.noise = self._noise(x, groups)
+            problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
+            return self._solve(self.course.watch(stage, problem.equations), x, 12), problem
+
+        # the first weights come from a model that is still off
+        return solve(solve(start)[0].x)
+
+    def _noise(self, x: Vector, groups: LaneGroups) -> TileNoise:
+        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)[:, :, 0]
+        return tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior)
+
+    def misfit(self, x: Vector) -> float:
+        """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
+        groups = all_groups(self.paths, tiles=True)
+        self.noise = self._noise(x, groups)
+        problem = self.problem(groups, self._weighing(self.noise, groups))
+        values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
+        # as far as a few outliers go, it is their number that counts and not their size
+        return float(np.sqrt(np.mean(np.minimum(np.abs(values), WeightedResidual.LIMIT) ** 2)))
+
+    def _weighing(self, noise: TileNoise, groups: LaneGroups, weigh: MakeWeighted = WeightedResidual) -> MakeResidual:
+        least = LEAST_NOISE * float(groups.average(self.reference).mean())
+        weight = (1.0 / np.hypot(noise.deviation, max(least, 1e-12))).astype(np.float32)
+        return lambda target: weigh(target, weight)
+
+    def _moved(self, problem: Problem, before: Vector, after: Vector) -> float:
+        """Root mean square change of the groups relative to their radiance and a tenth of its mean."""
+        old, new = (problem.evaluate(x)[:, :, 0] for x in (before, after))
+        return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + 0.1 * np.abs(new).mean() + 1e-12)))))
+
+    def polish(self, name: str, groups: LaneGroups, make: MakeResidual, starts: list[Vector]) -> list[Vector] | None:
+        """A stage with another residual on the same recording, from each start; None without finite numbers."""
         with self.course.stage(name) as stage:
             residual = make(groups.average(self.reference))
             problem = Problem(self.scene.evaluator(self.paths, groups), residual, groups)
-            solution = self._solve(self.course.watch(stage, problem.equations), start, 25)
-            stage.vector = solution.x
-        return solution
+            watched = self.course.watch(stage, problem.equations)
+            found = [self._solve(watched, start, 25, self.box) for start in starts]
+            stage.vector = min(found, key=lambda solution: solution.equations.cost).x
+        finite = [solution.x for solution in found if np.isfinite(solution.equations.cost)]
+        return finite or None
+
+    def lower_flip(self, judge: PictureJudge, starts: list[Vector]) -> list[Vector]:
+        """Stage `flip`: the mean error of the recorded picture itself, from each start."""
+        evaluate = self.scene.evaluator(self.paths, self.paths.pixel_groups())
+
+        def picture(x: Vector) -> tuple[Pixels, Callable[[Pixels], Vector]]:
+            table = evaluate(x)
+
+            def pullback(gradient: Pixels) -> Vector:
+                rows = gradient.reshape(-1, 3)[self.paths.pixel].astype(np.float64)
+                return np.einsum("gck,gc->k", table[:, :, 1:], rows, optimize=True)
+
+            return self._shown(table), pullback
+
+        with self.course.stage("flip") as stage:
+            told = self.course.values(stage)
+            stop = self.course.should_stop
+            ends = [minimise_flip(judge, picture, x, *self.box, on_value=told, should_stop=stop) for x in starts]
+            stage.vector = min(ends, key=lambda end: end[1])[0]
+        return [x for x, _ in ends]
 
 
 def _random_start(lower: Vector, upper: Vector, seed: int) -> Vector:

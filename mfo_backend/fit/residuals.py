@@ -68,6 +68,29 @@ class RelativeResidual:
         return (image - self._reference) * weight, weight
 
 
+class WeightedResidual:
+    """(I - R) x `weight`, both (g, 3), growing only like the root of a logarithm beyond `LIMIT` standard deviations.
+
+    A weight is one over the deviation of the noise. The influence of a residual falls beyond the limit, so that one
+    firefly in the reference outweighs neither its neighbours nor what is known of the noise.
+    """
+
+    LIMIT = 4.0
+
+    def __init__(self, reference: Rows, weight: Rows) -> None:
+        self._reference = reference
+        self._weight = weight.astype(np.float32)
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values = (image - self._reference) * self._weight
+        size = np.maximum(np.abs(values), self.LIMIT)
+        bounded = self.LIMIT * np.sqrt(1.0 + 2.0 * np.log(size / self.LIMIT))
+        far = size > self.LIMIT
+        slope = np.where(far, self._weight * (self.LIMIT**2 / (size * bounded)), self._weight)
+        return np.where(far, np.copysign(bounded, values), values), slope
+
+
 class CensoredResidual:
     """Another residual that does not look above `limit` where the reference (g, 3) is clipped there.
 

@@ -14,7 +14,7 @@ from ..types.image import Encoding
 from ..types.parameter_bounds import checked_bounds
 
 _CHOICES: dict[str, tuple[str, ...]] = {
-    "preset": ("paper", "fast", "balanced"),
+    "preset": ("paper", "fast", "balanced", "best"),
     "range": ("auto", "hdr", "ldr"),
     "schedule": ("decay", "constant"),
     "region": ("target", "image"),
@@ -31,8 +31,8 @@ class FitSettings:
     ----------
     preset
         ``"paper"``: Adam on `prb` through the stages below; ``"fast"``: least squares on recorded light paths;
-        ``"balanced"``: perceptual least squares from there. They use only `losses`, `range`, `seed`, `verify_spp` and
-        `region`.
+        ``"balanced"``: perceptual least squares from there; ``"best"``: then FLIP itself, from several solutions. They
+        use only `losses`, `range`, `seed`, `verify_spp` and `region`.
     model, parameters
         Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
         holds Blender's socket values, else Mitsuba's.

@@ -24,20 +24,27 @@ INFLATION = 1.2  # own noise in the Jacobian is not counted
 PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite
 
 
-def standard_deviations(jacobian: Vector, residual: Vector, table: ParameterTable) -> Vector:
-    """Standard deviations (k,) from weighted derivatives (g, 3, k) and relative residuals (g, 3)."""
+def covariance(jacobian: Vector, residual: Vector, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:
+    """Covariance (k, k) in widths of the box from weighted derivatives (g, 3, k) and weighted residuals (g, 3).
+
+    `model_error` is the least error of a residual; the default is for relative ones.
+    """
     g, _, k = jacobian.shape
-    width = table.upper - table.lower
-    scaled = jacobian.astype(np.float64) * width
+    scaled = jacobian.astype(np.float64) * (table.upper - table.lower)
     gram = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)
-    noise = np.maximum(np.abs(residual.astype(np.float64)), MODEL_ERROR)
+    noise = np.maximum(np.abs(residual.astype(np.float64)), model_error)
     signed = np.where(residual < 0.0, -noise, noise)
     q = np.einsum("gck,gc->gk", scaled, signed, optimize=True)
     # a prior as wide as the box, in units of the mean noise
     prior = float(np.mean(noise**2)) / PRIOR_SD**2
     inverse = np.linalg.inv(gram + prior * np.eye(k))
-    covariance = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
-    return INFLATION * width * np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.sqrt(g / max(g - k / 3, 1))
+    found = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
+    return INFLATION**2 * g / max(g - k / 3, 1) * found
+
+
+def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:
+    """Standard deviation (k,) of each value, in its own unit, from a `covariance`."""
+    return (table.upper - table.lower) * np.sqrt(np.maximum(np.diag(spread), 0.0))
 
 
 def certainties(sd: Vector, table: ParameterTable) -> dict[str, Certainty]:

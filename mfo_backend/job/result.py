@@ -45,6 +45,9 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "bounds": result.bounds,
         "errors": result.errors,
         "certainty": {n: {"sd": c.sd, "level": c.level.value} for n, c in result.certainty.items()},
+        "weak_combinations": [
+            {"parameters": w.parameters, "step": w.step, "sentence": w.sentence} for w in result.weak_combinations
+        ],
         "stages": [
             {
                 "name": stage.name,

@@ -113,7 +113,9 @@ def _value_table(result: FitResult) -> str:
     if result.certainty:
         heads.append("How sure")
     table = _table(heads, value_rows(result))
-    return f'{table}<p class="soft">Colours are linear Rec.709.</p>' if table else ""
+    weak = "".join(f"<li>{escape(weak.sentence)}</li>" for weak in result.weak_combinations)
+    weak = f"<ul>{weak}</ul>" if weak else ""
+    return f'{table}<p class="soft">Colours are linear Rec.709.</p>{weak}' if table else ""
 
 
 def _plot(result: FitResult) -> str:

@@ -21,3 +21,15 @@ class Certainty:
 
     sd: tuple[float, ...]
     level: Level
+
+
+@dataclass(frozen=True)
+class WeakCombination:
+    """Values that a picture determines together only: a step along them it would hardly show, and that as a sentence.
+
+    A colour's step is the mean of its channels'.
+    """
+
+    parameters: tuple[str, ...]
+    step: dict[str, float]
+    sentence: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .certainty import Certainty
+from .certainty import Certainty, WeakCombination
 from .model_gap import ModelGap
 from .parameter import Value
 from .status import Status
@@ -41,7 +41,8 @@ class FitResult:
     """The recovered values and how they came about.
 
     `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
-    well the picture determines each value, where the preset finds out; `notes` are sentences on what was left out or
+    well the picture determines each value, where the preset finds out, and `weak_combinations` which values it
+    determines together only; `notes` are sentences on what was left out or
     kept. `model_gap` is None where it could not be measured.
     """
 
@@ -57,4 +58,5 @@ class FitResult:
     passes: float
     certainty: dict[str, Certainty] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    weak_combinations: tuple[WeakCombination, ...] = ()
     model_gap: ModelGap | None = None

@@ -10,6 +10,7 @@ from mfo_backend.fit.residuals import (
     CensoredResidual,
     RelativeResidual,
     ResponseResidual,
+    WeightedResidual,
     log_residual,
     normal_equations,
     residual_rows,
@@ -77,3 +78,19 @@ def test_the_relative_residual_is_unbiased_under_noise_of_the_reference():
     assert abs(values.mean()) < 0.02  # 60 000 values of standard deviation 1
     log_values, _ = log_residual(noisy)(truth)
     assert log_values.mean() > 0.05  # which is why it is used
+
+
+def test_weighted_residual_has_its_slope_and_bounds_what_one_outlier_counts():
+    weight = np.full(REFERENCE.shape, 5.0)
+    residual = WeightedResidual(REFERENCE, weight)
+    image = REFERENCE + RNG.uniform(-2.0, 2.0, REFERENCE.shape)  # up to 10 standard deviations
+    values, slope = residual(image)
+    step = 1e-5
+    up, down = (residual(image + s * step)[0] for s in (1, -1))
+    np.testing.assert_allclose(slope, (up - down) / (2 * step), rtol=2e-3)
+    near = np.abs(image - REFERENCE) < 0.8
+    np.testing.assert_allclose(values[near], 5.0 * (image - REFERENCE)[near], rtol=1e-5)
+    # influence, value times slope: that of a firefly is below that of an ordinary pixel
+    firefly_value, firefly_slope = residual(REFERENCE + 1000.0)
+    assert (firefly_value * firefly_slope < 5.0 * 0.1).all()
+    assert (firefly_value < 20.0).all()

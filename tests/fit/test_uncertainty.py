@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.uncertainty import INFLATION, certainties, standard_deviations
+from mfo_backend.fit.uncertainty import INFLATION, certainties, covariance, standard_deviations
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
@@ -25,7 +25,8 @@ def test_predicts_the_scatter_of_repeated_fits(shared):
         noise = rng.normal(size=(400, 1 if shared else 3)) * 0.2 * np.ones((1, 3))
         x = solve @ noise.ravel()
         found.append(x)
-        predicted.append(standard_deviations(jacobian, noise - (rows @ x).reshape(400, 3), TABLE))
+        spread = covariance(jacobian, noise - (rows @ x).reshape(400, 3), TABLE)
+        predicted.append(standard_deviations(spread, TABLE))
     # 200 repetitions give the empirical value to 5 %; 1.2 is added for noise in the Jacobian
     np.testing.assert_allclose(np.mean(predicted, axis=0) / INFLATION, np.std(found, axis=0), rtol=0.12)
 
@@ -33,7 +34,7 @@ def test_predicts_the_scatter_of_repeated_fits(shared):
 def test_a_column_without_effect_is_as_unsure_as_its_box():
     jacobian = np.random.default_rng(1).normal(size=(200, 3, 4))
     jacobian[:, :, 3] = 0.0
-    sd = standard_deviations(jacobian, np.full((200, 3), 0.01), TABLE)
+    sd = standard_deviations(covariance(jacobian, np.full((200, 3), 0.01), TABLE), TABLE)
     levels = certainties(sd, TABLE)
     assert sd[3] >= 2.0  # the width of its box
     assert levels["width"].level is Level.NOT_VISIBLE
@@ -42,7 +43,7 @@ def test_a_column_without_effect_is_as_unsure_as_its_box():
 
 def test_an_exact_fit_still_has_the_error_of_the_model():
     jacobian = np.random.default_rng(1).normal(size=(200, 3, 4)) * 1e-3
-    sd = standard_deviations(jacobian, np.zeros((200, 3)), TABLE)
+    sd = standard_deviations(covariance(jacobian, np.zeros((200, 3)), TABLE), TABLE)
     assert (sd > 0.02).all()
 
 

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The hard cases as data: what is unusual about the truth, the light or the picture, and what counts as solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..material.mitsuba_parameters import MITSUBA_PRINCIPLED
+from ..scene.exr_file import write_exr
+from ..types.parameter import Value
+from .assets import generated_probe
+from .bumpy_sphere import bumpy_sphere, write_ply
+from .scene import SHAPE
+from .scene_text import on_sphere, point_light, principled, probe_light, scene_text
+
+REDUCED = ("base_color", "roughness", "metallic", "specular")
+OPAQUE = (*REDUCED, "anisotropic", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss")
+GLASS = ("base_color", "roughness", "eta", "spec_trans")
+_NEAR, _FAR = 3.6, 26.0  # of the camera: the object fills nine tenths of the frame, or 8 of 64 pixels
+_EDGE = 1e-3
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """One hard case.
+
+    Attributes
+    ----------
+    light
+        ``"point"``, ``"probe"`` (with small bright lamps) or ``"soft"`` (an environment of low frequency).
+    truth
+        Values that are not drawn at random.
+    fitted
+        What is sought, and drawn unless `truth` has it; nothing where all is locked.
+    spp
+        Samples per pixel of the reference, where it is not exact: under lights with extent and of glass.
+    white
+        Share of the target's pixels that a display shows as white; above 0 the reference is such a picture.
+    gain
+        What the reference is multiplied by.
+    distance
+        Of the camera.
+    other_object
+        The reference shows another object.
+    limit
+        Largest error that is solved: the root mean square error relative to the truth's, or the mean FLIP above that
+        of the noise where the reference is noisy. Where no value can be right it is infinite: then the result must be
+        finite and no worse than the start.
+    """
+
+    name: str
+    light: str = "point"
+    truth: Mapping[str, Value] = field(default_factory=dict)
+    fitted: tuple[str, ...] = OPAQUE
+    spp: int = 1024
+    white: float = 0.0
+    gain: float = 1.0
+    distance: float = _NEAR
+    other_object: bool = False
+    limit: float = 0.01
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the reference's own noise is what limits the result."""
+        return self.light != "point" or "spec_trans" in self.truth
+
+
+def _glass(roughness: float) -> HardCase:
+    truth = {"spec_trans": 1.0 - _EDGE, "metallic": 0.0, "roughness": roughness}
+    return HardCase(f"glass-{roughness:g}", "probe", truth, GLASS, spp=32, limit=0.02)
+
+
+HARD_CASES = {
+    case.name: case
+    for case in (
+        HardCase("mirror-like", truth={"roughness": 0.05}),
+        HardCase("black", truth={"base_color": (_EDGE,) * 3}),
+        HardCase("white", truth={"base_color": (1.0 - _EDGE,) * 3}),
+        HardCase("metallic-0", truth={"metallic": 0.0}),
+        HardCase("metallic-1", truth={"metallic": 1.0}),
+        HardCase("coat-on-metal", truth={"metallic": 1.0, "clearcoat": 0.9, "clearcoat_gloss": 0.9}),
+        HardCase("sheen", truth={"sheen": 0.9, "metallic": 0.05}),
+        HardCase("anisotropy", truth={"anisotropic": 0.9}),
+        _glass(0.0),
+        _glass(0.1),
+        _glass(0.6),
+        HardCase("soft-light", "soft", fitted=REDUCED, spp=256, limit=0.02),
+        HardCase("single-light", fitted=OPAQUE, truth={"sheen": 0.5, "clearcoat": 0.5}),
+        HardCase("fireflies", "probe", fitted=REDUCED, spp=1, limit=0.02),
+        HardCase("clipped", truth={"roughness": 0.3}, fitted=REDUCED, white=0.1),
+        HardCase("tiny", fitted=REDUCED, distance=_FAR),
+        HardCase("exposure", fitted=REDUCED, gain=2.0, limit=np.inf),
+        HardCase("outside", truth={"roughness": 0.02}, fitted=REDUCED, limit=np.inf),
+        HardCase("other-object", fitted=REDUCED, other_object=True, limit=np.inf),
+        HardCase("all-locked", fitted=()),
+    )
+}
+
+
+@dataclass(frozen=True)
+class HardScene:
+    """`file` shows the start's material, `true_file` what the reference is rendered from."""
+
+    case: HardCase
+    seed: int
+    file: Path
+    true_file: Path
+    truth: Mapping[str, Value]
+    start: Mapping[str, Value]
+
+
+def write_hard_scene(case: HardCase, seed: int, size: int, folder: Path) -> HardScene:
+    """Write one scene of a case; all in it follows from the case's name and the seed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rng = np.random.default_rng([seed, *case.name.encode()])
+    drawn = case.fitted or REDUCED
+    truth = _material(rng, drawn) | dict(case.truth)
+    # what is not sought is the same in both
+    start = truth | {name: value for name, value in _material(rng, drawn).items() if name in case.fitted}
+    meshes = [folder / "object.ply", folder / "other.ply"]
+    for number, mesh in enumerate(meshes):
+        write_ply(mesh, *bumpy_sphere(int(rng.integers(2**31)) + number))
+    azimuth = rng.uniform(-60.0, 60.0)
+    camera = on_sphere(azimuth, rng.uniform(5.0, 35.0), case.distance)
+    light = _light(case, azimuth, rng, folder)
+
+    def write(name: str, values: Mapping[str, Value], mesh: Path) -> Path:
+        bsdf = principled("target_bsdf", values, two_sided="spec_trans" not in values)
+        depth = 8 if "spec_trans" in values else 2
+        path = folder / name
+        path.write_text(scene_text(SHAPE, mesh, bsdf, [light], camera, size, depth), "utf-8")
+        return path
+
+    true_file = write("true.xml", truth, meshes[1 if case.other_object else 0])
+    return HardScene(case, seed, write("scene.xml", start, meshes[0]), true_file, truth, start)
+
+
+def _material(rng: np.random.Generator, names: tuple[str, ...]) -> dict[str, Value]:
+    values: dict[str, Value] = {}
+    for name in names:
+        parameter = MITSUBA_PRINCIPLED[name]
+        low = 0.1 if name == "roughness" else parameter.lower
+        high = {"eta": 1.8, "anisotropic": 0.9}.get(name, parameter.upper)
+        drawn = rng.uniform(low, high, parameter.size)
+        values[name] = float(drawn[0]) if parameter.size == 1 else tuple(float(v) for v in drawn)
+    return values
+
+
+def _light(case: HardCase, azimuth: float, rng: np.random.Generator, folder: Path) -> str:
+    if case.light == "point":
+        return point_light(azimuth + rng.uniform(-50.0, 50.0), rng.uniform(10.0, 60.0))
+    probe = generated_probe(int(rng.integers(2**31)))
+    if case.light == "soft":
+        up = np.linspace(1.0, -1.0, len(probe))[:, None, None]
+        around = np.linspace(0.0, 2.0 * np.pi, probe.shape[1])[None, :, None]
+        probe = (1.0 + 0.5 * up + 0.3 * np.cos(around + np.array([0.0, 0.3, 0.6]))).astype(np.float32)
+    path = folder / "probe.exr"
+    write_exr(path, probe)
+    return probe_light(path, rng.uniform(0.0, 360.0))

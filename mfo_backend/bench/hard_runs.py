@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits of the hard cases: what came out, and which guard spoke."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fit.choose_groups import detail_grid
+from ..fit.recover_material import recover_material
+from ..fit.settings import FitSettings
+from ..metrics.compare import compare_images
+from ..metrics.tone_mapping import DisplayView
+from ..render.mitsuba_renderer import MitsubaRenderer
+from ..render.renderer import Renderer, load_renderer
+from ..types.errors import MfoError
+from ..types.image import Encoding, Image, Pixels
+from .hard_cases import HardCase, HardScene, write_hard_scene
+from .judge import relative_rmse
+from .scene import SHAPE
+
+_REFERENCE_SEED, _JUDGE_SEED = 0x4A2D0000, 0x4A2D8000
+_JUDGE_SPP = 256
+
+
+@dataclass(frozen=True)
+class HardRun:
+    """One fit of one case.
+
+    `error` is what the case's limit is for. `guards` are the sentences in which the fit said what it left out, kept or
+    refused. `finite` says that no value and no error is NaN or infinite.
+    """
+
+    case: str
+    seed: int
+    solved: bool
+    error: float
+    start_error: float
+    finite: bool
+    passes: float
+    guards: tuple[str, ...]
+
+
+def run_hard_case(case: HardCase, seed: int, size: int, folder: Path, preset: str = "balanced") -> HardRun:
+    """Fit one scene of a case and judge it in pictures that the fit has not seen."""
+    scene = write_hard_scene(case, seed, size, folder)
+    try:
+        renderer = load_renderer(scene.file, SHAPE, model="mitsuba_principled", parameters=case.fitted)
+    except MfoError as error:  # a refusal in words is the right end where all is locked
+        return HardRun(case.name, seed, not case.fitted, 0.0, 0.0, True, 0.0, (str(error),))
+    true = load_renderer(scene.true_file, SHAPE, model="mitsuba_principled", parameters=case.fitted)
+    exact = None if case.noisy else ExactPicture(true, true.table.pack(scene.truth))
+    reference, view = _reference(case, scene, true, exact)
+    settings = FitSettings(model="mitsuba_principled", preset=preset, seed=seed, max_iterations=60)
+    result = recover_material(
+        renderer, reference, settings, display=view, listener=lambda event: None, should_stop=lambda: False
+    ).result
+
+    mask = renderer.target_mask()
+    vectors = renderer.start, renderer.table.pack(result.recovered)
+    if exact is not None and not case.other_object:
+        shown = [exact(x) for x in vectors]
+    else:
+        shown = [renderer.image(x, seed=_JUDGE_SEED + seed, spp=_JUDGE_SPP) for x in vectors]
+    truth = true.table.pack(scene.truth)
+    truth = exact(truth) if exact else true.image(truth, seed=_JUDGE_SEED + seed, spp=_JUDGE_SPP)
+    truth = truth * np.float32(case.gain)
+    start_error, error = (_error(case, picture, truth, reference, view, mask) for picture in shown)
+    values = np.concatenate([np.ravel(value) for value in result.recovered.values()])
+    finite = bool(np.isfinite([*values, error, start_error]).all())
+    # errors of pictures with noise: a start that is the best cannot be told from the result by less
+    solved = finite and error <= case.limit and error <= start_error + 0.005
+    guards = tuple(result.notes) if "so the start was kept" not in result.message else (*result.notes, result.message)
+    return HardRun(case.name, seed, solved, error, start_error, finite, result.passes, guards)
+
+
+def hard_table(runs: Sequence[HardRun]) -> str:
+    """A line of Markdown for each case."""
+    lines = [
+        "| case | runs | solved | worst error | median passes | not finite | guards that fired (runs) |",
+        "| --- | --: | --: | --: | --: | --: | --- |",
+    ]
+    for name in dict.fromkeys(run.case for run in runs):
+        rows = [run for run in runs if run.case == name]
+        fired: dict[str, int] = {}
+        for run in rows:
+            for guard in dict.fromkeys(_short(guard) for guard in run.guards):
+                fired[guard] = fired.get(guard, 0) + 1
+        guards = "; ".join(f"{guard} ({count})" for guard, count in sorted(fired.items(), key=lambda g: -g[1])[:3])
+        lines.append(
+            f"| {name} | {len(rows)} | {100 * np.mean([r.solved for r in rows]):.0f} % | "
+            f"{max(r.error for r in rows):.3g} | {np.median([r.passes for r in rows]):.0f} | "
+            f"{sum(not r.finite for r in rows)} | {guards or '-'} |"
+        )
+    return "\n".join(lines)
+
+
+class ExactPicture:
+    """Pictures under lights of no extent, with many rays where the picture of one vector has detail.
+
+    Path tracing finds a highlight that is narrower than a pixel by luck only.
+    """
+
+    def __init__(self, renderer: Renderer, vector: NDArray[np.float64]) -> None:
+        from ..render.recorded_scene import RecordedScene
+
+        assert isinstance(renderer, MitsubaRenderer)
+        mask = renderer.target_mask()
+        scene = RecordedScene(renderer, int(mask.sum()))
+        self._shape = (*mask.shape, 3)
+        grid: int | NDArray[np.int64] = 6
+        for _ in range(2):
+            self._paths = scene.record(vector, grid=grid, seed=_JUDGE_SEED, near=False)
+            self._evaluate = scene.evaluator(self._paths, self._paths.pixel_groups())
+            grid = 2 * detail_grid(self(vector), mask) + 2
+
+    def __call__(self, vector: NDArray[np.float64]) -> Pixels:
+        """The linear picture; black beside the target."""
+        image = np.zeros(self._shape, np.float32)
+        image.reshape(-1, 3)[self._paths.pixel] = self._evaluate(vector)[:, :, 0]
+        return image
+
+
+def _reference(
+    case: HardCase, scene: HardScene, true: Renderer, exact: ExactPicture | None
+) -> tuple[Image, DisplayView | None]:
+    truth = true.table.pack(scene.truth)
+    pixels = exact(truth) if exact else true.image(truth, seed=_REFERENCE_SEED + scene.seed, spp=case.spp)
+    pixels = pixels * np.float32(case.gain)
+    if not case.white:
+        return Image(pixels, Encoding.LINEAR), None
+    brightest = np.quantile(pixels[true.target_mask()].max(-1), 1.0 - case.white)
+    view = DisplayView(exposure_ev=float(-np.log2(max(brightest, 1e-6))))
+    return Image(view.display(pixels), Encoding.SRGB), view
+
+
+def _error(
+    case: HardCase, picture: Pixels, truth: Pixels, reference: Image, view: DisplayView | None, mask: np.ndarray
+) -> float:
+    if view is not None:  # above white any value is right
+        picture, truth = (np.minimum(image, 2.0**-view.exposure_ev) for image in (picture, truth))
+    if not case.noisy:
+        return relative_rmse(picture, truth, mask)
+    noise, misfit = (
+        compare_images(reference, Image(image, Encoding.LINEAR), mask=mask, display=view).metrics["flip"]
+        for image in (truth, picture)
+    )
+    return float((misfit or 0.0) - (noise or 0.0))
+
+
+def _short(guard: str) -> str:
+    """What a guard's sentence begins with, without its numbers."""
+    words = guard.split(":")[0].split(".")[0].split()
+    return " ".join(word for word in words[:9] if not any(c.isdigit() for c in word))

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which values go back to the user's: lobes that only noise asked for, and values the picture does not determine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solve.box_quadratic import minimise_in_box
+from ..types.certainty import Certainty, Level
+from ..types.parameter import ParameterTable
+from .recorded_stages import Problem, RecordedFit, Vector
+from .residuals import RelativeResidual, residual_rows
+from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
+
+# Values the picture does not determine go back to the user's if that costs no more than this share of the residual
+KEEP_TOLERANCE = 1.01
+# A lobe that the user's material lacks comes in only where the picture asks for it by three standard deviations
+SIGNIFICANT = 9.0
+OFF = 2e-3  # of the box: a value this near its lower bound is switched off
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A vector, how sure each value is, their covariance in widths of the box, and sentences for the report.
+
+    `held` names the values that are the user's again; later stages leave them alone.
+    """
+
+    x: Vector
+    held: tuple[str, ...]
+    certainty: dict[str, Certainty]
+    spread: NDArray[np.float64]
+    notes: tuple[str, ...]
+
+
+def keep_values(fit: RecordedFit, problem: Problem, found: Vector, *, weighted: bool) -> Kept:
+    """`found` with unneeded lobes switched off again and undetermined values given back.
+
+    `weighted` says that the problem's residuals are in standard deviations of the noise.
+    """
+    table, user = fit.table, fit.scene.renderer.start
+    judged = _Judged(fit, problem, weighted)
+    cost, certainty, spread = judged(found)
+    off = unneeded_lobes(problem, found, user, table, 0.0 if weighted else MODEL_ERROR)
+    moved = [name for name in off if not np.allclose(found[table.slice_of(name)], user[table.slice_of(name)])]
+    if moved:
+        allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / _independent(problem)
+        simpler = _solve_holding(fit, problem, found, off)
+        simpler_cost, surer, narrower = judged(simpler)
+        if simpler_cost <= allowed + 1e-12:
+            found, cost = simpler, simpler_cost
+            certainty, spread = surer, narrower
+        else:
+            off = [name for name in off if name not in moved]
+
+    notes: list[str] = []
+    unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
+    if unseen and len(unseen) < len(table):
+        held = [*unseen, *(name for name in off if name not in unseen)]
+        kept = _solve_holding(fit, problem, found, held)
+        if judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8:
+            found, off = kept, held
+            notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
+    return Kept(found, tuple(off), certainty, spread, tuple(notes))
+
+
+def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: ParameterTable, least: float) -> list[str]:
+    """Names whose user's value is off and whose return to it the picture cannot tell from noise.
+
+    One after another, the cheapest first, on the quadratic around `found`: with the lobes' weights the picture is
+    nearly linear in them. `least` is the least root mean square of a residual that is no noise.
+    """
+    equations = problem.equations(found)
+    noise = max(2.0 * equations.cost, least**2, 1e-30)
+    hessian = equations.hessian + 1e-9 * np.diag(equations.hessian).max() * np.eye(len(found))
+    lower, upper = table.lower, table.upper
+    candidates = [p.name for p in table if np.all((user - lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))]
+
+    def change(names: list[str]) -> float:
+        """How much the cost rises with these names at the user's values and all others at their best."""
+        step, free = np.zeros_like(found), np.ones(len(found), bool)
+        for name in names:
+            part = table.slice_of(name)
+            step[part], free[part] = (user - found)[part], False
+        if free.any():
+            rest = np.ix_(free, free)
+            slope = equations.gradient[free] + hessian[np.ix_(free, ~free)] @ step[~free]
+            step[free] = minimise_in_box(hessian[rest], slope, (lower - found)[free], (upper - found)[free])
+        return float(equations.gradient @ step + 0.5 * step @ hessian @ step)
+
+    off: list[str] = []
+    now = change([])
+    while candidates:
+        rise, cheapest = min((change([*off, name]) - now, name) for name in candidates)
+        if 2.0 * rise * _independent(problem) > SIGNIFICANT * noise:
+            break
+        off.append(cheapest)
+        candidates.remove(cheapest)
+        now += rise
+    return off
+
+
+class _Judged:
+    """Mean square residual, certainty and covariance at a vector."""
+
+    def __init__(self, fit: RecordedFit, problem: Problem, weighted: bool) -> None:
+        self._fit, self._problem, self._weighted = fit, problem, weighted
+
+    def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
+        problem, table = self._problem, self._fit.table
+        image = problem.evaluate(x)
+        rows = residual_rows(image, problem.residual)
+        if self._weighted:
+            spread = covariance(rows[:, :, 1:], rows[:, :, 0], table, model_error=0.0)
+        else:
+            relative = residual_rows(image, RelativeResidual(problem.groups.average(self._fit.reference)))
+            spread = covariance(relative[:, :, 1:], relative[:, :, 0], table)
+        return float(np.mean(rows[:, :, 0] ** 2)), certainties(standard_deviations(spread, table), table), spread
+
+    def noise(self, cost: float) -> float:
+        """Mean square of a residual that is noise."""
+        return cost if self._weighted else max(cost, MODEL_ERROR**2)
+
+
+def _independent(problem: Problem) -> float:
+    """Number of independent residuals: the channels of a group share most of their noise."""
+    return 1.5 * len(problem.groups)
+
+
+def box_holding(table: ParameterTable, user: Vector, names: Iterable[str]) -> tuple[Vector, Vector]:
+    """The bounds of `table` with these names held at the user's values."""
+    lower, upper = table.lower, table.upper
+    for name in names:
+        part = table.slice_of(name)
+        lower[part] = upper[part] = user[part]
+    return lower, upper
+
+
+def _solve_holding(fit: RecordedFit, problem: Problem, found: Vector, names: list[str]) -> Vector:
+    lower, upper = box_holding(fit.table, fit.scene.renderer.start, names)
+    start = np.clip(found, lower, upper)
+    return start if np.all(lower >= upper) else fit.solve_within(problem, start, lower, upper)

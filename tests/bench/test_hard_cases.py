@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The hard cases as data, and a few of them small enough for every run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.bench.hard_cases import HARD_CASES, write_hard_scene
+from mfo_backend.bench.hard_runs import HardRun, hard_table, run_hard_case
+
+
+def test_every_hard_case_is_there():
+    assert len(HARD_CASES) == 20  # seventeen, of which metallic counts twice and glass three times
+    assert all(case.limit > 0.0 for case in HARD_CASES.values())
+
+
+@pytest.mark.parametrize("name", ["mirror-like", "soft-light", "fireflies", "tiny"])
+def test_scenes_follow_from_name_and_seed(name, tmp_path):
+    first, again, other = (
+        write_hard_scene(HARD_CASES[name], n, 16, tmp_path / f"{k}") for k, n in enumerate([3, 3, 4])
+    )
+    assert first.truth == again.truth != other.truth
+    text = first.file.read_text().replace(str(first.file.parent), "")
+    assert text == again.file.read_text().replace(str(again.file.parent), "")
+    assert first.true_file.read_text() != first.file.read_text()
+    for key, value in HARD_CASES[name].truth.items():
+        assert first.truth[key] == value
+
+
+@pytest.mark.parametrize("name", ["metallic-0", "clipped", "exposure", "other-object", "fireflies", "all-locked"])
+def test_small_hard_cases(name, tmp_path):
+    run = run_hard_case(HARD_CASES[name], 0, 24, tmp_path, preset="fast")
+    assert run.finite
+    assert run.error <= run.start_error + 0.005
+    if name in ("metallic-0", "clipped"):
+        assert run.error < 0.03  # 24 pixels hold a tenth of what the limit of 1 % is for
+    if name == "all-locked":
+        assert run.solved
+        assert "No parameter is selected" in run.guards[0]
+
+
+def test_the_table_counts_failures_and_names_guards():
+    runs = [
+        HardRun("black", 0, True, 0.001, 0.5, True, 40.0, ()),
+        HardRun("black", 1, False, np.inf, 0.5, False, 60.0, ("The light was recorded 2 times: it moved.",)),
+    ]
+    line = hard_table(runs).splitlines()[-1]
+    assert line == "| black | 2 | 50 % | inf | 50 | 1 | The light was recorded times (1) |"
