@@ -101,7 +101,10 @@ def _content(file: object) -> str:
 def _read(code: int, out: str, err: str, python: Path) -> Verdict:
     line = next((line for line in reversed(out.splitlines()) if line.startswith("{")), "")
     try:
-        checks = {check["name"]: check for check in json.loads(line)["checks"]}
+        answer = json.loads(line)
+        if "sentence" in answer and "checks" not in answer:  # it could not even begin
+            return Verdict(False, str(answer["sentence"]))
+        checks = {check["name"]: check for check in answer["checks"]}
         problems = _problems([check for check in checks.values() if check["state"] == "problem"])
     except (ValueError, KeyError, TypeError):
         last = next((text.strip() for text in reversed(err.splitlines()) if text.strip()), f"exit code {code}")

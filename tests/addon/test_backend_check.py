@@ -65,6 +65,11 @@ def test_problems_are_named_with_their_cure(tmp_path: Path) -> None:
     ]
 
 
+def test_a_refusal_keeps_its_sentence(tmp_path: Path) -> None:
+    python = says(tmp_path / "python", json.dumps({"status": "setup", "sentence": "numpy is not installed."}), code=3)
+    assert verdict_of(python) == Verdict(False, "numpy is not installed.")
+
+
 @pytest.mark.parametrize("line", ["", "no JSON", "{}", '{"checks": 3}', "{damaged"])
 def test_an_answer_that_is_none(tmp_path: Path, line: str) -> None:
     python = says(tmp_path / "python", line, code=1)
