@@ -68,7 +68,7 @@ def _not_importable(error: ImportError) -> str:
         lock = Path(__file__).resolve().parents[2] / "requirements" / "backend.lock"
         what = f'-r "{lock}"' if lock.is_file() else error.name.partition(".")[0]
         return (
-            f"{error.name} is not installed in {sys.executable}: run \"{sys.executable}\" -m pip install {what}, or "
+            f'{error.name} is not installed in {sys.executable}: run "{sys.executable}" -m pip install {what}, or '
             "choose the Python that has the backend's packages."
         )
     return f"A package cannot be loaded ({error}): run `mfo doctor`, which says what is missing."

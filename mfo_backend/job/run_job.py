@@ -43,7 +43,8 @@ def run_job(path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter
     except ImportError as error:  # a package is missing, or there was no memory for its library
         traceback.print_exc(file=sys.stderr)
         what = str(error).strip().split("\n")[0][:200]
-        return _fail(events, Status.SETUP, f"A package cannot be loaded ({what}): run `mfo doctor`, or free some memory.")
+        sentence = f"A package cannot be loaded ({what}): run `mfo doctor`, or free some memory."
+        return _fail(events, Status.SETUP, sentence)
     except MemoryError:
         traceback.print_exc(file=sys.stderr)
         return _fail(events, Status.FAILED, "The fit ran out of memory: lower the resolution or the samples per pixel.")

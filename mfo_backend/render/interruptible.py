@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ from ..types.image import Pixels
 from .renderer import Interrupted, Pullback, Renderer, Vector
 
 T = TypeVar("T")
+_Calls = queue.SimpleQueue[Callable[[], None] | None]
 POLL_SECONDS = 0.05  # how often a waiting call looks for the request
 PATIENCE_SECONDS = 0.3  # a picture that is nearly done may finish; the rest of the promised second is for the result
 
@@ -28,8 +30,9 @@ class NativeThread:
 
     def __init__(self, should_stop: Callable[[], bool]) -> None:
         self._should_stop = should_stop
-        self._calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        threading.Thread(target=self._work, name="mfo-native", daemon=True).start()
+        self._calls: _Calls = queue.SimpleQueue()
+        threading.Thread(target=_work, args=(self._calls,), name="mfo-native", daemon=True).start()
+        weakref.finalize(self, self._calls.put, None)  # a process of many fits would keep a thread for each
 
     def call(self, function: Callable[[], T]) -> T:
         """The function's result or error.
@@ -61,9 +64,11 @@ class NativeThread:
             raise value
         return value
 
-    def _work(self) -> None:
-        while True:
-            self._calls.get()()
+
+def _work(calls: _Calls) -> None:
+    while (call := calls.get()) is not None:
+        call()
+        del call  # it holds the renderer, and this waits for the next one
 
 
 class InterruptibleRenderer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from ..scene.scene_xml import Element
 from ..types.errors import BadInputError
@@ -17,7 +18,7 @@ def trust_only_mitsuba() -> None:
     stranger's ``plugins/diffuse.so`` there would be taken for Mitsuba's."""
     import mitsuba as mi
 
-    resolver = mi.file_resolver()
+    resolver: Any = mi.file_resolver()  # type: ignore[operator]  # Mitsuba's stubs call it an object
     resolver.clear()
     resolver.append(str(Path(mi.__file__).parent))
 

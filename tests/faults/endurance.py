@@ -24,6 +24,7 @@ import numpy as np
 
 from .scene import ROOT, environment, in_blender, make_demo
 
+PARTS = {"values": ("initial", "recovered", "certainty"), "errors": ("errors",)}  # of result.json
 WARM = 5  # fits until kernels are compiled and pools have grown
 
 
@@ -73,7 +74,9 @@ def backend(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
 
     job = export(folder, size)
     request = json.loads((job / "request.json").read_text())
-    cache = Path(os.environ.get("DRJIT_CACHE_DIR", Path.home() / ".drjit"))
+    cache = folder / "kernels"  # nobody else's
+    cache.mkdir()
+    os.environ["DRJIT_CACHE_DIR"] = str(cache)
     rows = []
     for index in range(fits):
         request["fit"] |= {
@@ -93,7 +96,7 @@ def backend(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
                 "megabytes": pages * 4096 / 1e6,
                 "files": len(os.listdir("/proc/self/fd")),
                 "threads": len(os.listdir("/proc/self/task")),
-                "kernels": len(list(cache.glob("*"))) if cache.is_dir() else 0,
+                "kernels": len(list(cache.rglob("*"))),
             }
         )
         if index == fits - 1 or index % 20 == 19:
@@ -125,18 +128,20 @@ def repeat(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
         request["fit"] |= {"preset": preset, "seed": 5, "max_iterations": 12, "spp": 4}
         (job / "request.json").write_text(json.dumps(request))
         runs = {threads: [_values(job, threads) for _ in range(max(2, fits))] for threads in (1, 2, 4)}
-        everything = np.array([values for some in runs.values() for values in some])
-        found[preset] = {
-            "runs": len(everything),
-            "identical": {str(threads): int(len({v.tobytes() for v in some}) == 1) for threads, some in runs.items()},
-            "same_threads": float(max(np.ptp(np.array(some), axis=0).max() for some in runs.values())),
-            "any_threads": float(np.ptp(everything, axis=0).max()),
-        }
+        found[preset] = {"runs": sum(map(len, runs.values()))}
+        for part in PARTS:
+            same = [np.ptp([run[part] for run in some], axis=0).max() for some in runs.values()]
+            everything = [run[part] for some in runs.values() for run in some]
+            found[preset][part] = {
+                "same_threads": float(max(same)),
+                "one_thread": float(same[0]),
+                "any_threads": float(np.ptp(everything, axis=0).max()),
+            }
     yield found
 
 
-def _values(job: Path, threads: int) -> np.ndarray:
-    """The recovered values and errors of a run in a new process, flat."""
+def _values(job: Path, threads: int) -> dict[str, list[float]]:
+    """The recovered values with their certainty, and the errors, of a run in a new process."""
     code = (
         "import sys, os, io\nfrom pathlib import Path\nfrom mfo_backend.render.llvm import configure_llvm, needs_llvm\n"
         "needs_llvm() and configure_llvm()\nimport drjit as dr\n"
@@ -147,7 +152,7 @@ def _values(job: Path, threads: int) -> np.ndarray:
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=environment(), capture_output=True)
     result = json.loads((job / "result.json").read_text())
-    return np.array(leaves({key: result[key] for key in ("recovered", "errors", "certainty")}))
+    return {part: leaves({key: result[key] for key in keys}) for part, keys in PARTS.items()}
 
 
 def leaves(value: Any) -> list[float]:

@@ -102,18 +102,16 @@ def _endurance(record: Any) -> str:
 
 
 def _repeat(record: Any) -> str:
-    rows = [
-        (
-            preset,
-            r["runs"],
-            ", ".join(threads for threads, same in r["identical"].items() if same) or "none",
-            f"{r['same_threads']:.1e}",
-            f"{r['any_threads']:.1e}",
-        )
-        for preset, r in record.items()
-    ]
-    head = ("preset", "runs", "thread counts with equal bits", "largest difference, same count", "any count")
-    return _table(head, rows)
+    rows = []
+    for preset, r in record.items():
+        for part, words in (("values", "recovered values, certainty"), ("errors", "errors")):
+            cells = [_difference(r[part][key]) for key in ("one_thread", "same_threads", "any_threads")]
+            rows.append((preset, r["runs"], words, *cells))
+    return _table(("preset", "runs", "part of result.json", "one thread", "1, 2 or 4 threads, same count", "any"), rows)
+
+
+def _difference(value: float) -> str:
+    return "equal bits" if value == 0.0 else f"{value:.1e}"
 
 
 TABLES: dict[str, Callable[[Any], str]] = {

@@ -57,6 +57,15 @@ class Grey:
             time.sleep(60)
 
 
+def test_the_thread_ends_with_its_last_user() -> None:
+    thread = NativeThread(lambda: False)
+    native = thread.call(threading.current_thread)
+    assert native.is_alive()
+    del thread
+    native.join(5.0)
+    assert not native.is_alive()
+
+
 def test_results_and_errors_come_through() -> None:
     thread = NativeThread(lambda: False)
     assert thread.call(lambda: 7) == 7
