@@ -101,7 +101,12 @@ def _content(file: object) -> str:
 def _read(code: int, out: str, err: str, python: Path) -> Verdict:
     line = next((line for line in reversed(out.splitlines()) if line.startswith("{")), "")
     try:
-        checks = {check["name"]: check for check in json.loads(line)["checks"]}
+        answer = json.loads(line)
+        if "sentence" in answer and "checks" not in answer:  # it could not even begin
+            # without the path and the command line that help in a terminal: here a button does it
+            reason = str(answer["sentence"]).replace(f" in {python}", "").split(": run ")[0].rstrip(".")
+            return Verdict(False, f"{reason}: install the backend, or choose another Python.")
+        checks = {check["name"]: check for check in answer["checks"]}
         problems = _problems([check for check in checks.values() if check["state"] == "problem"])
     except (ValueError, KeyError, TypeError):
         last = next((text.strip() for text in reversed(err.splitlines()) if text.strip()), f"exit code {code}")

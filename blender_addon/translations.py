@@ -168,7 +168,7 @@ LANGUAGES = {
     "de": {("*", text): german for text, german in _GERMAN.items()}
     | {("Operator", text): german for text, german in _GERMAN_OPERATORS.items()},
 }
-LANGUAGES["de_DE"] = LANGUAGES["de"]  # its name before Blender 5.0
+LANGUAGES["de_DE"] = LANGUAGES["de"]  # what Blender 4.3 and 5.2 call it
 
 
 def register() -> None:

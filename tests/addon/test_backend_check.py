@@ -65,6 +65,14 @@ def test_problems_are_named_with_their_cure(tmp_path: Path) -> None:
     ]
 
 
+def test_a_refusal_keeps_its_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "python"
+    sentence = f'numpy is not installed in {path}: run "{path}" -m pip install -r "backend.lock", or choose another.'
+    python = says(path, json.dumps({"status": "setup", "sentence": sentence}), code=3)
+    expected = "numpy is not installed: install the backend, or choose another Python."
+    assert verdict_of(python) == Verdict(False, expected)
+
+
 @pytest.mark.parametrize("line", ["", "no JSON", "{}", '{"checks": 3}', "{damaged"])
 def test_an_answer_that_is_none(tmp_path: Path, line: str) -> None:
     python = says(tmp_path / "python", line, code=1)
