@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.compare import compare_images
-from ..metrics.judges.hdr_vdp import is_configured
+from ..metrics.judges.hdr_vdp_program import is_configured
 from ..metrics.judges.judgement import judge_images
 from ..metrics.judges.packages import require_pycvvdp
 from ..render.plain_picture import PlainScene
@@ -90,10 +90,6 @@ class Judge:
     def flip(self, values: Mapping[str, Value]) -> float:
         """Mean FLIP alone, without the judges' scores."""
         return self._flip(self.pictures.truth[0], self._renderer.table.pack(values), self.pictures.mask)
-
-    def reference_flip(self, picture: Pixels) -> float:
-        """Mean FLIP of a picture of the judge's and the reference, whose noise is in it."""
-        return _difference(picture, self.pictures.reference, self.pictures.mask, judges=False).flip
 
     def reference_flip(self, picture: Pixels) -> float:
         """Mean FLIP of a picture of the judge's and the reference, whose noise is in it."""

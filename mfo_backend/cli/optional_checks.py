@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ..metrics.judges.hdr_vdp import FOLDER_VARIABLE, find_code, find_program
+from ..metrics.judges.hdr_vdp_program import FOLDER_VARIABLE, find_code, find_program
 from ..metrics.judges.packages import CVVDP, LPIPS
 from ..metrics.lpips.weight_files import TRUNK_FILES, find_weights, weight_folders
 from ..types.errors import SetupError

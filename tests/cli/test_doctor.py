@@ -169,3 +169,12 @@ def test_what_does_not_fit_is_a_warning_with_a_cure(tmp_path: Path, monkeypatch:
     assert checks["judges"][0] == checks["HDR-VDP-3"][0] == "warning"
     assert "run " in checks["judges"][1]
     assert "name the folder that does" in checks["HDR-VDP-3"][1]
+
+
+def test_lists_what_is_missing_without_numpy() -> None:
+    code = (
+        "import sys; sys.modules['numpy'] = None; from mfo_backend.cli.optional_checks import check_optional; "
+        "print([check.name for check in check_optional()])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60)
+    assert "HDR-VDP-3" in done.stdout, done.stderr

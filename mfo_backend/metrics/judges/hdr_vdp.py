@@ -10,7 +10,6 @@ distortions in high dynamic range and regular content", arXiv 2304.13625. It doe
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable
@@ -22,19 +21,13 @@ from numpy.typing import NDArray
 from ...types.errors import BadInputError, SetupError
 from ..flip_filters import DEFAULT_PIXELS_PER_DEGREE
 from ..pixel_check import check_pair
+from .hdr_vdp_program import FOLDER_VARIABLE, find_code, find_program
 
 Array = NDArray[np.floating]
 
-FOLDER_VARIABLE = "MFO_HDRVDP3"
 _DRIVER = Path(__file__).with_name("hdr_vdp_driver.m")
-_PROGRAMS = ("octave-cli", "octave", "matlab")  # the first one on the path runs
 # seconds: a slow start, and some ten times what Octave 7.3 takes for a pixel on one core
 _START_SECONDS, _SECONDS_PER_PIXEL = 120.0, 1e-4
-
-
-def is_configured() -> bool:
-    """Whether the user has named a copy of HDR-VDP-3."""
-    return bool(os.environ.get(FOLDER_VARIABLE))
 
 
 def hdr_vdp_q_jods(
@@ -80,32 +73,6 @@ def _write_pairs(path: Path, pairs: Iterable[tuple[Array, Array]]) -> tuple[tupl
             for picture in (reference, test):
                 file.write(np.ascontiguousarray(np.maximum(picture, 0), dtype="<f4").tobytes())
     return shape, count
-
-
-def find_code() -> Path:
-    """The user's folder with hdrvdp3.m, or `SetupError`."""
-    chosen = os.environ.get(FOLDER_VARIABLE)
-    if not chosen:
-        raise SetupError(
-            f"HDR-VDP-3 is not set up: fetch its code from hdrvdp.sourceforge.net and let {FOLDER_VARIABLE} name the "
-            "folder that holds hdrvdp3.m."
-        )
-    folder = Path(chosen).absolute()
-    if not (folder / "hdrvdp3.m").is_file():
-        raise SetupError(f"{FOLDER_VARIABLE} names {chosen!r}, which holds no hdrvdp3.m: name the folder that does.")
-    return folder
-
-
-def find_program() -> str:
-    """The program that runs HDR-VDP-3, or `SetupError`."""
-    for name in _PROGRAMS:
-        found = shutil.which(name)
-        if found is not None:
-            return found
-    raise SetupError(
-        "HDR-VDP-3 runs in GNU Octave or MATLAB and neither is on the path: "
-        "install the packages octave, octave-image and octave-statistics."
-    )
 
 
 def _run(program: str, folder: Path, job: Path, seconds: float) -> str:

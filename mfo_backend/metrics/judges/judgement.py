@@ -20,7 +20,8 @@ from ..response import nits_per_unit
 from ..tone_mapping import DisplayView
 from .color_video_vdp import color_video_vdp_jod
 from .display_light import DisplayLight
-from .hdr_vdp import hdr_vdp_q_jods, is_configured
+from .hdr_vdp import hdr_vdp_q_jods
+from .hdr_vdp_program import is_configured
 from .viewing import HDR_VIEWING, SDR_VIEWING, Viewing
 
 Array = NDArray[np.floating]

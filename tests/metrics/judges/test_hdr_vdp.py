@@ -14,7 +14,8 @@ import sys
 import numpy as np
 import pytest
 
-from mfo_backend.metrics.judges.hdr_vdp import hdr_vdp_q_jods, is_configured
+from mfo_backend.metrics.judges.hdr_vdp import hdr_vdp_q_jods
+from mfo_backend.metrics.judges.hdr_vdp_program import is_configured
 from mfo_backend.types.errors import BadInputError, SetupError
 
 STAND_IN = f"""#!{sys.executable}
