@@ -95,10 +95,6 @@ class Judge:
         """Mean FLIP of a picture of the judge's and the reference, whose noise is in it."""
         return _difference(picture, self.pictures.reference, self.pictures.mask, judges=False).flip
 
-    def reference_flip(self, picture: Pixels) -> float:
-        """Mean FLIP of a picture of the judge's and the reference, whose noise is in it."""
-        return _difference(picture, self.pictures.reference, self.pictures.mask, judges=False).flip
-
     def relit(self, values: Mapping[str, Value]) -> list[Difference]:
         """The same under the lights no fit sees."""
         found = []
