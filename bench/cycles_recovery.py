@@ -168,10 +168,11 @@ def table_row(seed: int, light: str, found: Recovery) -> str:
     return f"| {seed} | {light} | {flips} | {jods} | {gap} | {found.seconds:.0f} s |"
 
 
-def summary(found: Sequence[Recovery], tried: int) -> str:
+def summary(found: Sequence[Recovery], tried: int, unmeasured: int = 0) -> str:
     """How many were good enough by each measure, and what was worst."""
-    good = sum(recovery.after <= LIMIT for recovery in found)
-    text = f"{good} of {tried} scenes have a mean FLIP of at most {LIMIT} after applying, {tried - len(found)} failed."
+    good, failed = sum(recovery.after <= LIMIT for recovery in found), tried - len(found) - unmeasured
+    text = f"{good} of {tried} scenes have a mean FLIP of at most {LIMIT} after applying, {failed} failed"
+    text += f", {unmeasured} are not measured." if unmeasured else "."
     scores = [recovery.jod for recovery in found if recovery.jod is not None]
     if scores:
         high = sum(score >= LEAST_JOD for score in scores)
@@ -188,14 +189,19 @@ def main() -> None:
     parser.add_argument("--judge", default=sys.executable, metavar="PYTHON", help="a Python with ColorVideoVDP")
     parser.add_argument("--only", nargs="*", metavar="SEED/LIGHT", help="print the rows of these scenes alone")
     parser.add_argument("--out", type=Path, help="keep the scenes here, and do not repeat those that are there")
+    parser.add_argument("--kept", action="store_true", help="write the table of the scenes in OUT, measure no others")
     chosen = parser.parse_args()
     effort = Effort(chosen.size, chosen.samples, chosen.judge_samples)
     scenes = [(seed, light) for seed, light in SCENES if not chosen.only or f"{seed}/{light}" in chosen.only]
-    rows, found = [], []
+    rows, found, unmeasured = [], [], 0
     notes: dict[str, list[str]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         for seed, light in scenes:
             folder = (chosen.out or Path(temporary)).absolute() / str(seed)
+            if chosen.kept and _kept(folder) is None:
+                rows.append(f"| {seed} | {light} | not measured |")
+                unmeasured += 1
+                continue
             try:
                 found.append(_kept(folder) or recover(seed, light, folder, effort, chosen.judge))
             except RuntimeError as error:
@@ -205,12 +211,12 @@ def main() -> None:
                 for note in found[-1].notes:
                     notes.setdefault(note, []).append(str(seed))
             print(rows[-1], flush=True)
-    print(summary(found, len(scenes)))
+    print(summary(found, len(scenes), unmeasured))
     if not chosen.only:
         text = INTRODUCTION.format(**asdict(effort), own=OWN_SAMPLES) + "\n".join(rows)
         lines = [f"- {note} Scenes {', '.join(seeds)}." for note, seeds in notes.items()]
         said = "\n\nNotes of the exporter and the fit:\n\n" + "\n".join(lines) if notes else ""
-        TABLE.write_text(f"{text}\n\n{summary(found, len(scenes))}{said}\n", "utf-8")
+        TABLE.write_text(f"{text}\n\n{summary(found, len(scenes), unmeasured)}{said}\n", "utf-8")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
     python bench/ladder.py [--scenes 30] [--size 48] [--rows ladder.jsonl] [--doc docs/ladder.md]
 
 Every scene is one line of the rows' file, so a run that was stopped goes on where it was; `--doc ""` only measures.
-Losses whose packages are missing are left out, and so is the judge ColorVideoVDP. The table and docs/ladder.svg
+Losses whose packages are missing are left out, and so is the judge ColorVideoVDP. The table and docs/pictures/ladder.svg
 replace what is there.
 """
 

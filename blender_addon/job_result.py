@@ -41,6 +41,7 @@ class JobResult:
     certainty: Mapping[str, str]
     notes: tuple[str, ...]
     seconds: float
+    weak_combinations: tuple[str, ...] = ()  # sentences on values that can be traded against each other
     image: tuple[int, int] = (0, 0)  # width and height of the job's pictures
 
 
@@ -76,6 +77,7 @@ def read_job_result(folder: Path) -> JobResult:
             certainty={str(k): str(c["level"]) for k, c in result.get("certainty", {}).items()},
             notes=tuple(map(str, result.get("notes", ()))),
             seconds=float(result.get("seconds", 0.0)),
+            weak_combinations=tuple(str(c["sentence"]) for c in result.get("weak_combinations", ())),
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:

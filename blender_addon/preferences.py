@@ -77,10 +77,13 @@ def preference(context: bpy.types.Context, name: str) -> str:
 
 
 def new_job_folder(context: bpy.types.Context, label: str) -> Path:
-    """Path of a job folder that does not exist yet, named after the time and `label`."""
+    """Path of a job folder that does not exist yet, named after the time, `label` and this process.
+
+    Two Blenders that start in the same second must not take the same one: an export replaces an earlier job.
+    """
     root = bpy.path.abspath(preference(context, "job_root")) or _default_root()
     plain = re.sub(r"[^\w-]+", "_", label)[:40].strip("_")
-    stem = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{plain}"
+    stem = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{plain}_{os.getpid()}"
     folder, n = Path(root) / stem, 1
     while folder.exists():
         n += 1

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .ply_file import TriangleMesh
 
 FARTHEST = 1e18  # metres; the square of a distance must fit into a float32
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, near 2**64 over the golden ratio (Knuth, TAOCP 3, 6.4)
 
 
 @dataclass(frozen=True)
@@ -32,33 +33,41 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     transpose. A mirroring matrix turns the winding around, so that the side a normal points to stays the outside, as in
     Cycles.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        triangle_corners = mesh.positions[slots].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-        held = (np.abs(triangle_corners) < FARTHEST).all(axis=(1, 2))  # False for NaN
-    positions = triangle_corners[held].reshape(-1, 3)
+    # sharing comes first: the corners are six times as many as the vertices of a smooth mesh
+    parts = (mesh.positions, mesh.normals, mesh.uvs)
+    rows, index = _shared(np.concatenate([part[slots].reshape(-1, part.shape[-1]) for part in parts], axis=1))
     linear = matrix[:3, :3]
-    mirrored = np.linalg.det(linear) < 0.0
+    mirrored = bool(np.linalg.det(linear) < 0.0)
     # adjugate transpose instead of the inverse: it exists for flat matrices too
     cofactor = np.stack(
         [np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])]
     )
     if mirrored:
         cofactor = -cofactor
-    normals = mesh.normals[slots][held].reshape(-1, 3).astype(np.float64) @ cofactor.T
-    lengths = np.linalg.norm(normals, axis=1)
-    flat = _face_normals(positions.reshape(-1, 3, 3), mirrored)
-    normals = np.where(lengths[:, None] > 1e-20, normals / np.maximum(lengths, 1e-20)[:, None], flat)
+    with np.errstate(invalid="ignore", over="ignore"):
+        positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
+        held = (np.abs(positions) < FARTHEST).all(axis=1)  # False for NaN
+        if not held.all():
+            rows, index = _shared(rows[index[np.repeat(held[index].reshape(-1, 3).all(axis=1), 3)]])
+            positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
+        normals = rows[:, 3:6].astype(np.float64) @ cofactor.T
+        lengths = np.linalg.norm(normals, axis=1)
+    without = ~(lengths > 1e-20)  # True for NaN
+    normals = np.where(without[:, None], 0.0, normals) / np.where(without, 1.0, lengths)[:, None]
     # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
-    uvs = np.nan_to_num(mesh.uvs[slots][held].reshape(-1, 2), posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
-    corners = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
-    vertices, index = _shared(corners + np.float32(0.0))  # -0.0 and 0.0 are one vertex
+    uvs = np.nan_to_num(rows[:, 6:], posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
+    rows = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
+    if without.any():  # such a corner takes the normal of its triangle
+        rows, without = rows[index], without[index]
+        rows[without, 3:6] = _face_normals(positions[index].reshape(-1, 3, 3), mirrored)[without]
+        rows, index = _shared(rows)
     triangles = index.reshape(-1, 3).astype(np.int32)
     if mirrored:
         triangles = triangles[:, ::-1]
     return TriangleMesh(
-        np.ascontiguousarray(vertices[:, :3]),
-        np.ascontiguousarray(vertices[:, 3:6]),
-        np.ascontiguousarray(vertices[:, 6:]),
+        np.ascontiguousarray(rows[:, :3]),
+        np.ascontiguousarray(rows[:, 3:6]),
+        np.ascontiguousarray(rows[:, 6:]),
         np.ascontiguousarray(triangles),
     )
 
@@ -84,11 +93,15 @@ def turned(mesh: TriangleMesh, offset: float) -> TriangleMesh:
 
 def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Return the distinct rows of `rows` (n, 8) and the index of each row among them."""
-    # sorting 64-bit hashes takes a tenth of the time of sorting rows
-    factors = np.random.default_rng(0).integers(1, 2**63, rows.shape[1], dtype=np.uint64) * np.uint64(2) + np.uint64(1)
-    hashes = (rows.view(np.uint32).astype(np.uint64) * factors).sum(axis=1, dtype=np.uint64)
-    _, first, index = np.unique(hashes ^ (hashes >> np.uint64(32)), return_index=True, return_inverse=True)
-    if (rows[first][index] == rows).all():
+    rows = rows + np.float32(0.0)  # -0.0 and 0.0 are one
+    # sorting 64-bit hashes takes a tenth of the time of sorting rows; two numbers at a time are one of 64 bits
+    pairs = rows.view(np.uint64)
+    hashes = np.zeros(len(rows), np.uint64)
+    for column in range(pairs.shape[1]):
+        hashes = (hashes ^ pairs[:, column]) * _FACTOR
+        hashes ^= hashes >> np.uint64(32)
+    _, first, index = np.unique(hashes, return_index=True, return_inverse=True)
+    if (pairs[first][index] == pairs).all():  # as bits, since NaN is not equal to itself
         return rows[first], index
     _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)  # two rows had one hash
     return rows[first], index.reshape(-1)

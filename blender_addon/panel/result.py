@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from .. import previews
+from .. import previews, shown_result
+from .layout import draw_sentence
 
 # levels of result.json: icon before the value, and its meaning in the legend
 _CERTAINTY = {
@@ -42,6 +43,9 @@ class Result:
         column.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         if runtime.has_result:
             draw_table(layout, runtime.values, "Value")
+            found = shown_result.result
+            for sentence in found.weak_combinations if found is not None else ():
+                draw_sentence(layout, context, sentence, "QUESTION")
 
 
 def draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection, title: str) -> None:

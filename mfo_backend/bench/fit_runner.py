@@ -12,16 +12,17 @@ from typing import Any
 from ..fit.fit_material import FitOutcome
 from ..fit.settings import FitSettings
 from ..job.atomic_file import write_atomically
-from ..types.errors import UnrecordableError
+from ..types.errors import SetupError, UnrecordableError
 from ..types.image import Pixels
 from ..types.status import Status
 from .assets import Assets
 from .busy import BusyMark
+from .cycles_scene import CallsBlender, write_cycles_scene
 from .judge import Judge, TruePictures
 from .method import METHODS, method_settings, warm_up_settings
 from .row import Row, Task
 from .row_pictures import picture_file, shown_picture
-from .scenario import SCENARIOS
+from .scenario import SCENARIOS, Scenario
 from .scene import SHAPE, BenchScene, write_scene
 from .stopwatch import Stopwatch
 from .wrapped_renderer import NewSeeds
@@ -48,7 +49,14 @@ class FitRunner:
     """
 
     def __init__(
-        self, folder: Path, size: int, assets: Assets, pictures: Path | None = None, *, threads: int = 0
+        self,
+        folder: Path,
+        size: int,
+        assets: Assets,
+        pictures: Path | None = None,
+        *,
+        threads: int = 0,
+        host: CallsBlender | None = None,
     ) -> None:
         from ..render.llvm import configure_llvm, needs_llvm
 
@@ -65,6 +73,7 @@ class FitRunner:
         self._folder = folder
         self._assets = assets
         self._kept_at = pictures
+        self._host = host
         self._warm: set[tuple[str, str]] = set()
         self._at: tuple[str, int] | None = None
         self._scene: BenchScene
@@ -94,11 +103,18 @@ class FitRunner:
         if self._at != at:
             self._at = None
             folder = self._folder / f"{task.scenario}-{task.scene:03d}"
-            self._scene = write_scene(SCENARIOS[task.scenario], task.scene, self.size, self._assets, folder)
+            self._scene = self._write(SCENARIOS[task.scenario], task.scene, folder)
             self._judge = Judge(self._scene, pictures)
             self._at = at
             self._keep_picture(Task(*at, "reference"), self._judge.pictures.reference)
             self._keep_picture(Task(*at, "truth"), self._judge.pictures.truth[0])
+
+    def _write(self, scenario: Scenario, number: int, folder: Path) -> BenchScene:
+        if not scenario.cycles:
+            return write_scene(scenario, number, self.size, self._assets, folder)
+        if self._host is None:
+            raise SetupError("Scenes of Cycles need the bpy module or a Blender program, and one process.")
+        return write_cycles_scene(scenario, number, self.size, self._host, folder)
 
     def _fit(self, task: Task, settings: FitSettings, should_stop: Callable[[], bool]) -> _Measured:
         from ..fit.fit_material import fit_material
@@ -162,11 +178,13 @@ class FitRunner:
             relative_rmse=difference.relative_rmse,
             jod=difference.jod,
             q_jod=difference.q_jod,
-            relit_relative_rmse=sum(d.relative_rmse for d in relit) / len(relit),
+            relit_relative_rmse=sum(d.relative_rmse for d in relit) / len(relit) if relit else None,
             relit_flips=[d.flip for d in relit],
+            reference_flip=judge.reference_flip(picture),
             start_flip=start.flip,
             floor_flip=floor.flip,
             floor_relative_rmse=floor.relative_rmse,
+            gap_flip=judge.pictures.gap_flip,
             stages=[
                 {
                     "name": stage.name,

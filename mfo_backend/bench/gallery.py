@@ -43,4 +43,4 @@ def _figure(pictures: Path, task: Task, caption: str) -> str:
         data = base64.b64encode(picture_file(pictures, task).read_bytes()).decode("ascii")
     except OSError:
         return ""
-    return f'<img alt="{escape(caption)}" title="{escape(caption)}" src="data:image/png;base64,{data}">'
+    return f'<img alt="{escape(caption)}" title="{escape(caption)}" src="data:image/jpeg;base64,{data}">'

@@ -17,6 +17,7 @@ from ..metrics.judges.judgement import judge_images
 from ..metrics.judges.packages import require_pycvvdp
 from ..render.plain_picture import PlainScene
 from ..render.renderer import Renderer, load_renderer
+from ..scene.image_file import read_image
 from ..types.errors import MfoError
 from ..types.image import Encoding, Image, Pixels
 from ..types.parameter import Value
@@ -25,7 +26,7 @@ from .scene import SHAPE, BenchScene
 # far from each other and from the seeds of fits, which are the scenes' numbers and those ^ VERIFY_STREAM
 _REFERENCE_STREAM, _JUDGE_STREAM = 0x0BEF0000, 0x70D6E000
 JUDGE_SPP = 256
-UNPAIRED_SPP = 1024  # where the truth is another material, so that noise is not the same in both pictures
+UNPAIRED_SPP = 512  # where the truth is another material's or renderer's, so that noise is not the same in both
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class TruePictures:
     """What only depends on the scene: it is rendered once and can be sent to another process.
 
     `truth` is under the reference's light and then under those of the judge; `floor` is the difference of the
-    reference from it, its noise, and `start` that of the start.
+    reference from it, its noise, and `start` that of the start. `gap_flip` is that of our own picture of the true
+    values where another renderer made the truth.
     """
 
     reference: Pixels
@@ -52,6 +54,7 @@ class TruePictures:
     mask: NDArray[np.bool_]
     floor: Difference
     start: Difference
+    gap_flip: float | None = None
 
 
 class Judge:
@@ -62,7 +65,7 @@ class Judge:
         self._renderers = [self._load(file) for file in (scene.file, *scene.relit)]
         self._renderer = self._renderers[0]
         self._seed = _JUDGE_STREAM + scene.number
-        self._spp = JUDGE_SPP if scene.truth else UNPAIRED_SPP
+        self._spp = JUDGE_SPP if scene.truth and not scene.given else UNPAIRED_SPP
         table = self._renderer.table
         self.truth = table.clip(table.pack(scene.truth)) if scene.truth else None
         self.pictures = pictures or self._render()
@@ -86,7 +89,11 @@ class Judge:
 
     def flip(self, values: Mapping[str, Value]) -> float:
         """Mean FLIP alone, without the judges' scores."""
-        return _difference(self.pictures.truth[0], self.picture(values), self.pictures.mask, judges=False).flip
+        return self._flip(self.pictures.truth[0], self._renderer.table.pack(values), self.pictures.mask)
+
+    def reference_flip(self, picture: Pixels) -> float:
+        """Mean FLIP of a picture of the judge's and the reference, whose noise is in it."""
+        return _difference(picture, self.pictures.reference, self.pictures.mask, judges=False).flip
 
     def relit(self, values: Mapping[str, Value]) -> list[Difference]:
         """The same under the lights no fit sees."""
@@ -111,7 +118,10 @@ class Judge:
     def _render(self) -> TruePictures:
         scene, spp = self._scene, self._scene.scenario.reference_spp
         seed = _REFERENCE_STREAM + scene.number
-        if self.truth is None:
+        if scene.given:
+            reference, true = (read_image(file).pixels for file in scene.given)
+            truth = (true,)
+        elif self.truth is None:
             plain = [PlainScene(file) for file in scene.true_files]
             reference = plain[0].image(seed=seed, spp=spp)
             truth = tuple(one.image(seed=self._seed, spp=self._spp) for one in plain)
@@ -121,7 +131,11 @@ class Judge:
         mask = self._renderer.target_mask()
         floor = _difference(truth[0], reference, mask)
         start = _difference(truth[0], self._picture(self._renderer, self._renderer.start), mask)
-        return TruePictures(reference, truth, mask, floor, start)
+        gap = self._flip(truth[0], self.truth, mask) if scene.given and self.truth is not None else None
+        return TruePictures(reference, truth, mask, floor, start, gap)
+
+    def _flip(self, truth: Pixels, vector: NDArray[np.float64], mask: NDArray[np.bool_]) -> float:
+        return _difference(truth, self._picture(self._renderer, vector), mask, judges=False).flip
 
     def _load(self, file: Path) -> Renderer:
         chosen = self._scene.scenario

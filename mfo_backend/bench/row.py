@@ -51,8 +51,12 @@ class Row:
         the last is the root of the mean square difference over the root of the mean square.
     jod, q_jod
         ColorVideoVDP's and HDR-VDP-3's score of the same pictures, None where they are not installed.
+    reference_flip
+        Of the reference and the picture of the recovered values: less `floor_flip` it is the error above the noise.
     start_flip, floor_flip, floor_relative_rmse
         The same for the start, and for the reference itself: its noise.
+    gap_flip
+        FLIP of our own picture of the true values, where Cycles made the truth.
     relit_relative_rmse, relit_flips
         The same under lights that the fit did not see, the first their mean.
     stages
@@ -86,9 +90,11 @@ class Row:
     q_jod: float | None = None
     relit_relative_rmse: float | None = None
     relit_flips: list[float] = field(default_factory=list)
+    reference_flip: float | None = None
     start_flip: float | None = None
     floor_flip: float | None = None
     floor_relative_rmse: float | None = None
+    gap_flip: float | None = None
     stages: list[dict[str, Any]] = field(default_factory=list)
     parameter_errors: dict[str, float] = field(default_factory=dict)
     truth: dict[str, Value] = field(default_factory=dict)

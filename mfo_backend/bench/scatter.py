@@ -23,7 +23,10 @@ from .run_bench import Runner, failed_row, measured_row
 class Recipe(Protocol):
     """Makes a runner in a worker; equal recipes share one."""
 
-    size: int
+    @property
+    def size(self) -> int:
+        """Width and height of the pictures."""
+        ...
 
     def make(self) -> tuple[Runner, dict[str, Any]]:
         """The runner and the facts of its machine."""

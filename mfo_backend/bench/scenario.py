@@ -43,6 +43,8 @@ class Scenario:
         The reference shows a material that the fitted model cannot reach exactly.
     model
         Material model of truth and fit. Transparency is Blender's, which all methods can fit; the paper's is Disney's.
+    cycles
+        Truth and reference are Cycles' pictures of the demo's scene.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Scenario:
     neighbours: int = 0
     measured: bool = False
     model: str = "mitsuba_principled"
+    cycles: bool = False
 
 
 _TRANSPARENCY = Scenario(
@@ -84,5 +87,16 @@ OUR_SCENARIOS = (
     Scenario("relighting", "probe", "all", reference_spp=64, fit_spp=8, max_depth=3, relights=3),
     Scenario("objects", "probe", "all", reference_spp=64, fit_spp=8, max_depth=5, neighbours=3),
     Scenario("measured", "probe", "all", reference_spp=64, fit_spp=8, max_depth=3, measured=True, closed_only=True),
+    Scenario(
+        "cycles",
+        "world",
+        "all",
+        reference_spp=64,
+        fit_spp=8,
+        max_depth=0,
+        model="blender_principled",
+        relights=0,
+        cycles=True,
+    ),
 )
 SCENARIOS = {scenario.name: scenario for scenario in (*PAPER_SCENARIOS, *OUR_SCENARIOS)}

@@ -36,6 +36,10 @@ class BenchScene:
         The same scenes with the true material where the fitted model has no values for it, else empty.
     truth
         The true values; empty where there are none.
+    sockets, light_paths
+        Of an exported scene: its materials and what Cycles does to indirect light.
+    given
+        Files of the reference and of the true picture where another renderer makes them.
     """
 
     scenario: Scenario
@@ -48,11 +52,14 @@ class BenchScene:
     true_files: tuple[Path, ...]
     truth: Mapping[str, Value] = field(repr=False)
     start: Mapping[str, Value] = field(repr=False)
+    sockets: Mapping[str, Any] | None = field(default=None, repr=False)
+    light_paths: Any = None
+    given: tuple[Path, Path] | None = None
 
     @property
     def materials(self) -> dict[str, Any]:
         """Sockets of the start, where the scenario's model has them."""
-        return materials_of(self.scenario, self.start)
+        return materials_of(self.scenario, self.start) if self.sockets is None else dict(self.sockets)
 
 
 def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, folder: Path) -> BenchScene:

@@ -19,7 +19,9 @@ TARGETS = (0.1, 0.05, SOLVED_FLIP)
 class Summary:
     """One method in one scenario.
 
-    `solved` and `close` count runs with a mean FLIP of at most 0.02 and 0.05. `seconds` are of runs that did not
+    `solved` and `close` count runs with a mean FLIP of at most 0.02 and 0.05,
+    `at_noise` those whose picture differs from the reference by no more than 0.02 above what the true one does.
+    `seconds` are of runs that did not
     raise: median and 90th percentile. `seconds_per_solved` is the time of all runs over the number solved.
     `flip` holds the quartiles of all runs, `relit_flip` the median under all lights no fit saw, `jod` mean and minimum.
     """
@@ -30,6 +32,7 @@ class Summary:
     raised: int
     solved: int
     close: int
+    at_noise: int
     seconds: tuple[float, float]
     seconds_per_solved: float
     passes: float
@@ -100,6 +103,7 @@ def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
         raised=sum(bool(row.error) for row in rows),
         solved=solved,
         close=sum(flip <= 0.05 for flip in flips),
+        at_noise=sum(_above_noise(row) <= SOLVED_FLIP for row in rows),
         seconds=(quantile(seconds, 0.5), quantile(seconds, 0.9)),
         seconds_per_solved=sum(seconds) / solved if solved else math.inf,
         passes=quantile([row.passes for row in rows if row.passes is not None], 0.5),
@@ -109,6 +113,12 @@ def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
         relit_flip=quantile([flip for row in rows for flip in (row.relit_flips or [math.inf])], 0.5),
         jod=(sum(jods) / len(jods), min(jods)) if jods else (math.nan, math.nan),
     )
+
+
+def _above_noise(row: Row) -> float:
+    if row.reference_flip is None or row.floor_flip is None:
+        return math.inf
+    return error_of(row.reference_flip) - row.floor_flip
 
 
 def _place(name: str, order: Sequence[str]) -> int:

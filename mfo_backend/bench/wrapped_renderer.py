@@ -16,23 +16,25 @@ class WrappedRenderer:
     def __init__(self, renderer: Renderer) -> None:
         self._renderer = renderer
         self.model, self.table, self.start = renderer.model, renderer.table, renderer.start
-
-    @property
-    def passes(self) -> float:
-        """See `Renderer.passes`."""
-        return self._renderer.passes
-
-    @passes.setter
-    def passes(self, value: float) -> None:
-        self._renderer.passes = value
+        self.passes = renderer.passes
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`."""
-        return self._renderer.image(vector, seed=seed, spp=spp)
+        image = self._renderer.image(vector, seed=seed, spp=spp)
+        self.passes = self._renderer.passes
+        return image
 
     def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Pullback]:
         """See `Renderer.image_and_pullback`."""
-        return self._renderer.image_and_pullback(vector, seed=seed, spp=spp)
+        image, pullback = self._renderer.image_and_pullback(vector, seed=seed, spp=spp)
+        self.passes = self._renderer.passes
+
+        def counted(pixel_gradient: Pixels) -> Vector:
+            gradient = pullback(pixel_gradient)
+            self.passes = self._renderer.passes
+            return gradient
+
+        return image, counted
 
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer.target_mask`."""

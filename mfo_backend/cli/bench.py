@@ -20,9 +20,10 @@ from ..bench.scenario import SCENARIOS
 from ..job.cluster import open_client, threads_each
 from ..job.progress_bar import terminal_columns
 from ..job.stop import StopSignal
-from ..types.errors import BadInputError
+from ..types.errors import BadInputError, MfoError
 from ..types.status import Status
 from .bench_surface import add_surface_parser
+from .blender_host import BlenderHost, find_blender_host
 from .cluster_options import add_cluster_options
 
 
@@ -65,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..bench.fit_runner import FitRunner
     from ..bench.machine import machine_facts
 
-    runner = FitRunner(arguments.out / "scenes", arguments.size, assets, pictures)
+    runner = FitRunner(arguments.out / "scenes", arguments.size, assets, pictures, host=_blender())
     machine = machine_facts(runner.variant)
     return work(arguments, partial(run_bench, runner=runner, machine=machine, log=partial(_log, arguments.out)))
 
@@ -76,7 +77,7 @@ def work(arguments: argparse.Namespace, bench: Callable[..., bool]) -> int:
 
     file = RowFile(arguments.out)
     methods = arguments.method or [m for m in DEFAULT_METHODS if can_run(m)]
-    tasks = all_tasks(arguments.scenario or SCENARIOS, methods, arguments.scenes)
+    tasks = all_tasks(arguments.scenario or _scenarios(arguments), methods, arguments.scenes)
     stop = StopSignal()
     with file.only_writer(), stop.watching():
         done = {row.key for row in file.read()}
@@ -104,6 +105,21 @@ def can_run(method: str) -> bool:
     if missing:
         print(f"mfo: without {method}: {missing}", file=sys.stderr)
     return not missing
+
+
+def _scenarios(arguments: argparse.Namespace) -> list[str]:
+    """All scenarios, without Cycles' where they cannot run."""
+    here = not (arguments.scheduler or arguments.workers) and _blender() is not None
+    if not here:
+        print("mfo: without cycles: it needs Blender, and one process.", file=sys.stderr)
+    return [name for name, scenario in SCENARIOS.items() if here or not scenario.cycles]
+
+
+def _blender() -> BlenderHost | None:
+    try:
+        return find_blender_host()
+    except MfoError:
+        return None
 
 
 def _log(folder: Path, text: str) -> None:

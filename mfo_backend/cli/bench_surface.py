@@ -7,6 +7,8 @@ import argparse
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from ..bench.method import METHODS
 from ..bench.scenario import SCENARIOS
 from ..types.errors import BadInputError
@@ -46,7 +48,8 @@ def run_surface(arguments: argparse.Namespace) -> int:
         size=arguments.size, grid=arguments.grid, folder=(folder / "scene").absolute(),
     )  # fmt: skip
     (folder / "surface.svg").write_text(surface_svg(surface), "utf-8")
-    view = DisplayView.for_scene(surface.pictures["truth"], (surface.pictures["truth"] > 0).any(axis=2))
+    lit = np.asarray(surface.pictures["truth"].max(axis=2) > 0.0)
+    view = DisplayView.for_scene(surface.pictures["truth"], lit)
     for name, pixels in surface.pictures.items():
         (folder / f"{name}.png").write_bytes(png_bytes(displayed_linear(pixels, view)))
     for name, flip in surface.flips.items():

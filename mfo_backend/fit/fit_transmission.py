@@ -14,7 +14,7 @@ from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..types.certainty import Certainty, Level
 from ..types.event import Listener, Preview, Started
-from ..types.image import Encoding, Image
+from ..types.image import Encoding, Image, Pixels
 from ..types.parameter import ParameterTable
 from ..types.result import FitResult
 from ..types.status import Status
@@ -28,6 +28,7 @@ from .uncertainty import WEAK_BELOW, certainties
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 
 STAGES = ("scan", "race", "polish")
+_PATHS_OF_A_PART = 1 << 20
 Vector = NDArray[np.float64]
 
 
@@ -84,7 +85,7 @@ def fit_transmission(
     seed = settings.seed ^ VERIFY_STREAM
     stopped = should_stop()
     spp = min(CANCELLED_SPP, settings.verify_spp) if stopped else settings.verify_spp
-    pictures = [Candidate(x, renderer.image(x, seed=seed, spp=spp)) for x in (renderer.start, found)]
+    pictures = [Candidate(x, _picture(renderer, x, seed, spp, should_stop)) for x in (renderer.start, found)]
     listener(Preview(pictures[-1].image))
     name = "flip-ldr" if ldr else "flip-hdr"
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
@@ -108,6 +109,19 @@ def fit_transmission(
         notes=tuple(notes),
     )
     return FitOutcome(result, pictures[0].image, pictures[best].image)
+
+
+def _picture(renderer: MitsubaRenderer, x: Vector, seed: int, spp: int, should_stop: Callable[[], bool]) -> Pixels:
+    """A path-traced picture in parts of about a million paths, so that a request to stop need not wait for all."""
+    passes, done, total = renderer.passes, 0, None
+    part = max(1, min(spp, _PATHS_OF_A_PART // renderer.target_mask().size))
+    while total is None or (done < spp and not should_stop()):
+        count = min(part, spp - done)
+        image = renderer.image(x, seed=seed + done, spp=count).astype(np.float64) * count
+        total = image if total is None else total + image
+        done += count
+    renderer.passes = passes + 1.0
+    return (total / done).astype(np.float32)
 
 
 def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certainty]:

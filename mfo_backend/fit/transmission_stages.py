@@ -38,24 +38,24 @@ TRUST = 0.25  # of the range: the longest step
 class TransmissionPlan:
     """How much a fit on traced paths does.
 
-    `*_pixels` bounds the pixels a stage looks at, `*_samples` are paths a pixel in each of the two halves; `race_steps`
-    and `polish_steps` bound the iterations, `starts` the nodes that race, besides the scene's own material. The polish
-    ends when the error that is left is expected to be below the share `enough` of the reference's noise (squares;
-    0.02 is one per cent of the root).
+    `*_pixels` bounds the pixels a stage looks at, `*_samples` are paths a pixel in each of the two halves and
+    `polish_paths` those of all pixels; `race_steps` and `polish_steps` bound the iterations, `starts` the nodes that
+    race, besides the scene's own material. The polish ends when the error that is left is expected to be below the
+    share `enough` of the reference's noise (squares; 0.02 is one per cent of the root).
     """
 
     scan_pixels: int = 500
     scan_samples: int = 4
-    scan_steps: int = 3
+    scan_steps: int = 2
     starts: int = 2
-    race_pixels: int = 4000
+    race_pixels: int = 3000
     race_samples: int = 8
     race_steps: int = 7
     polish_pixels: int = 16_000
-    polish_samples: int = 8
-    polish_steps: int = 24
+    polish_paths: int = 40_000
+    polish_steps: int = 32
     guard_samples: int = 16
-    enough: float = 0.006
+    enough: float = 0.003
 
 
 @dataclass
@@ -187,6 +187,7 @@ class TransmissionFit:
             frozen = self._extras.copy()
             for name in held:
                 frozen[table.slice_of(name)] = True
+            equations: list[NormalEquations] = []
             for turn in range(plan.scan_steps + 1):
                 rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
                 equations = [_two_half(*pair) for pair in rows]
@@ -266,17 +267,19 @@ class TransmissionFit:
         x, variance, floor = start.copy(), np.diag(self._width**2), 0.0
         equations, noise = None, variance
         single = self.tiles(1, plan.polish_pixels)
+        # few pixels need more paths each: products of two noisy numbers average slowly
+        samples = int(np.clip(plan.polish_paths // len(single), 4, 16))
         tiles, pool = single, CrossProducts(3, columns)
         for turn in range(plan.polish_steps):
             seed = self._seed(stream + turn)
             if turn == 0:
-                (table,) = self._tables(single, x[None], seed, plan.polish_samples, True, True, True)
+                (table,) = self._tables(single, x[None], seed, samples, True, True, True)
                 halves = np.split(table, 2)
                 floor = 2.0 * _two_half(*(single.rows(half) for half in halves)).cost
                 tiles, pair = self._best_tiles(single, halves)
                 pool = CrossProducts(3 * len(tiles), columns)
             else:
-                (pair,) = self.halves(tiles, x[None], seed=seed, samples=plan.polish_samples, near=True)
+                (pair,) = self.halves(tiles, x[None], seed=seed, samples=samples, near=True)
             if self.course.should_stop():
                 break
             if turn in (1, 2):

@@ -155,9 +155,10 @@ def _compensation(white: tuple[Any, Any] | None, mean_fresnel: Any) -> Compensat
 
 def _add_sheen(stack: dict[str, Any], p: Mapping[str, Any], w: Any, view: Any) -> Any:
     shape = sheen_lobe(view, saturate(p["sheen_roughness"]))
-    albedo = at_least(p["sheen_weight"], 0) * at_least(p["sheen_tint"], 0) * shape.albedo
-    stack |= {"sheen": w * albedo, "sheen_shape": shape}
-    return w * saturate(1 - largest(albedo))
+    albedo, tint = at_least(p["sheen_weight"], 0) * shape.albedo, at_least(p["sheen_tint"], 0)
+    stack |= {"sheen": w * albedo * tint, "sheen_shape": shape}
+    # of the tint alone: at weight 0 all channels of the product are equal, and the slope would be that of any of them
+    return w * saturate(1 - albedo * largest(tint))
 
 
 def _add_coat(stack: dict[str, Any], p: Mapping[str, Any], w: Any, mu: Any, model: CyclesModel) -> Any:

@@ -53,7 +53,7 @@ class MitsubaPrincipled:
     scanned: tuple[str, ...] = ("roughness", "clearcoat_gloss")
     two_sided: bool = False  # the plugin needs the wrapper `twosided`
 
-    def values(self, given: Mapping[str, Value], free: Collection[str]) -> dict[str, Value]:
+    def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """All values `evaluate` needs besides the free ones, from those of a material; missing ones are the plugin's
         defaults.
 
@@ -67,7 +67,7 @@ class MitsubaPrincipled:
         unused = {"spec_trans", "specular" if "eta" in {*given, *free} else "eta", *free}
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
 
-    def bind(self, fixed: Mapping[str, Value], free: Collection[str]) -> Callable[[Mapping, Any, Any], Any]:
+    def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Callable[[Mapping, Any, Any], Any]:
         """`evaluate`, which leaves out by itself what is exactly 0."""
         return self.evaluate
 

@@ -47,6 +47,8 @@ def prepare_blender_principled(
     start = table.clip(table.pack(_constants(sockets)))
     opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in table.unpack(start).items()}
     textures = _textures(scene)
+    # a light Cycles does not sample: directions no microfacet of rough glass leads to do not count there
+    uniform = {emitter.get("type") for emitter in scene.iter("emitter")} == {"constant"}
     for bsdf in scene.findall("bsdf"):
         bsdf_id = bsdf.get("id", "")
         if bsdf_id not in materials:
@@ -58,6 +60,7 @@ def prepare_blender_principled(
             distribution=materials[bsdf_id].get("distribution", "MULTI_GGX"),
             version=materials[bsdf_id].get("blender_version", _VERSION),
             free=free,
+            unreachable_refraction=not uniform,
         )
         _rewrite(bsdf, bsdf_id, properties, textures)
     outer = target.outer

@@ -22,7 +22,7 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 from ..types.light_paths import NO_LIMIT, LightPaths
 
 PLUGIN_NAME = "cycles_path"
-_CERTAIN = 1e30  # density before the first bounce
+CERTAIN = 1e30  # density before the first bounce
 _LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
 DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
 TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
@@ -58,7 +58,7 @@ class CyclesPath(RBIntegrator):
         change = mi.Spectrum(0 if δL is None else δL)
         throughput = mi.Spectrum(1)
         first = mi.Spectrum(1 if before is None else dr.detach(before[1]))
-        least = mi.Float(_CERTAIN if before is None else dr.detach(before[0]))
+        least = mi.Float(CERTAIN if before is None else dr.detach(before[0]))
         bounce = mi.UInt32(0 if before is None else 1)
         left = mi.UInt32(self.max_depth)
         diffuse, glossy, through = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
@@ -77,7 +77,7 @@ class CyclesPath(RBIntegrator):
                 behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
                 si[skip] = behind
             valid |= (bounce == 0) & si.is_valid()
-            si.duv_dx = mi.Point2f(self._blur(least), 0)
+            si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), 0)
             bsdf = si.bsdf(ray)
 
             # light that the last direction meets
@@ -86,7 +86,7 @@ class CyclesPath(RBIntegrator):
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
             weight = dr.select(delta, 1, density / dr.maximum(density + light_density, 1e-30))
             met = throughput * weight * ds.emitter.eval(si, seen)
-            met *= self._clamp(first * met, bounce >= 2)
+            met *= clamp_factor(self.clamp_indirect, first * met, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
             ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, goes_on)
@@ -95,7 +95,7 @@ class CyclesPath(RBIntegrator):
                 value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
                 weight = dr.detach(dr.select(ds.delta, 1, ds.pdf / dr.maximum(ds.pdf + chance, 1e-30)))
                 direct = dr.select(lit, throughput * value * light * weight, 0)
-                direct = direct * self._clamp(first * direct, bounce >= 1)
+                direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
 
             bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
             onward = si.spawn_ray(si.to_world(bs.wo))
@@ -133,19 +133,21 @@ class CyclesPath(RBIntegrator):
 
         return radiance if primal else change, valid, [], radiance
 
-    def _blur(self, least: Any) -> Any:
-        """The least alpha of the microfacet lobes after bounces of which the unlikeliest had density `least`."""
-        if self.filter_glossy <= 0.0:
-            return mi.Float(0)
-        return 0.5 * dr.safe_sqrt(1 - least / self.filter_glossy)
 
-    def _clamp(self, sample: Any, indirect: Any) -> Any:
-        """What to scale a sample by whose channels add up to more than allowed."""
-        if self.clamp_indirect <= 0.0:
-            return mi.Float(1)
-        total = dr.detach(dr.sum(dr.abs(sample)))
-        limit = 3.0 * self.clamp_indirect
-        return dr.select(indirect & (total > limit), limit / total, 1)
+def least_alpha(filter_glossy: float, density: Any) -> Any:
+    """The least alpha of the microfacet lobes after bounces of which the unlikeliest had `density`."""
+    if filter_glossy <= 0.0:
+        return mi.Float(0)
+    return 0.5 * dr.safe_sqrt(1 - density / filter_glossy)
+
+
+def clamp_factor(clamp_indirect: float, sample: Any, indirect: Any) -> Any:
+    """What to scale a sample of light by, whose channels may add up to too much where it is `indirect`."""
+    if clamp_indirect <= 0.0:
+        return mi.Float(1)
+    total = dr.detach(dr.sum(dr.abs(sample)))
+    limit = 3.0 * clamp_indirect
+    return dr.select(indirect & (total > limit), limit / total, 1)
 
 
 def light_path_properties(light_paths: LightPaths) -> dict[str, float | int]:

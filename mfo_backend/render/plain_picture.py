@@ -36,6 +36,6 @@ class PlainScene:
         """Scene-linear pixels; one that Mitsuba leaves non-finite is black."""
         import mitsuba as mi
 
-        pixels = np.array(mi.render(self._scene, seed=seed, spp=spp), dtype=np.float32)[..., :3]
+        pixels = np.array(mi.render(self._scene, seed=mi.UInt32(seed), spp=spp), dtype=np.float32)[..., :3]
         pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
         return pixels

@@ -70,7 +70,7 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
     # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per
     # cent
     inside = (mi.Point2f(mi.Float(cell - cell_y * cells), mi.Float(cell_y)) + 0.5) / mi.Float(cells)
-    offset, sign = _through_filter(film.rfilter(), inside)
+    offset, sign = through_filter(film.rfilter(), inside)
     weight = 1.0 / mi.Float(cells * cells)
     if sign is not None:
         total = dr.zeros(mi.Float, len(order))
@@ -85,7 +85,7 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
     return PrimaryRays(ray, position, weight, order, tile)
 
 
-def _through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:
+def through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:
     """Offsets from the pixel centre with density |filter|, and the filter's sign where it has one."""
     if rfilter.is_box_filter():
         return u - 0.5, None

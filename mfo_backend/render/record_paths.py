@@ -104,7 +104,8 @@ def record_paths(
             si = _face_camera(si)
         held = ()
         if settings.held:
-            values = shape.bsdf().values_at(si, mi.Bool(True))
+            plugin: Any = shape.bsdf()
+            values = plugin.values_at(si, mi.Bool(True))
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
         dr.eval(si, position, filter_weight, held)
         hits = _Hits(si, position, filter_weight, held)

@@ -29,15 +29,13 @@ from ..material.principled_plugin import BlenderPrincipled
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable
 from .mitsuba_renderer import MitsubaRenderer
-from .primary_rays import _through_filter
+from .primary_rays import through_filter
 
 MOST_LANES = 1 << 18  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
 _DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmission)
 _TRANSMITS = (
-    int(mi.BSDFFlags.GlossyTransmission)
-    | int(mi.BSDFFlags.DeltaTransmission)
-    | int(mi.BSDFFlags.DiffuseTransmission)
+    int(mi.BSDFFlags.GlossyTransmission) | int(mi.BSDFFlags.DeltaTransmission) | int(mi.BSDFFlags.DiffuseTransmission)
 )
 DEEPEST = 32  # path length of a scene without a limit
 
@@ -176,7 +174,7 @@ class TracedPaths:
         width = int(film.crop_size()[0])
         y = pixel // width
         x = pixel - y * width
-        offset, sign = _through_filter(film.rfilter(), rng.pair(0))
+        offset, sign = through_filter(film.rfilter(), rng.pair(0))
         crop = film.crop_offset()
         position = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
         position /= mi.Point2f(mi.ScalarVector2f(film.size()))
@@ -300,7 +298,10 @@ class TracedPaths:
         of_kind = (diffuse & ~through, ~diffuse & ~through, through)
         limits = self._light_paths
         most = (limits.diffuse_bounces, limits.glossy_bounces, limits.transmission_bounces)
-        bounces = [b + dr.select(counts & k, mi.UInt32(1), mi.UInt32(0)) for b, k in zip(state["bounces"], of_kind, strict=True)]
+        bounces = [
+            b + dr.select(counts & k, mi.UInt32(1), mi.UInt32(0))
+            for b, k in zip(state["bounces"], of_kind, strict=True)
+        ]
         done = mi.Bool(False)
         for count, limit in zip(bounces, most, strict=True):
             done |= count > limit

@@ -3,8 +3,8 @@
 
 Products of two noisy numbers are biased: own noise makes J^T J too large, so that steps are too short, and pulls J^T r
 towards solutions with less noise. Products of independent samples are not. `cross_equations` averages the products of
-every pair of different samples (a U-statistic, W. Hoeffding 1948); two samples are enough. What is left is noise, so the
-matrix may be indefinite and `cautious_step` raises its eigenvalues.
+every pair of different samples (a U-statistic, W. Hoeffding 1948); two samples are enough. What is left is noise, so
+the matrix may be indefinite and `SafeMatrix` raises its eigenvalues.
 """
 
 from __future__ import annotations

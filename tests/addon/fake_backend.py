@@ -125,6 +125,7 @@ def main(arguments: list[str]) -> int:
         "schema_version": 1, "status": status, "sentence": sentence, "model": "mitsuba_principled", "partial": partial,
         "initial": INITIAL, "recovered": RECOVERED, "bounds": {}, "stages": [], "seconds": 1.0, "passes": 1.0,
         "errors": {"flip": [0.21, 0.012], "hdr_flip": [0.3, 0.05], "mse": [0.1, 0.0004]},
+        "weak_combinations": [{"parameters": ["metallic"], "step": {}, "sentence": "Metallic and roughness."}],
         "certainty": {"roughness": {"sd": [0.01], "level": "determined"}, "metallic": {"sd": [0.2], "level": "weak"}},
         "notes": ["Light 'Sun': specular factor is ignored."], "versions": {}, "request_fit": request["fit"],
     }  # fmt: skip

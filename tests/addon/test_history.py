@@ -28,6 +28,10 @@ def test_results_are_kept_on_the_material_and_in_the_file(scene: SimpleNamespace
     bpy = scene.bpy
     fit(scene)
     fit(scene, job_folder=scene.job + "2", preset="fast")
+    from blender_addon import shown_result
+
+    assert shown_result.result is not None
+    assert shown_result.result.weak_combinations == ("Metallic and roughness.",)
     history = glaze(scene).mfo.history
     assert [(e.preset, e.partial, round(e.flip, 4)) for e in history] == [
         ("fast", False, 0.012), ("balanced", False, 0.012),

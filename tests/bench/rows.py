@@ -15,7 +15,7 @@ from mfo_backend.types.status import Status
 def row(task: Task, **values) -> Row:
     common = {"seed": task.scene, "size": 16, "status": Status.CONVERGED.value, "seconds": 2.0, "passes": 30.0}
     common |= {"flip": 0.01, "hdr_flip": 0.02, "relative_rmse": 0.005, "relit_relative_rmse": 0.006}
-    common |= {"start_flip": 0.5, "floor_flip": 0.001, "floor_relative_rmse": 0.002}
+    common |= {"start_flip": 0.5, "floor_flip": 0.001, "reference_flip": 0.011, "floor_relative_rmse": 0.002}
     return Row(task.scenario, task.scene, task.method, **(common | values))
 
 

@@ -45,6 +45,10 @@ def test_summary_counts_failures(found: list[Recovery], tried: int, expected: st
     assert summary(found, tried) == expected
 
 
+def test_summary_does_not_count_what_was_not_measured() -> None:
+    assert summary([GOOD], 3, 2).startswith(f"1 of 3 {HEAD}, 0 failed, 2 are not measured. ")
+
+
 def test_table_has_every_scene_and_counts_as_its_rows_do() -> None:
     text = TABLE.read_text("utf-8")
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("| ")][1:]

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from mfo_backend.bench.findings import ablations, calibration, stage_gains, time_parts
+from mfo_backend.bench.hard_section import hard_section
 from mfo_backend.bench.paper_figures import PAPER_NAMES, paper_figure
 from mfo_backend.bench.paper_tables import paper_tables
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.table import Table, minutes, number
+from mfo_backend.types.errors import BadInputError
 
 from .rows import row
 
@@ -100,3 +104,24 @@ def test_a_table_is_markdown_html_and_csv():
     assert table.markdown() == ["| a | b |", "| --- | --: |", "| x < | 1,5 |"]
     assert "x &lt;" in table.html()
     assert table.csv() == 'a,b\nx <,"1,5"\n'
+
+
+def test_hard_cases_are_counted_with_their_guards(tmp_path):
+    runs = [
+        {"case": "mirror", "seed": 0, "solved": True, "error": 0.01, "finite": True, "passes": 10.0, "guards": []},
+        {"case": "mirror", "seed": 1, "solved": False, "error": 0.5, "finite": True, "passes": 30.0,
+         "guards": ["Fireflies are left out: 12 pixels.", "Kept 3 values."]},
+        {"case": "tiny", "seed": 0, "solved": True, "error": 0.0, "finite": False, "passes": 5.0, "guards": []},
+    ]  # fmt: skip
+    assert hard_section(tmp_path) is None
+    lines = [json.dumps(run) for run in runs]
+    (tmp_path / "hard.jsonl").write_text("\n".join([*lines, '{"case": "cut of']))
+    table = hard_section(tmp_path)
+    assert table is not None
+    assert table.rows == [
+        ("mirror", "2", "1 (50%)", "0.5", "20", "0", "Fireflies are left out (1); Kept values (1)"),
+        ("tiny", "1", "1 (100%)", "0", "5", "1", "–"),
+    ]
+    (tmp_path / "hard.jsonl").write_text('{"case": "tiny"}\n')
+    with pytest.raises(BadInputError, match="no hard case"):
+        hard_section(tmp_path)

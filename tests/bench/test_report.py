@@ -29,6 +29,7 @@ ROWS = [
         flip=flip,
         seconds=None if flip is None else scene + 1.0,
         relative_rmse=flip,
+        reference_flip=flip and 0.0209,
         error="" if flip else "ValueError: no <light>",
     )
     for scene, flip in enumerate(FLIPS)
@@ -38,7 +39,7 @@ OTHERS = [row(Task("base", scene, "mfo-hdr"), flip=0.03, seconds=50.0) for scene
 
 def test_a_run_that_raised_stays_in_every_share():
     (summary,) = summaries(ROWS)
-    assert (summary.runs, summary.raised, summary.solved, summary.close) == (4, 1, 2, 3)
+    assert (summary.runs, summary.raised, summary.solved, summary.close, summary.at_noise) == (4, 1, 2, 3, 3)
     assert summary.seconds == pytest.approx((2.0, 2.8))  # of 1, 2, 3
     assert summary.seconds_per_solved == 3.0  # (1 + 2 + 3) / 2
     assert summary.flip == pytest.approx((0.0145, 0.0295, math.inf))  # of 0.001, 0.019, 0.04 and infinity
@@ -88,8 +89,8 @@ def test_the_report_says_what_raised_and_loads_nothing(tmp_path):
     for one in [*ROWS, *OTHERS]:
         RowFile(tmp_path).append(one)
     text = write_report(tmp_path, notes=["The machine was shared & busy."])
-    assert "| fast | 4 | 1 | 2 (50%) | 3 (75%) | 2 | 2.8 | 3 | 30 | 0.0145 | 0.0295 | – |" in text
-    assert "| mfo-hdr | 4 | 0 | 0 (0%) | 4 (100%) | 50 | 50 | – |" in text
+    assert "| fast | 4 | 1 | 2 (50%) | 3 (75%) | 3 (75%) | 2 | 2.8 | 3 | 30 | 0.0145 | 0.0295 | – |" in text
+    assert "| mfo-hdr | 4 | 0 | 0 (0%) | 4 (100%) | 4 (100%) | 50 | 50 | – |" in text
     assert "| base | fast | 1 | ValueError: no <light> |" in text
     assert "busy" in write_report(tmp_path)  # kept
     assert (tmp_path / "report.md").read_text("utf-8") == text

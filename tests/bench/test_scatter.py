@@ -17,6 +17,7 @@ from mfo_backend.bench.row import Task
 from mfo_backend.bench.row_file import RowFile
 from mfo_backend.bench.run_bench import all_tasks, run_bench
 from mfo_backend.bench.scatter import run_scattered
+from mfo_backend.job.batch import run_there
 from mfo_backend.job.cluster import as_they_come, open_client
 from mfo_backend.types.errors import BadInputError, SetupError
 from tests.bench.rows import FakeRecipe, NotingRunner
@@ -83,6 +84,12 @@ def test_a_stopped_bench_goes_on_where_it_was(tmp_path, client):
     assert 0 < len(RowFile(tmp_path).read()) < len(TASKS)
     assert scatter(tmp_path, client, replace(recipe, seconds=0.0))
     assert len(RowFile(tmp_path).path.read_text().splitlines()) == len(TASKS)
+
+
+def test_jobs_run_on_workers_too(tmp_path, client):
+    (tmp_path / "request.json").write_text('{"schema_version": 99}')
+    (end,) = run_there([str(tmp_path)], client, lambda: False)
+    assert (end.job, end.status) == (str(tmp_path), "bad_input")
 
 
 def test_no_scheduler_is_said_in_one_sentence(monkeypatch):

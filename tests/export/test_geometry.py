@@ -269,3 +269,14 @@ def test_mitsuba_command_renders(scene: Any, export: Any, tmp_path: Path) -> Non
     pixels = next(iter(OpenEXR.File(str(out)).channels().values())).pixels
     assert pixels.shape == (32, 32, 3)
     assert pixels.mean() > 0.1
+
+
+def test_an_export_says_how_far_it_is(scene: Any, export: Any) -> None:
+    world_color(scene, 1.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=6.0)
+    told: list[float] = []
+    export(target, tell=told.append)
+    assert told == sorted(told)
+    assert told[-1] >= 0.9
+    assert len(told) >= 3

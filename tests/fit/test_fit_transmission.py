@@ -42,10 +42,12 @@ def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
     renderer = load(tmp_path, size=40)
     x = renderer.table.pack(TRUTH)
     result, events = fit(renderer, renderer.image(x, seed=5, spp=32), preset="balanced")
-    assert result.status is Status.CONVERGED and not result.notes
+    assert result.status is Status.CONVERGED
+    assert not result.notes
     assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "race", "polish"]
     assert sum(isinstance(e, Started) for e in events) == 1
-    assert any(isinstance(e, Progress) for e in events) and any(isinstance(e, Preview) for e in events)
+    assert any(isinstance(e, Progress) for e in events)
+    assert any(isinstance(e, Preview) for e in events)
     found = renderer.table.pack(result.recovered)
     sd = np.concatenate([result.certainty[name].sd for name in renderer.table.names])
     assert np.all(np.abs(found - x) < 4.0 * sd + 0.005)
@@ -75,7 +77,7 @@ def test_the_start_is_kept_where_nothing_is_better(tmp_path):
     assert result.errors["flip"][1] <= result.errors["flip"][0]
 
 
-@pytest.mark.parametrize("calls", [2, 30, 60])
+@pytest.mark.parametrize("calls", [2, 12, 30])
 def test_cancel_returns_the_best_so_far(tmp_path, calls):
     renderer = load(tmp_path, size=24)
     left = iter(range(10**6))

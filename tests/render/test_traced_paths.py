@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole paths through glass with derivatives. Oracles: the integrators that render references, and finite differences."""
+"""Whole paths through glass with derivatives. Oracles: the integrators of references, and finite differences."""
 
 from __future__ import annotations
 

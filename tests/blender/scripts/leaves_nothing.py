@@ -17,6 +17,9 @@ def leftovers() -> list[str]:
         handlers = getattr(bpy.app.handlers, name)
         if isinstance(handlers, list):
             found += [f"{name}: {h}" for h in handlers if "material_fit" in getattr(h, "__module__", "")]
+    for name in ("VIEW3D_MT_object", "MATERIAL_MT_context_menu"):
+        drawn = getattr(getattr(bpy.types, name).draw, "_draw_funcs", ())
+        found += [f"{name}: {f}" for f in drawn if "material_fit" in getattr(f, "__module__", "")]
     return found
 
 

@@ -85,14 +85,13 @@ def start():
 def story():
     yield from show_panel()
     yield from until(lambda: state.current.name == "NOT_INSTALLED", 10)
-    yield 0.5
+    yield 2.5  # panels slide open
     shot("setup_1_not_installed")
     start()
     assert state.current.name == "INSTALLING"
     yield from until(lambda: state.current.step == "Making the environment", 30)
     yield 0.5
     shot("setup_2_installing")
-    yield from show_preferences()
     assert bpy.ops.mfo.cancel_install() == {"FINISHED"}
     yield from until(lambda: state.current.name == "NOT_INSTALLED", 20)
     assert not list(state.backend_root().glob("env-*"))
@@ -106,6 +105,8 @@ def story():
     assert len(state.current.problems) == 1, state.current
     yield 0.5
     shot("setup_3_broken")
+    yield from show_preferences()
+    shot("setup_4_preferences")
     preferences().backend_python = ""
     assert bpy.ops.mfo.remove_backend() == {"FINISHED"}
     assert not state.backend_root().exists()
