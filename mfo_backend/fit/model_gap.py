@@ -54,4 +54,4 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
 def _block_sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
     height, width = (n // BLOCK for n in values.shape[:2])
     cut = values[: height * BLOCK, : width * BLOCK]
-    return cut.reshape(height, BLOCK, width, BLOCK, -1).sum(axis=(1, 3))
+    return cut.reshape(height, BLOCK, width, BLOCK, values.shape[2]).sum(axis=(1, 3))

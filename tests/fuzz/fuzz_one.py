@@ -33,7 +33,7 @@ def main() -> None:
     quoted = ("".join(f"\\x{byte:02x}" for byte in word) for word in target.words)
     dictionary.write_text("".join(f'"{word}"\n' for word in quoted))
     options = [
-        f"-max_total_time={seconds}", "-max_len=4096", "-timeout=20", "-rss_limit_mb=3000", "-print_final_stats=1",
+        f"-max_total_time={seconds}", "-max_len=4096", "-timeout=120", "-rss_limit_mb=3000", "-print_final_stats=1",
         f"-artifact_prefix={crashes}/{name.replace(' ', '_')}_", "-verbosity=0",
         *([f"-dict={dictionary}"] if target.words else []),
     ]  # fmt: skip

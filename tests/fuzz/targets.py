@@ -220,6 +220,7 @@ def _pictures(folder: Path) -> list[Target]:
     seeds = {suffix: tuple(p.read_bytes() for p in sorted(folder.glob(f"[ab].{suffix}"))) for suffix in SUFFIXES}
     seeds["hdr"] = (_radiance(),)
     seeds["exr"] += _more_exr(folder)
+    seeds["png"] += (_deep_png(0), _deep_png(1))
     return [Target(suffix, seeds[suffix], reader(suffix), (BadInputError,), ()) for suffix in SUFFIXES]
 
 
@@ -237,6 +238,19 @@ def _more_exr(folder: Path) -> tuple[bytes, ...]:
         OpenEXR.File(header, {name: value.copy() for name, value in channels.items()}).write(str(folder / "c.exr"))
         made.append((folder / "c.exr").read_bytes())
     return tuple(made)
+
+
+def _deep_png(interlaced: int) -> bytes:
+    """3x2 pixels of 16 bits a channel, which have a reader of their own."""
+    columns = (1, 1, 1, 3) if interlaced else (3, 3)  # of each line, passes without pixels have none
+    lines = [b"\0" + bytes(range(6 * count)) for count in columns]
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", 3, 2, 16, 2, 0, 0, interlaced)),
+        (b"IDAT", zlib.compress(b"".join(lines))),
+        (b"IEND", b""),
+    )
+    parts = [struct.pack(">I", len(d)) + k + d + struct.pack(">I", zlib.crc32(k + d)) for k, d in chunks]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
 def _radiance() -> bytes:

@@ -109,7 +109,8 @@ def numbers(value: Any) -> list[Any]:
 def test_every_number_is_finite(tmp_path: Path, case: dict[str, Any]) -> None:
     status, sentence, result = run(tmp_path, **case)
     assert status.exit_code == 0, sentence
-    found = numbers(result)  # NaN and infinity are written as null
+    # NaN and infinity are written as null; a gap is null where the target fills too few blocks
+    found = numbers({key: value for key, value in result.items() if key != "model_gap"})
     assert None not in found
     assert len(found) > 50
     lines = (tmp_path / "job" / "progress.jsonl").read_text().splitlines()
