@@ -29,7 +29,8 @@ from mfo_backend.metrics.judges.color_video_vdp import ColorVideoVdp  # noqa: E4
 from mfo_backend.metrics.judges.display_light import DisplayLight  # noqa: E402
 from mfo_backend.metrics.judges.hdr_vdp import hdr_vdp_q_jods, is_configured  # noqa: E402
 from mfo_backend.metrics.judges.viewing import HDR_VIEWING  # noqa: E402
-from mfo_backend.metrics.loss import LOSS_NAMES, OPTIONAL_LOSS_NAMES, make_loss  # noqa: E402
+from mfo_backend.metrics.loss import make_loss  # noqa: E402
+from mfo_backend.metrics.loss_names import LOSS_NAMES, OPTIONAL_LOSS_NAMES  # noqa: E402
 from mfo_backend.metrics.response import nits_per_unit  # noqa: E402
 from mfo_backend.types.errors import SetupError  # noqa: E402
 from mfo_backend.types.image import Encoding, Image  # noqa: E402

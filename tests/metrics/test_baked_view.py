@@ -9,7 +9,8 @@ import pytest
 from mfo_backend.metrics.baked_view import BakedView
 from mfo_backend.metrics.colour import srgb_from_linear
 from mfo_backend.metrics.flip_loss import FlipLoss
-from mfo_backend.metrics.loss import LDR_LOSSES, make_loss
+from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.loss_names import LDR_LOSSES
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image

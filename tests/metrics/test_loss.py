@@ -8,7 +8,8 @@ import pytest
 
 from mfo_backend.metrics.flip_error import flip_error, hdr_flip_error
 from mfo_backend.metrics.flip_loss import FlipLoss
-from mfo_backend.metrics.loss import LOSS_NAMES, make_loss
+from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.loss_names import LOSS_NAMES
 from mfo_backend.metrics.response import Displayed
 from mfo_backend.metrics.squared_loss import SquaredLoss
 from mfo_backend.metrics.tone_mapping import DisplayView

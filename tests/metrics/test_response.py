@@ -8,7 +8,8 @@ import pytest
 
 from mfo_backend.metrics import itp
 from mfo_backend.metrics.itp import Itp, de_itp_map
-from mfo_backend.metrics.loss import LOSS_NAMES, make_loss
+from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.loss_names import LOSS_NAMES
 from mfo_backend.metrics.pu21 import Pu21, pu21
 from mfo_backend.metrics.response import (
     Displayed,

@@ -12,7 +12,8 @@ import pytest
 
 from mfo_backend.metrics.judges import packages
 from mfo_backend.metrics.judges.judgement import judge_images
-from mfo_backend.metrics.loss import OPTIONAL_LOSS_NAMES, make_loss
+from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.loss_names import OPTIONAL_LOSS_NAMES
 from mfo_backend.types.errors import SetupError
 from mfo_backend.types.image import Encoding, Image
 
