@@ -21,6 +21,7 @@ from .process_group import KILL, TERMINATE, own_group, signal_group
 from .progress_lines import Event, read_events
 
 LOG = "backend.log"
+RESULT, PARTIAL = "result.json", "partial.json"
 
 CANCEL_GRACE = 5.0  # seconds from the cancel command to SIGTERM; the backend promises to need one
 TERMINATE_GRACE = 3.0  # seconds from SIGTERM to SIGKILL
@@ -165,9 +166,8 @@ class JobProcess:
             fallback = _EXIT_SENTENCES.get(code, "The backend ended") + "."
             return Outcome(str(last.get("status", "failed")), str(last.get("sentence") or fallback))
         if self._cancelled:
-            return Outcome(
-                "cancelled", "Cancelled; the backend did not answer in time, so nothing of this run was kept."
-            )
+            kept = "only its best values so far were kept" if self._keep_best() else "nothing of this run was kept"
+            return Outcome("cancelled", f"Cancelled; the backend did not answer in time, so {kept}.")
         if code < 0:
             name = _signal_name(-code)
             # native code that gets no memory ends in a segmentation fault (Dr.Jit 1.5.0, Embree 3)
@@ -175,12 +175,23 @@ class JobProcess:
             cause = f"The backend {ended} ({name}); the memory may have run out, so try a lower resolution"
         else:
             cause = _EXIT_SENTENCES.get(code, f"The backend ended with the unknown exit code {code}")
+        if self._keep_best():
+            cause += "; the best values so far are kept and can be applied"
         tail = log_tail(self.folder / LOG)
         reason = next((line.strip() for line in reversed(tail.splitlines()) if line.strip()), "")
         sentence = (
             f"{cause}; its log {self.folder / LOG} ends with: {reason}" if reason else f"{cause}; its log is empty."
         )
         return Outcome(_EXIT_STATUS.get(code, "failed"), sentence, tail)
+
+    def _keep_best(self) -> bool:
+        """Make the best values so far of a dead process the result, unless it has written one."""
+        result, partial = self.folder / RESULT, self.folder / PARTIAL
+        with contextlib.suppress(OSError):
+            if partial.is_file() and not result.exists():
+                os.replace(partial, result)
+                return True
+        return False
 
     def _send(self, line: bytes) -> None:
         stdin = self._process.stdin

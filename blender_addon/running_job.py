@@ -229,7 +229,8 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
             found = read_job_result(job.process.folder)
             shown_result.show(found, job.fit.material_uid)
             unrecorded.append((found, job.fit.material_uid))
-            runtime.state = "DONE"
+            died = found.partial and found.status == "failed"  # its sentence says so beside what can be applied
+            runtime.state = "FAILED" if died else "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
     fit_queue.ended(job.fit.material_name, runtime.sentence, "CHECKMARK" if runtime.state == "DONE" else "ERROR")

@@ -118,7 +118,7 @@ _GERMAN = {
     "Wheels": "Wheels",
     "Where the reference picture comes from": "Woher das Referenzbild kommt",
     "Which values may change; sockets with a link never do": "Welche Werte sich ändern dürfen; verbundene Eingänge nie",
-    "cancelled": "abgebrochen",
+    "partial": "unvollständig",
     "linked": "verbunden",
 }
 _GERMAN_OPERATORS = {

@@ -20,7 +20,7 @@ _ABANDONED = re.compile(r"\..+\.(\d+)\.[a-z0-9_]+\.(partial|old)")  # hidden, pr
 # what a job folder may hold; a folder with anything else is somebody's own
 OWN_NAMES = {
     "request.json", "scene.xml", "meshes", "textures", "view_lut.exr", "progress.jsonl", "cancel", "result.json",
-    "pictures", "index.html", "backend.log",
+    "partial.json", "pictures", "index.html", "backend.log",
 }  # fmt: skip
 
 

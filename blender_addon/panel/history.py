@@ -26,7 +26,7 @@ class MFO_UL_history(bpy.types.UIList):
         split = layout.split(factor=0.5)
         split.label(text=item.name[5:16], icon="CHECKMARK" if applied else "TIME")
         right = split.split(factor=0.58)
-        right.label(text="cancelled" if item.partial else item.preset)
+        right.label(text="partial" if item.partial else item.preset)
         right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
 
 

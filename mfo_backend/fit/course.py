@@ -17,6 +17,7 @@ from ..types.event import Listener, Preview, Progress, StageEnd
 from ..types.image import Pixels
 from ..types.result import CurvePoint, StageReport
 from ..types.status import Status
+from .best_so_far import BestSoFar
 
 Vector = NDArray[np.float64]
 _QUIET_SECONDS = 0.05  # between two progress events; an iteration takes about a millisecond
@@ -64,6 +65,7 @@ class Course:
         self.reports: list[StageReport] = []
         self._renderer, self._listener, self._began = renderer, listener, began
         self._told = self._shown = -np.inf
+        self._best = BestSoFar(renderer, listener, began)
         self.picture: Callable[[Vector], Pixels] | None = None  # of a vector, for previews
 
     @contextmanager
@@ -74,6 +76,9 @@ class Course:
         yield stage
         if self.should_stop():
             stage.status = Status.CANCELLED
+        if stage.vector is not None:
+            self._best.found(name, stage.vector)
+        self._best.tell(at_once=True)
         vector = self._renderer.start if stage.vector is None else stage.vector
         best = float(min(stage.loss_best, stage.loss_start))
         self._listener(
@@ -112,6 +117,7 @@ class Course:
         def noted(x: Vector, loss: float) -> None:
             if loss < stage.loss_best:
                 stage.best = x.copy()
+                self._best.found(stage.name, x)
             self.note(stage, loss)
             self._show(stage, time.monotonic())
 
@@ -126,6 +132,11 @@ class Course:
         self._listener(Preview(self.picture(stage.best)))
         stage.best, self._shown = None, time.monotonic()
 
+    def reached(self, stage: Stage, x: Vector, loss: float) -> None:
+        """Note an evaluation whose vector is the best so far whatever its loss, which noise has a part in."""
+        self._best.found(stage.name, x)
+        self.note(stage, loss)
+
     def note(self, stage: Stage, loss: float) -> None:
         """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard."""
         if not stage.curve:
@@ -134,6 +145,7 @@ class Course:
         now = time.monotonic()
         seconds = now - self._began
         stage.curve.append(CurvePoint(len(stage.curve) + 1, loss, stage.loss_best, seconds, self._renderer.passes))
+        self._best.tell(now)
         if now - self._told > _QUIET_SECONDS:
             self._told = now
             self._tell(stage, loss, seconds)

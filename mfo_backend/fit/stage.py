@@ -29,6 +29,7 @@ class Step:
     best: float
     more: float
     improved: bool
+    vector: NDArray[np.float64]
     image: Pixels = field(repr=False)
 
 
@@ -84,7 +85,8 @@ def run_stage(
             best, best_loss, best_image = vector, loss, image
         status = stopping.observe(loss)
         more = _expected_iterations(stopping, schedule.levels - 1 - level)
-        on_step(Step(stopping.iterations, loss, best_loss, more if status is None else 0.0, improved, image))
+        more = more if status is None else 0.0
+        on_step(Step(stopping.iterations, loss, best_loss, more, improved, vector, image))
 
         may_go_on = level + 1 < schedule.levels and stopping.iterations < rules.max_iterations
         if status is Status.STALE and may_go_on:

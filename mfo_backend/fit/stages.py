@@ -17,6 +17,7 @@ from ..types.event import Listener, Preview, Progress, StageEnd
 from ..types.image import Pixels
 from ..types.result import CurvePoint, StageReport
 from ..types.status import Status
+from .best_so_far import BestSoFar
 from .schedule import SCHEDULES
 from .settings import FitSettings
 from .stage import StageOutcome, Step, run_stage
@@ -56,10 +57,11 @@ def run_stages(
     began = clock() if began is None else began
     candidates, reports, status = [start], [], Status.CONVERGED
     adam = _new_adam(renderer, settings)
+    best = BestSoFar(renderer, listener, began)
     for index, loss in enumerate(losses):
         if not settings.keep_optimizer_state:
             adam = _new_adam(renderer, settings)
-        log = _StageLog(renderer, loss.name, index, len(losses), listener, clock, began)
+        log = _StageLog(renderer, loss.name, index, len(losses), listener, clock, began, best)
         outcome = run_stage(
             renderer,
             loss.value_and_gradient,
@@ -92,9 +94,10 @@ class _StageLog:
         listener: Listener,
         clock: Callable[[], float],
         began: float,
+        best: BestSoFar,
     ) -> None:
         self._renderer, self._name, self._index, self._count = renderer, name, index, count
-        self._listener, self._clock, self._began = listener, clock, began
+        self._listener, self._clock, self._began, self._best = listener, clock, began, best
         self._entered = clock()
         self._previewed = -np.inf
         self._unseen: Pixels | None = None
@@ -126,6 +129,8 @@ class _StageLog:
         )
         if step.improved:
             self._unseen = step.image
+            self._best.found(self._name, step.vector)
+        self._best.tell(now)
         if self._unseen is not None and now - self._previewed >= _PREVIEW_SECONDS:
             self._previewed = now
             self._listener(Preview(self._unseen))
@@ -133,6 +138,7 @@ class _StageLog:
 
     def report(self, outcome: StageOutcome) -> StageReport:
         status = outcome.status
+        self._best.tell(self._clock(), at_once=True)
         self._listener(
             StageEnd(
                 stage=self._name,

@@ -192,7 +192,7 @@ class TransmissionFit:
                 rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
                 equations = [_two_half(*pair) for pair in rows]
                 best = int(np.argmin([e.cost for e in equations]))
-                self._note(stage, equations[best].cost)
+                self._note(stage, xs[best], equations[best].cost)
                 if turn == plan.scan_steps or frozen.all() or self.course.should_stop():
                     break
                 for i, e in enumerate(equations):
@@ -222,7 +222,7 @@ class TransmissionFit:
                 best = runners[0]
                 stage.vector = best.x
                 assert best.equations is not None
-                self._note(stage, best.equations.cost)
+                self._note(stage, best.x, best.equations.cost)
                 # those that fall behind are given up
                 if turn >= 2:
                     least = abs(best.equations.cost)
@@ -288,7 +288,7 @@ class TransmissionFit:
                 sample[:, 1:][:, frozen] = 0.0
                 pool.add(sample)
             equations, noise = cross_equations(pool.gram()), pool.gradient_noise(3)
-            self._note(stage, equations.cost)
+            self._note(stage, x, equations.cost)
             step = self._step(equations, x, 1e-3, 0.1 if turn < 2 else 0.05, frozen, noise)
             x = x + step
             pool.shifted(step)
@@ -383,8 +383,8 @@ class TransmissionFit:
     def _seed(self, stream: int) -> int:
         return (self.seed * 1009 + stream) & 0xFFFFFFFF
 
-    def _note(self, stage: Stage, cost: float) -> None:
-        self.course.note(stage, float(np.sqrt(max(2.0 * cost, 0.0))))
+    def _note(self, stage: Stage, x: Vector, cost: float) -> None:
+        self.course.reached(stage, x, float(np.sqrt(max(2.0 * cost, 0.0))))
 
 
 def _two_half(a: NDArray[np.float32], b: NDArray[np.float32]) -> NormalEquations:

@@ -57,6 +57,11 @@ class JobFolder:
         return self.root / "result.json"
 
     @property
+    def partial(self) -> Path:
+        """The best values so far; complete when it exists, gone when there is a result."""
+        return self.root / "partial.json"
+
+    @property
     def pictures(self) -> Path:
         """Folder of the pictures."""
         return self.root / "pictures"
@@ -124,7 +129,7 @@ def clear_outputs(folder: JobFolder) -> None:
     OSError
         If the folder cannot be written.
     """
-    for path in (folder.result, folder.progress, folder.report):
+    for path in (folder.result, folder.partial, folder.progress, folder.report):
         path.unlink(missing_ok=True)
     if folder.pictures.is_symlink():
         folder.pictures.unlink()

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""result.json: the outcome of a job, written once. Its keys are in `docs/architecture.md`."""
+"""result.json: the outcome of a job, written once; partial.json until then. Keys are in `docs/architecture.md`."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import platform
 from collections.abc import Sequence
@@ -21,15 +22,26 @@ SCHEMA_VERSION = 1
 
 
 def write_result(folder: JobFolder, content: dict[str, Any]) -> None:
-    """Write result.json by rename, so that it is complete when it exists.
+    """Write result.json by rename, so that it is complete when it exists, and remove partial.json.
 
     Raises
     ------
     OSError
         If the folder cannot be written or the disk is full.
     """
-    text = json.dumps(finite(content), indent=1, ensure_ascii=False, allow_nan=False)
-    write_atomically(folder.result, text.encode("utf-8"))
+    write_atomically(folder.result, _encoded(content))
+    with contextlib.suppress(OSError):  # nobody reads it beside a result
+        folder.partial.unlink(missing_ok=True)
+
+
+def write_partial(folder: JobFolder, best: FitResult, *, notes: Sequence[str] = ()) -> None:
+    """Write partial.json by rename: what is left of a fit whose process is killed. A full disk does not end the fit."""
+    with contextlib.suppress(OSError):
+        write_atomically(folder.partial, _encoded(result_to_json(best, notes=notes) | {"partial": True}))
+
+
+def _encoded(content: dict[str, Any]) -> bytes:
+    return json.dumps(finite(content), indent=1, ensure_ascii=False, allow_nan=False).encode("utf-8")
 
 
 def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str = "") -> dict[str, Any]:

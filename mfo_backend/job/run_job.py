@@ -11,7 +11,7 @@ from ..render.renderer import Interrupted
 from ..report.live_pictures import LivePictures
 from ..scene.image_file import check_reference, read_image
 from ..types.errors import MfoError
-from ..types.event import Event, Progress
+from ..types.event import BestValues, Event, Progress
 from ..types.image import Image
 from ..types.status import Status
 from .fit_scene import Fitter, fit_scene
@@ -20,6 +20,7 @@ from .job_view import view_of
 from .outputs import bytes_needed, write_outputs
 from .progress import EventWriter
 from .request import Request, read_request
+from .result import write_partial
 from .stop import StopSignal
 
 _CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
@@ -68,14 +69,19 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> t
     small = LivePictures(reference, view)
     events.attach(folder, small.current, small.difference)
 
+    said = (*request.notes, *notes)
+
     def listener(event: Event) -> None:
+        if isinstance(event, BestValues):
+            write_partial(folder, event.result, notes=said)
+            return
         if isinstance(event, Progress):
             stop.loaded()
         events(event)
 
     outcome = fitter(folder, request, reference, view, listener=listener, should_stop=stop.requested)
     stop.loaded()
-    write_outputs(folder, request, reference, view, outcome, notes=(*request.notes, *notes))
+    write_outputs(folder, request, reference, view, outcome, notes=said)
     folder.cancel.unlink(missing_ok=True)  # it has been answered
     return outcome.result.status, outcome.result.message
 

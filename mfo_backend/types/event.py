@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a running fit tells its listener. The fields are those of the JSON lines in `docs/architecture.md`."""
+"""What a running fit tells its listener. The fields are those of the JSON lines in `docs/architecture.md`;
+`BestValues` is no line but the file partial.json.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from .image import Pixels
+from .result import FitResult
 
 
 @dataclass(frozen=True)
@@ -57,5 +60,13 @@ class StageEnd:
     loss_best: float
 
 
-Event = Started | Progress | Preview | StageEnd
+@dataclass(frozen=True)
+class BestValues:
+    """The best values so far as the result of a fit that ends here, without errors, stages and certainty."""
+
+    event: ClassVar[str] = "best_values"
+    result: FitResult
+
+
+Event = Started | Progress | Preview | StageEnd | BestValues
 Listener = Callable[[Event], None]

@@ -2,13 +2,15 @@
 """A stand-in for the backend's Python: takes the same command line, tells the same events, computes nothing.
 
 Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes,
-`end` (finished, failed, crash, deaf). Only the standard library, so that any Python of any machine can run it.
+`end` (finished, failed, crash, deaf; killed: by SIGKILL half way). Only the standard library, so that any Python of any
+machine can run it.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import signal
 import struct
 import sys
 import threading
@@ -110,6 +112,9 @@ def main(arguments: list[str]) -> int:
                 event="stage_end", stage=stage, status="stale", iterations=STEPS, loss_start=0.2, loss_best=loss,
                 sentence="The best loss did not improve for ten iterations.",
             )  # fmt: skip
+        if control.get("end") == "killed" and i == steps // 2:
+            write_result(folder, "partial", "failed", "The fit ended by itself.", request, partial=True)
+            os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(pause)
         if cancelled.is_set():
             break
@@ -121,6 +126,13 @@ def main(arguments: list[str]) -> int:
     partial = cancelled.is_set()
     status = "cancelled" if partial else "stale"
     sentence = "Cancelled; the best values so far were kept." if partial else "The fit is done."
+    write_result(folder, "result", status, sentence, request, partial=partial)
+    say(event="finished", status=status, sentence=sentence, result="result.json")
+    return 4 if partial else 0
+
+
+def write_result(folder: Path, name: str, status: str, sentence: str, request: dict, *, partial: bool) -> None:
+    """result.json or partial.json, by rename."""
     result = {
         "schema_version": 1, "status": status, "sentence": sentence, "model": "mitsuba_principled", "partial": partial,
         "initial": INITIAL, "recovered": RECOVERED, "bounds": {}, "stages": [], "seconds": 1.0, "passes": 1.0,
@@ -129,10 +141,8 @@ def main(arguments: list[str]) -> int:
         "certainty": {"roughness": {"sd": [0.01], "level": "determined"}, "metallic": {"sd": [0.2], "level": "weak"}},
         "notes": ["Light 'Sun': specular factor is ignored."], "versions": {}, "request_fit": request["fit"],
     }  # fmt: skip
-    (folder / "result.tmp").write_text(json.dumps(result))
-    os.replace(folder / "result.tmp", folder / "result.json")
-    say(event="finished", status=status, sentence=sentence, result="result.json")
-    return 4 if partial else 0
+    (folder / f"{name}.tmp").write_text(json.dumps(result))
+    os.replace(folder / f"{name}.tmp", folder / f"{name}.json")
 
 
 def judge(folder: Path, picture: Path) -> int:

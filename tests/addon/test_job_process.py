@@ -226,6 +226,32 @@ def test_a_worker_deaf_to_cancel_is_killed_with_its_children(start: Start, monke
     assert gone(child)
 
 
+@pytest.mark.parametrize(
+    ("files", "body", "words", "kept"),
+    [
+        ({"partial": 1}, "os.kill(os.getpid(), signal.SIGKILL)", "killed (SIGKILL).*best values so far are kept", 1),
+        ({"partial": 1}, "os.abort()", "crashed (SIGABRT).*best values so far are kept", 1),
+        ({"partial": 1, "result": 2}, "os.kill(os.getpid(), signal.SIGKILL)", "killed (SIGKILL); the memory", 2),
+        ({"partial": 1}, "say(event='failed', status='failed', sentence='A bug.'); sys.exit(1)", "A bug.", None),
+        ({}, "os.kill(os.getpid(), signal.SIGKILL)", "killed (SIGKILL); the memory", None),
+    ],
+    ids=["killed", "crashed", "after its result", "own words", "too early"],
+)
+def test_the_best_values_of_a_dead_worker_become_its_result(
+    start: Start, files: dict[str, int], body: str, words: str, kept: int | None
+) -> None:
+    write = f"[open(os.path.join(sys.argv[4], n + '.json'), 'w').write(str(v)) for n, v in {files}.items()]\n"
+    process = start(write + body)
+    drain(process)
+    assert process.outcome is not None
+    first, _, second = words.partition(".*")
+    assert first in process.outcome.sentence
+    assert second in process.outcome.sentence
+    assert ("kept" in process.outcome.sentence) == (kept == 1)
+    result = process.folder / "result.json"
+    assert (int(result.read_text()) if result.exists() else None) == kept
+
+
 def test_a_worker_that_hangs_after_its_last_event_is_ended(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job_process, "CANCEL_GRACE", 0.2)
     process = start("say(event='finished', status='stale', sentence='ok'); time.sleep(60)")

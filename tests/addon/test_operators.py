@@ -210,6 +210,33 @@ def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytes
     assert scene.bpy.ops.mfo.apply() == {"FINISHED"}
 
 
+def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    bpy = scene.bpy
+    before = {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": "killed"}))
+    with pytest.raises(RuntimeError, match=r"killed \(SIGKILL\).*best values so far are kept and can be applied"):
+        fit(scene)
+    assert runtime(scene).state == "FAILED"
+    assert runtime(scene).has_result
+    assert {r.name: r.result for r in runtime(scene).values}["Roughness"] == "0.312"
+    kept = bpy.data.materials["Glaze"].mfo
+    assert [(entry.partial, entry.job_folder) for entry in kept.history] == [(True, scene.job)]
+    assert {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before  # until Apply
+
+    assert bpy.ops.mfo.apply() == {"FINISHED"}
+    assert sockets(bpy)["Roughness"].default_value == pytest.approx(RECOVERED["roughness"], abs=FLOAT32)
+    assert bpy.ops.mfo.toggle(material="Glaze") == {"FINISHED"}
+    assert sockets(bpy)["Roughness"].default_value == pytest.approx(0.5, abs=FLOAT32)
+    assert bpy.ops.mfo.revert() == {"FINISHED"}
+    assert {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
+    assert bpy.ops.mfo.apply(job_folder=scene.job) == {"FINISHED"}  # as in a later session
+    left = json.loads(Path(scene.job, "result.json").read_text("utf-8"))
+    assert (left["partial"], left["status"]) == (True, "failed")
+    assert not Path(scene.job, "partial.json").exists()
+    monkeypatch.setenv("MFO_FAKE", "{}")
+    assert fit(scene) == {"FINISHED"}  # the folder is still taken for a job
+
+
 def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     from blender_addon import running_job
 

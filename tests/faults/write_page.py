@@ -66,7 +66,7 @@ def _kill(record: Any) -> str:
         ("moments", a["moments"], b["moments"]),
         ("of them before the end", a["moments"] - a["killed_after"].get("saved", 0), b["killed"]),
         (".blend or material as it was", a["unchanged"], b["moments"] - b["complete"] - b["half"]),
-        ("complete result", a["complete"], b["complete"]),
+        ("all values of a result", a["complete"], b["complete"]),
         ("half-applied material", a["half"], b["half"]),
         (".blend that does not open", a["unreadable"], "-"),
         ("material changed without Apply, or not reverted", "-", b["changed_without_apply"] + b["not_reverted"]),

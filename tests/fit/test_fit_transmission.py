@@ -13,6 +13,7 @@ from mfo_backend.types.certainty import Level
 from mfo_backend.types.event import Preview, Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
+from tests.fit.stage_ends import assert_stages_leave_their_values
 from tests.render.scenes import AREA, FLOOR, SKY, write_scene
 
 NAMES = ["base_color", "roughness", "ior", "transmission_weight"]
@@ -48,6 +49,7 @@ def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
     assert sum(isinstance(e, Started) for e in events) == 1
     assert any(isinstance(e, Progress) for e in events)
     assert any(isinstance(e, Preview) for e in events)
+    assert_stages_leave_their_values(events, result, renderer)
     found = renderer.table.pack(result.recovered)
     sd = np.concatenate([result.certainty[name].sd for name in renderer.table.names])
     assert np.all(np.abs(found - x) < 4.0 * sd + 0.005)

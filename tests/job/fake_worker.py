@@ -17,7 +17,7 @@ import numpy as np
 from mfo_backend.cli import run as command
 from mfo_backend.job.fit_scene import JobOutcome
 from mfo_backend.types.errors import BadInputError, SetupError
-from mfo_backend.types.event import Preview, Progress, StageEnd, Started
+from mfo_backend.types.event import BestValues, Preview, Progress, StageEnd, Started
 from mfo_backend.types.result import CurvePoint, FitResult, StageReport
 from mfo_backend.types.status import Status
 
@@ -43,24 +43,28 @@ def fake_fit(folder, request, reference, view, *, listener, should_stop):
         curve.append(CurvePoint(iteration, loss, loss, 0.01 * iteration, 3.0 * iteration))
         listener(Progress("mse-hdr", 0, 1, iteration, loss, loss, iteration / plan["iterations"], 0.0, float("nan")))
         listener(Preview(start))
+        listener(BestValues(fake_result(Status.FAILED, roughness)))
         if plan["problem"] == "die":
             os.kill(os.getpid(), 9)
     best = curve[-1].loss if curve else 0.1
     listener(StageEnd("mse-hdr", status.value, status.sentence, len(curve), 0.1, best))
     stage = StageReport("mse-hdr", status, 0.1, best, len(curve), 0.1, {"roughness": roughness}, tuple(curve))
-    result = FitResult(
+    return JobOutcome(fake_result(status, roughness, stage), start, reference.pixels, "fake_variant")
+
+
+def fake_result(status, roughness, *stages):
+    return FitResult(
         status=status,
         message=status.sentence,
         model="fake",
         initial={"roughness": 0.5, "base_color": (0.8, 0.8, 0.8)},
         recovered={"roughness": roughness, "base_color": (0.25, 0.5, 0.75)},
         bounds={"roughness": (0.04, 1.0), "base_color": (0.001, 0.999)},
-        stages=(stage,),
+        stages=stages,
         errors={"flip": (0.2, 0.1), "mse": (0.1, float("inf"))},
         seconds=0.1,
-        passes=3.0 * len(curve),
+        passes=3.0 * sum(len(stage.curve) for stage in stages),
     )
-    return JobOutcome(result, start, reference.pixels, "fake_variant")
 
 
 def raise_problem(problem: str) -> None:
