@@ -233,8 +233,10 @@ def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeyp
     left = json.loads(Path(scene.job, "result.json").read_text("utf-8"))
     assert (left["partial"], left["status"]) == (True, "failed")
     assert not Path(scene.job, "partial.json").exists()
+    Path(scene.job, "partial.json").write_text("{}")
     monkeypatch.setenv("MFO_FAKE", "{}")
-    assert fit(scene) == {"FINISHED"}  # the folder is still taken for a job
+    assert fit(scene) == {"FINISHED"}  # a folder with one is still taken for a job, and is emptied
+    assert not Path(scene.job, "partial.json").exists()
 
 
 def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,12 +72,16 @@ def test_a_killed_fit_leaves_its_best_values(tmp_path: Path) -> None:
 
 
 @posix_only
-def test_a_result_takes_its_place_and_the_next_run_clears_it(start_worker, job: Path) -> None:
+def test_the_next_run_clears_it_and_a_result_takes_its_place(start_worker, job: Path) -> None:
     child = start_worker("--progress", "json", plan={"iterations": 10_000, "seconds": 0.02})
     wait_for(job / "partial.json", child)
     child.kill()
     child.wait()
-    assert (job / "partial.json").exists()
+    child = start_worker("--progress", "json", plan={"iterations": 1, "seconds": 60})
+    assert json.loads(child.stdout.readline())["event"] == "started"
+    assert not (job / "partial.json").exists()  # the values of another fit
+    child.kill()
+    child.wait()
     child = start_worker("--progress", "json")
     out, _ = child.communicate(timeout=60)
     assert child.returncode == 0
