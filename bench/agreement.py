@@ -27,7 +27,8 @@ from material_pairs import CHANGES, REFERENCE_SPP, Pair, material_pairs  # noqa:
 
 from mfo_backend.metrics.judges.color_video_vdp import ColorVideoVdp  # noqa: E402
 from mfo_backend.metrics.judges.display_light import DisplayLight  # noqa: E402
-from mfo_backend.metrics.judges.hdr_vdp import hdr_vdp_q_jods, is_configured  # noqa: E402
+from mfo_backend.metrics.judges.hdr_vdp import hdr_vdp_q_jods  # noqa: E402
+from mfo_backend.metrics.judges.hdr_vdp_program import is_configured  # noqa: E402
 from mfo_backend.metrics.judges.viewing import HDR_VIEWING  # noqa: E402
 from mfo_backend.metrics.loss import make_loss  # noqa: E402
 from mfo_backend.metrics.loss_names import LOSS_NAMES, OPTIONAL_LOSS_NAMES  # noqa: E402

@@ -146,6 +146,8 @@ def test_a_weight_can_leave_its_bound(name: str) -> None:
 def test_derivative_on_a_bound_is_the_finite_difference_inwards(name: str) -> None:
     """Half of the cases on the lower bound (0, roughness 0.05), half on the upper; directions down to grazing."""
     view, light, values, _ = smooth_scene()
+    if name == "specular_tint":  # at 0 a film on metal has an infinite slope: square roots in its complex index
+        values = {**values, "thin_film_thickness": np.zeros((1, CASES))}
     item = BLENDER_PRINCIPLED[name]
     inwards = np.where(np.arange(CASES) % 2, -1.0, 1.0)
     bound = np.where(inwards > 0, item.lower, item.upper)
@@ -163,6 +165,5 @@ def test_derivative_on_a_bound_is_the_finite_difference_inwards(name: str) -> No
         scale = np.abs(difference) + 1e-3 * np.abs(rows[0]) + 1e-9
         smooth = np.abs(first - second) < 2e-3 * scale
         error = np.abs(found - difference) / scale
-        # at an edge tint of 0 a film on metal has an infinite slope (square roots in its complex index)
-        assert np.mean(smooth) > (0.6 if name == "specular_tint" else 0.9)
+        assert np.mean(smooth) > 0.9
         assert np.max(error[smooth]) < 1e-3, np.sort(error[smooth])[-5:]
