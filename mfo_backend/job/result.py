@@ -8,6 +8,7 @@ import json
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -84,11 +85,17 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
 
 def versions(variant: str = "") -> dict[str, str]:
     """What computed the result: packages, Python, platform and, if known, the Mitsuba variant."""
-    found = {"mfo_backend": __version__}
+    found = {"mfo_backend": __version__, **_installed()}
+    found |= {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
+    return found | ({"variant": variant} if variant else {})
+
+
+@cache  # it reads files, and partial.json is written every second
+def _installed() -> dict[str, str]:
+    found = {}
     for package in ("mitsuba", "drjit", "numpy"):
         try:
             found[package] = version(package)
         except PackageNotFoundError:
             continue
-    found |= {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
-    return found | ({"variant": variant} if variant else {})
+    return found
