@@ -18,6 +18,7 @@ from bpy.props import (
 )
 
 from . import comparison
+from .versions import RELATIVE_PATH
 
 # name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance
 _PARAMETERS = (
@@ -95,6 +96,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view "
         "(with Bake View: the scene's)",
         subtype="FILE_PATH",
+        options=RELATIVE_PATH,
     )
     reference_image: PointerProperty(
         name="Reference",

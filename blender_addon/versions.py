@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 PRINCIPLED = "ShaderNodeBsdfPrincipled"
+# options of a path that may begin with "//": Blender 4.5 and later draw it in red without, older ones refuse the word
+RELATIVE_PATH: set[str] = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 
 def working_space_to_rec709() -> NDArray[np.float64] | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""F3 finds what is in a menu: every operator for users is, and no key map of ours exists."""
+"""F3 finds what is in a menu: every operator for users is, and no key map of ours exists; paths may be relative."""
 
 from __future__ import annotations
 
@@ -32,3 +32,8 @@ def test_no_key_map(scene: SimpleNamespace) -> None:
     keys = scene.bpy.context.window_manager.keyconfigs.addon
     items = [item.idname for keymap in (keys.keymaps if keys else ()) for item in keymap.keymap_items]
     assert not [name for name in items if name.startswith("mfo.")]
+
+
+def test_reference_may_be_relative(scene: SimpleNamespace) -> None:
+    path = scene.bpy.context.scene.mfo.bl_rna.properties["reference_path"]
+    assert getattr(path, "is_path_supports_blend_relative", True)  # Blender before 4.5 does not ask
