@@ -55,7 +55,7 @@ def clear(runtime: bpy.types.PropertyGroup) -> None:
 
 
 def material() -> bpy.types.Material | None:
-    """The material of the result under whatever name it has by now, if it was fitted in this session."""
+    """The material of the result under whatever name it has by now, if it was fitted since Blender started."""
     return next((m for m in bpy.data.materials if m.session_uid == material_uid), None) if material_uid else None
 
 
