@@ -15,6 +15,7 @@ from ..fit.recover_material import recover_material
 from ..fit.settings import FitSettings
 from ..metrics.compare import compare_images
 from ..metrics.tone_mapping import DisplayView
+from ..render.highlight_cells import Highlights
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Renderer, load_renderer
 from ..types.errors import MfoError
@@ -25,6 +26,7 @@ from .scene import SHAPE
 
 _REFERENCE_SEED, _JUDGE_SEED = 0x4A2D0000, 0x4A2D8000
 _JUDGE_SPP = 256
+_FINE = Highlights(share=0.2, most=400_000)
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class ExactPicture:
         self._shape = (*mask.shape, 3)
         grid: int | NDArray[np.int64] = 6
         for _ in range(2):
-            self._paths = scene.record(vector, grid=grid, seed=_JUDGE_SEED, near=False)
+            self._paths = scene.record(vector, grid=grid, seed=_JUDGE_SEED, near=False, highlights=_FINE)
             self._evaluate = scene.evaluator(self._paths, self._paths.pixel_groups())
             grid = 2 * detail_grid(self(vector), mask) + 2
 

@@ -39,9 +39,8 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
 
 
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
-# the next pixel; by half; by a factor of four. A highlight of roughness 0.06 on a sphere of 100 pixels is narrower
-# than one.
-GRID_PLAIN, GRID_DETAIL, GRID_HIGHLIGHT, GRID_PEAK = 2, 6, 20, 50
+# the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
+GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
 
 
 def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -60,6 +59,5 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
             change = np.maximum(change, np.abs(level - np.roll(level, shift, axis)))
     grid = np.full(level.shape, GRID_PLAIN)
     grid[mask & (change > 0.1)] = GRID_DETAIL
-    grid[inside & (change > 0.5)] = GRID_HIGHLIGHT
-    grid[inside & (change > 1.4)] = GRID_PEAK
+    grid[inside & (change > 0.5)] = GRID_EDGE
     return grid

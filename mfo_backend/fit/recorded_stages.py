@@ -48,9 +48,9 @@ class RecordedPlan:
     grid_first, grid_last
         Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
     scan_lanes, start_lanes
-        Recorded lanes the scan and the fits from its nodes look at.
-    refine_lanes
-        Those the last stage looks at where every light is exact: without noise more of them say nothing new.
+        Recorded lanes the scan and the fits from its nodes look at where light is sampled.
+    exact_scan_lanes, exact_start_lanes, refine_lanes
+        Those that they and the last stage look at where every light is exact: without noise more say nothing new.
     starts
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     trial_evaluations
@@ -66,7 +66,9 @@ class RecordedPlan:
     grid_last: int = 8
     scan_lanes: int = 20_000
     start_lanes: int = 80_000
-    refine_lanes: int = 160_000
+    exact_scan_lanes: int = 8_000
+    exact_start_lanes: int = 20_000
+    refine_lanes: int = 80_000
     starts: int = 3
     trial_evaluations: int = 10
     keep_factor: float = 10.0
@@ -158,13 +160,15 @@ class RecordedFit:
             grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
             groups = all_groups(self.paths, tiles=sampled)
-            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make, calm=True)
+            lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
+            few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             nodes = []
             if plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
                 stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
-            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make, calm=True)
+            lanes = plan.start_lanes if sampled else plan.exact_start_lanes
+            more = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             metals = [node for node in nodes if node.metal]

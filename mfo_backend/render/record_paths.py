@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
-from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
+from .highlight_cells import DELTA, Highlights, highlight_cells
+from .pixel_cells import PixelCells
+from .primary_rays import PrimaryRays, fresh_sampler, primary_rays, tile_order
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
-
-DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
-    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`.
+    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. With `highlights` more
+    rays start where lights of no extent are mirrored.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -46,6 +47,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     light_paths: LightPaths | None = None
+    highlights: Highlights | None = None
 
 
 @dataclass
@@ -86,8 +88,7 @@ def record_paths(
     with dr.suspend_grad():
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
-        grid = np.broadcast_to(settings.grid, (height, width))
-        rays = primary_rays(sensor, grid, settings.seed, settings.stride)
+        rays = _camera_rays(scene, shape, settings, width, height)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
         dr.eval(rays, hit, on_target)
@@ -100,8 +101,7 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
-        if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
-            si = _face_camera(si)
+        si = _facing(shape, settings, si)
         held = ()
         if settings.held:
             plugin: Any = shape.bsdf()
@@ -140,6 +140,32 @@ def indirect_share(
         )
         lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
     return (lit[1] - lit[0]) / max(lit[0], 1e-30)
+
+
+def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:
+    """Camera rays on the settings' grid, and more of them in narrow highlights if the settings say so."""
+    sensor = scene.sensors()[0]
+    order, tile = tile_order(width, height, settings.stride)
+    per_axis = np.broadcast_to(settings.grid, (height, width)).reshape(-1)[order]
+    if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
+        return primary_rays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
+
+    def rays_in(cells: PixelCells) -> PrimaryRays:
+        return primary_rays(sensor, cells, order, tile, settings.seed, four=True)
+
+    def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
+        ray = mi.Ray3f(rays.ray)
+        hit = scene.ray_intersect_preliminary(ray, coherent=True)
+        on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
+        return _facing(shape, settings, si), on_target
+
+    cells = PixelCells.grid((per_axis + 1) // 2)
+    return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
+
+
+def _facing(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    return _face_camera(si) if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF" else si
 
 
 def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
 from ..types.parameter import Value
+from .highlight_cells import Highlights
 from .mitsuba_renderer import MitsubaRenderer
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
@@ -29,6 +30,8 @@ from .recorded_paths import LaneGroups, RecordedPaths
 # noise of 64 samples a pixel.
 NEGLIGIBLE_INDIRECT = 0.005
 MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
+# How finely highlights are recorded (`Highlights.share`): 0.3 % and 0.1 % of the picture at roughness 0.05
+SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 DEEPEST = 16  # path length of a scene without a limit
 
 
@@ -77,12 +80,19 @@ class RecordedScene:
         return SceneNeeds(True, depth, ())
 
     def record(
-        self, vector: NDArray[np.float64], *, grid: int | NDArray[np.int64], seed: int, near: bool
+        self,
+        vector: NDArray[np.float64],
+        *,
+        grid: int | NDArray[np.int64],
+        seed: int,
+        near: bool,
+        highlights: Highlights | None = None,
     ) -> RecordedPaths:
         """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
         that of the material `vector`.
 
-        `near` shapes the proposal for that material instead of for any.
+        `near` shapes the proposal for that material instead of for any and resolves highlights more finely, unless
+        `highlights` says how.
         """
         self.renderer.show(vector)
         proposal = DefensiveProposal()
@@ -94,6 +104,7 @@ class RecordedScene:
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths)
+        settings = replace(settings, highlights=highlights or Highlights(share=SHARE_NEAR if near else SHARE_FIRST))
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 

@@ -64,7 +64,9 @@ def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
 
 def test_delta_lights_take_one_lane_for_each_ray_and_36_bytes(tmp_path):
     renderer, scene = recorded_scene(tmp_path, POINT)
-    paths = scene.record(renderer.start, grid=2, seed=0, near=False)
+    from mfo_backend.render.highlight_cells import Highlights
+
+    paths = scene.record(renderer.start, grid=2, seed=0, near=False, highlights=Highlights(most=0))
     covered = int(renderer.target_mask().sum())
     assert not scene.needs.sampled
     assert paths.lanes <= 4 * covered
