@@ -14,10 +14,13 @@ from ..types.image import Pixels
 MINIMUM_INTERIOR_SHARE = 0.3
 
 
-def all_groups(paths: RecordedPaths, *, tiles: bool) -> LaneGroups:
-    """All pixels or tiles without background; those on the silhouette too where the target is small."""
+def all_groups(paths: RecordedPaths, side: int) -> LaneGroups:
+    """All pixels or tiles of this `side` without background; those on the silhouette too where the target is small."""
     interior = paths.interior
-    make = paths.tile_groups if tiles else paths.pixel_groups
+
+    def make(keep: NDArray[np.bool_] | None = None) -> LaneGroups:
+        return paths.pixel_groups(keep) if side == 1 else paths.tile_groups(keep, side)
+
     if interior.mean() < MINIMUM_INTERIOR_SHARE:
         return make()
     groups = make(interior)

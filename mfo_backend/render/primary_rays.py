@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .pixel_cells import PixelCells
 
-TILE = 4  # pixels; a tile is the smallest residual when the recording itself is noisy
+TILE = 4  # pixels along each side
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,23 @@ class PrimaryRays:
 
 
 def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Flat pixel indices ordered by tile, and the tile number of each; of every `stride`-th tile along both axes."""
+    """Flat pixel indices ordered by tile, and the tile number of each; of every `stride`-th tile along both axes.
+
+    Within a tile they are ordered by its quarters, so that those are runs of pixels, too.
+    """
     row, column = np.divmod(np.arange(width * height), width)
     tile_row, tile_column = row // TILE, column // TILE
     tile = tile_row * -(-width // TILE) + tile_column
     kept = np.flatnonzero((tile_row % stride == stride // 2) & (tile_column % stride == stride // 2))
-    order = kept[np.argsort(tile[kept], kind="stable")]
+    order = kept[np.argsort(4 * tile[kept] + quarter(kept, width), kind="stable")]
     return order, tile[order]
+
+
+def quarter(pixel: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """Which quarter of its tile each pixel lies in, 0 to 3."""
+    row, column = np.divmod(pixel, width)
+    half = TILE // 2
+    return 2 * (row % TILE // half) + column % TILE // half
 
 
 def fresh_sampler(seed: int, width: int) -> mi.Sampler:

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
+from .even_points import even_points
 from .highlight_cells import DELTA, Highlights, highlight_cells
 from .pixel_cells import PixelCells
-from .primary_rays import PrimaryRays, fresh_sampler, primary_rays, tile_order
+from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_order
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
 
@@ -201,6 +202,7 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
         return []
     count = dr.width(position)
     sampler = fresh_sampler(settings.seed + 0x51ED270, count)
+    number, tile = dr.arange(mi.UInt32, count), position // TILE**2
     proposal = settings.proposal
     front = si.wi.z > 0.0
     # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
@@ -210,9 +212,11 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
     if extended:
         table = mi.UInt32(np.array(extended, np.uint32))
         turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, 1 + int(dr.max(position)[0])).next_1d() * 65536)
-        pick = (dr.arange(mi.UInt32, count) + dr.gather(mi.UInt32, turns, position)) % len(extended)
+        pick = (number + dr.gather(mi.UInt32, turns, position)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
-        ds, value = emitter.sample_direction(si, sampler.next_2d(), front)
+        # one light's samples follow each other in the sequence
+        u = even_points(2, number // len(extended), tile, settings.seed + 0x51ED270)
+        ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
@@ -220,7 +224,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
         mis = light_density / (light_density + proposal.density(si.wi, wo))
         lanes.append(_compress(hits, wo, value * (share * mis / choice), lit))
 
-    wo = proposal.sample(si.wi, sampler.next_1d(), sampler.next_2d())
+    lobe, *u = even_points(3, number, tile, settings.seed + 0x51ED270)
+    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u))
     density = proposal.density(si.wi, wo)
     valid = front & (wo.z > 0.0) & (density > 0.0)
     ray = si.spawn_ray(si.to_world(wo))

@@ -125,6 +125,13 @@ class RecordedScene:
 
         return at
 
+    def effective_samples(
+        self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
+    ) -> NDArray[np.float64]:
+        """How many equal samples the light of each group is worth at a vector, shape (g,)."""
+        self.renderer.passes += len(groups.pixels) / max(len(paths.pixel), 1)
+        return self.jacobian.effective_samples(vector, paths, groups)
+
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed[name]
