@@ -62,8 +62,23 @@ def run_one(job: str, threads: int = 0, should_stop: Callable[[], bool] = lambda
     said = [line for line in errors.splitlines() if line.startswith("mfo: ")]
     codes = {status.exit_code: status.value for status in Status if status.exit_code}
     status = codes.get(process.returncode, Status.CONVERGED.value if process.returncode == 0 else Status.FAILED.value)
-    sentence = said[0].removeprefix("mfo: ") if said else f"The process ended with code {process.returncode}."
+    sentence = said[0].removeprefix("mfo: ") if said else _end_sentence(process.returncode)
     return JobEnd(job, status, sentence, time.monotonic() - began)
+
+
+def _end_sentence(code: int) -> str:
+    """Why a process ended that could not say so itself."""
+    if code >= 0:
+        return f"The process ended with code {code}."
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    # native code that gets no memory ends in a segmentation fault (Dr.Jit 1.5.0, Embree 3)
+    ended = "was killed" if name == "SIGKILL" else "crashed"
+    return (
+        f"The process {ended} ({name}); the memory may have run out, so try a lower resolution or fewer jobs at once."
+    )
 
 
 def run_here(jobs: Sequence[str], at_once: int, threads: int, should_stop: Callable[[], bool]) -> Iterator[JobEnd]:

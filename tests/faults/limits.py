@@ -60,7 +60,7 @@ def all_faults() -> Iterator[dict[str, Any]]:
                 yield run("disk full after the start", job(disk, 24), on_start=_fill)
 
 
-def job(folder: Path, size: int, light: str = "") -> Path:
+def job(folder: Path, size: int, light: str = "", *, preset: str = "fast") -> Path:
     """A job of a sphere with a flat reference."""
     path = folder / f"job_{size}_{len(list(folder.iterdir()))}"
     source = path.with_suffix(".source")
@@ -68,7 +68,7 @@ def job(folder: Path, size: int, light: str = "") -> Path:
     text = SCENE.format(width=size, height=size, shape=SPHERE, light=light or POINT.format(40.0))
     (source / "scene.xml").write_text(text)
     write_exr(source / "r.exr", np.full((size, size, 3), 0.5, np.float32))
-    settings = FitSettings(preset="paper" if size == 24 else "fast", max_iterations=60)
+    settings = FitSettings(preset="paper" if size == 24 else preset, max_iterations=60)
     make_job(source / "scene.xml", "target", source / "r.exr", settings, path)
     shutil.rmtree(source)
     return path
