@@ -7,6 +7,7 @@ import sys
 import traceback
 from pathlib import Path
 
+from ..render.memory import require_memory
 from ..render.renderer import Interrupted
 from ..report.live_pictures import LivePictures
 from ..scene.image_file import check_reference, read_image
@@ -23,6 +24,9 @@ from .request import Request, read_request
 from .result import write_partial
 from .stop import StopSignal
 
+# Measured on Linux (docs/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are mapped
+# but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
+_STARTUP_BYTES, _MAPPED_BYTES, _BYTES_PER_PIXEL = 150_000_000, 380_000_000, 430
 _CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
 
 
@@ -63,6 +67,12 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> t
     stop.loading(lambda: events.failed(Status.CANCELLED, _CANCELLED_EARLY))
     folder = JobFolder.open(path)
     request = read_request(folder)
+    require_memory(
+        _STARTUP_BYTES + request.width * request.height * _BYTES_PER_PIXEL,
+        mapped=_MAPPED_BYTES,
+        what=f"A fit of {request.width}x{request.height} pixels",
+        cure="lower the resolution, or free some memory or raise its limit",
+    )
     reference, notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     folder.require_space(bytes_needed(request))
