@@ -36,6 +36,9 @@ def mitsuba() -> Any:
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
+    from mfo_backend.render.lamps.met_lamps import register
+
+    register()
     return mi
 
 
@@ -93,7 +96,8 @@ def export(tmp_path: Path) -> Callable[..., Any]:
 @pytest.fixture
 def render_mitsuba(mitsuba: Any) -> Callable[..., Pixels]:
     def render(report: Any, spp: int = 64) -> Pixels:
-        """Return what `mi.load_file` and `mi.render` make of the job's scene."""
-        return np.array(mitsuba.render(mitsuba.load_file(str(report.folder / "scene.xml")), spp=spp))[:, :, :3]
+        """Return what `mi.load_file` and `mi.render` make of the job's scene, with our lamps registered."""
+        scene = mitsuba.load_file(str(report.folder / "scene.xml"), parallel=False)  # plugins in Python
+        return np.array(mitsuba.render(scene, spp=spp))[:, :, :3]
 
     return render
