@@ -24,7 +24,7 @@ from ..types.light_paths import NO_LIMIT, LightPaths
 from .lamps.met_lamps import SceneLamps, alone
 
 PLUGIN_NAME = "cycles_path"
-CERTAIN = 1e30  # density before the first bounce
+CERTAIN = 1e30  # density before the first bounce, and of mirrors
 _LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
 DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
 TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
@@ -91,7 +91,8 @@ class CyclesPath(RBIntegrator):
             met *= clamp_factor(self.clamp_indirect, first * met, bounce >= 2)
             if dr.hint(lamps, mode="scalar"):
                 straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
-                shine = throughput * lamps.met(ray, si, lambda d: share(delta, density, d), active, camera=straight)
+                likely = dr.select(delta, CERTAIN, density)
+                shine = throughput * lamps.met(ray, si, active, density=likely, camera=straight)
                 met += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
@@ -83,6 +83,9 @@ def record_paths(
         If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
+        lamps = SceneLamps(scene)
+        if lamps and settings.light_paths is None:
+            settings = replace(settings, light_paths=LightPaths())  # Mitsuba's own integrators do not meet lamps
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         grid = np.broadcast_to(settings.grid, (height, width))
@@ -99,9 +102,8 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
-        lamps = SceneLamps(scene)
         if lamps.seen:
-            before = lamps.met(ray, si, lambda _: mi.Float(1), mi.Bool(True), camera=True) * filter_weight
+            before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
         if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
             si = _face_camera(si)
@@ -208,8 +210,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
     weight = emission / (light_density + density)
     if lamps:
-        weight += lamps.met(ray, far, lambda other: dr.rcp(other + density), valid, chance=mi.Float(choice))
-        emission += lamps.met(ray, far, lambda _: mi.Float(1), valid)
+        weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
+        emission += lamps.met(ray, far, valid)
     if indirect:
         # a path tracer's radiance along the ray, less what the ray meets directly
         before = None

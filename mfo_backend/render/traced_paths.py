@@ -222,8 +222,8 @@ class TracedPaths:
             total = [t + b * emission for t, b in zip(total, beta, strict=True)]
             if self._lamps:
                 straight = s["bounces"][0] + s["bounces"][1] + s["bounces"][2] == 0
-                weight = lambda d: dr.select(s["delta"], 1.0, self._share(s["density"], d))
-                shine = self._lamps.met(ray, si, weight, active, camera=straight)
+                likely = dr.select(s["delta"], 1e30, s["density"])
+                shine = self._lamps.met(ray, si, active, density=likely, camera=straight)
                 shine *= self._clamp(beta[0] * shine, depth >= 2)
                 total = [t + b * shine for t, b in zip(total, beta, strict=True)]
             active = active & si.is_valid() & (s["left"] > 1)

@@ -21,6 +21,7 @@ collect_ignore = (
         "test_bad_input.py",
         "test_camera.py",
         "test_geometry.py",
+        "test_lamps.py",
         "test_light_levels.py",
         "test_materials.py",
         "test_reference.py",

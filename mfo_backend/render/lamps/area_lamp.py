@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Area lights with their spread (Cycles 4.3 to 5.2, kernel/light/area.h, scene/light.cpp).
 
-The spread is that of a grid in front of a soft box: at angle a to the axis the light is (T - tan a) / (T - h) times the
-radiance, h half the spread and T its tangent, which leaves the power as it is. Choose the variant before importing this.
+The spread is that of a grid in front of a soft box: at angle a to the axis light is (T - tan a) / (T - h) times the
+radiance, h half the spread and T its tangent, which leaves the power as it is. Choose the variant before importing.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -66,11 +66,10 @@ class AreaLamp(Lamp):
         way = height / cosine
         place = line + way * direction
         hit = (height > 0) & (cosine > 0) & self._is_inside(dr.dot(place, self.u), dr.dot(place, self.v))
-        tangent = dr.norm(direction + cosine * self.n) / cosine
-        factor = dr.maximum(self.tangent - tangent, 0) * self.scale
+        short = self.tangent - dr.norm(direction + cosine * self.n) / cosine
         radius = height * self.tangent
         area = dr.select(self._is_narrow(radius), dr.pi * dr.square(radius), self.area)
-        return Crossing(hit, way, dr.square(way) / (cosine * area), factor)
+        return Crossing(hit & (short > 0), way, dr.square(way) / (cosine * area), short * self.scale)
 
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True

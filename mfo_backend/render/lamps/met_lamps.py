@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -49,16 +48,17 @@ class SceneLamps:
         self,
         ray: mi.Ray3f,
         surface: mi.SurfaceInteraction3f,
-        weight: Callable[[mi.Float], mi.Float],
         active: mi.Bool,
         *,
+        density: mi.Float | None = None,
         camera: mi.Bool | bool = False,
-        chance: mi.Float | None = None,
+        chance: float | None = None,
     ) -> mi.Color3f:
         """Radiance of all lamps that `ray` meets before `surface`, or before infinity where that is not valid.
 
-        Each is scaled by `weight` of the density with which a light sample would have taken this direction, its lamp
-        chosen with `chance` (default: as the scene does). Where `camera` is true only lamps that cameras see are met.
+        Each counts by the share that `density`, with which the ray was sent out, has beside that of a light sample, its
+        lamp chosen with `chance` (default: as the scene does); without `density` each counts in full. Where `camera` is
+        true only lamps that cameras see are met.
         """
         total = mi.Color3f(0)
         limit = dr.select(surface.is_valid(), surface.t, dr.inf)
@@ -67,7 +67,9 @@ class SceneLamps:
             on = found.hit & active & (found.distance > 0) & (found.distance <= limit)
             if not lamp.camera:
                 on &= ~mi.Bool(camera)
-            share = weight(found.density * (own_chance if chance is None else chance))
+            share = mi.Float(1)
+            if density is not None:
+                share = density / (density + found.density * (own_chance if chance is None else chance))
             total += dr.select(on, lamp.radiance * (found.factor * share), 0)
         return total
 
