@@ -37,7 +37,7 @@ def mitsuba() -> Any:
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
-    from mfo_backend.render.lamps.met_lamps import register
+    from mfo_backend.render.lamps.lamp_plugins import register
 
     register()
     return mi

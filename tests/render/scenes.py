@@ -35,7 +35,7 @@ LAMPS = {
 <float name="spread" value="90"/></emitter>""",
     "round": f"""<emitter type="blender_area">{_DOWN}<rgb name="radiance" value="25, 24, 22"/>
 <boolean name="round" value="true"/></emitter>""",
-    "beam": f"""<emitter type="blender_area"><transform name="to_world"><scale value="2"/><lookat
+    "beam": """<emitter type="blender_area"><transform name="to_world"><scale value="2"/><lookat
 origin="1.5, -2, 2.5" target="0, 0, 0" up="0, 0, 1"/></transform><rgb name="radiance" value="1, 1, 0.9"/>
 <float name="spread" value="0"/></emitter>""",
     "sun": f"""<emitter type="blender_sun">{_DOWN}<rgb name="radiance" value="40, 40, 44"/>

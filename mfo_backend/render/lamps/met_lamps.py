@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lamps of a scene as rays meet them. Choose the variant before importing this."""
+"""The lamps of a scene as rays meet them."""
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
 # pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
@@ -7,23 +7,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
 
-from .area_lamp import AreaLamp
-from .lamp import Lamp
-from .point_lamp import PointLamp, SharpSpot, SpotLamp
-from .sun_lamp import SunLamp
+if TYPE_CHECKING:
+    from .lamp import Lamp  # needs a variant
 
-PLUGINS = {
-    "blender_point": PointLamp,
-    "blender_spot": SpotLamp,
-    "blender_sharp_spot": SharpSpot,
-    "blender_area": AreaLamp,
-    "blender_sun": SunLamp,
-}
 DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 
 
@@ -33,7 +24,7 @@ class SceneLamps:
     def __init__(self, scene: mi.Scene) -> None:
         self.lamps: list[tuple[Lamp, Any]] = []
         for index, emitter in enumerate(scene.emitters()):
-            if isinstance(emitter, Lamp) and not mi.has_flag(emitter.flags(), DELTA):
+            if hasattr(emitter, "crossing") and not mi.has_flag(emitter.flags(), DELTA):
                 self.lamps.append((emitter, dr.opaque(mi.Float, float(scene.pdf_emitter(mi.UInt32(index))[0]))))
 
     def __bool__(self) -> bool:
@@ -77,9 +68,3 @@ class SceneLamps:
 def alone(ds: mi.DirectionSample3f) -> mi.Bool:
     """Whether no ray can meet the light of this sample: `delta`, which lamps say of themselves too."""
     return ds.delta & mi.has_flag(ds.emitter.flags(), DELTA)
-
-
-def register() -> None:
-    """Make the lamps known to Mitsuba in the current variant."""
-    for name, plugin in PLUGINS.items():
-        mi.register_emitter(name, plugin)

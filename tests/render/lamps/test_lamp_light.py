@@ -22,9 +22,9 @@ def mi():
     load_variant()
     import mitsuba
 
-    from mfo_backend.render.lamps import met_lamps
+    from mfo_backend.render.lamps import lamp_plugins
 
-    met_lamps.register()
+    lamp_plugins.register()
     return mitsuba
 
 
@@ -97,7 +97,7 @@ def test_a_sharp_spot_fades_by_smoothstep_of_the_cosine(mi, cosine, expected):
         }
     )
     aside = HIGH * math.sqrt(1 - cosine**2) / cosine
-    ds, value = emitter.sample_direction(at(mi, aside, 0, 0), mi.Point2f(0.5))
+    _, value = emitter.sample_direction(at(mi, aside, 0, 0), mi.Point2f(0.5))
     square = HIGH**2 + aside**2
     np.testing.assert_allclose(np.array(value).ravel() * square, np.array([8, 4, 2]) * expected, atol=2e-3)
 

@@ -10,12 +10,13 @@ from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.light_paths import LightPaths
 from tests.render.scenes import FLOOR, LAMPS, POINT, SKY, write_scene
 
-METAL = {"Base Color": {"value": [0.9, 0.6, 0.4]}, "Metallic": {"value": 1.0}, "Roughness": {"value": 0.3}}
+# half metal, so that light samples and rays of the material both matter
+GLAZE = {"Base Color": {"value": [0.9, 0.6, 0.4]}, "Metallic": {"value": 0.5}, "Roughness": {"value": 0.45}}
 GLASS = {"Transmission Weight": {"value": 1.0}, "Roughness": {"value": 0.4}, "IOR": {"value": 1.45}}
 SEEN = '<boolean name="camera" value="true"/></emitter>'
 
 
-def load(folder, lights, sockets=METAL, *, model="blender_principled", **options):
+def load(folder, lights, sockets=GLAZE, *, model="blender_principled", **options):
     material = {"name": "Ball", "distribution": "MULTI_GGX", "sockets": sockets}
     path = write_scene(folder, lights, size=16, **options)
     return load_renderer(
@@ -38,19 +39,19 @@ def test_the_integrator_has_the_light_of_mitsubas_path(tmp_path, name):
     import mitsuba as mi
 
     renderer = load(tmp_path, LAMPS[name])
-    means = [renderer.image(renderer.start, seed=s, spp=256).mean(axis=(0, 1)) for s in range(4)]
+    means = [renderer.image(renderer.start, seed=s, spp=1024).mean(axis=(0, 1)) for s in range(4)]
     plain = mi.load_dict({"type": "path", "max_depth": 2})
-    others = [np.array(mi.render(renderer.scene, integrator=plain, seed=s, spp=256)).mean((0, 1)) for s in range(4)]
+    others = [np.array(mi.render(renderer.scene, integrator=plain, seed=s, spp=1024)).mean((0, 1)) for s in range(4)]
     noise = np.sqrt(np.var(means, axis=0) + np.var(others, axis=0)) / 2.0
     difference = np.abs(np.mean(means, axis=0) - np.mean(others, axis=0))
     assert np.all(difference < 4 * noise + 1e-4 * np.mean(means))
-    assert np.all(noise < 0.01 * np.mean(means))
+    assert np.all(noise < 0.005 * np.mean(means))
 
 
 @pytest.mark.parametrize("name", LAMPS)
 def test_recorded_paths_hold_the_light_of_the_picture(tmp_path, name):
     renderer = load(tmp_path, LAMPS[name])
-    x = renderer.table.pack({"base_color": (0.8, 0.5, 0.3), "roughness": 0.25})
+    x = renderer.table.pack({"base_color": (0.8, 0.5, 0.3), "roughness": 0.4})
     groups, got = recorded(renderer, x)
     expected = groups.average(renderer.image(x, seed=7, spp=1024))
     np.testing.assert_allclose(got.sum(axis=0), expected.sum(axis=0), rtol=0.01)
@@ -68,12 +69,12 @@ def test_recorded_paths_hold_several_lamps_beside_other_lights(tmp_path, depth):
 
 @pytest.mark.parametrize("camera", [True, False])
 def test_a_lamp_before_the_target_is_seen_or_not(tmp_path, camera):
-    """Between camera and ball: a small bright sphere."""
+    """Between camera and ball: a small disk."""
     small = """<emitter type="blender_point"><transform name="to_world"><translate y="-2" z="0.5"/></transform>
-<rgb name="radiance" value="50, 50, 50"/><float name="radius" value="0.05"/></emitter>"""
+<rgb name="radiance" value="9, 9, 9"/><float name="radius" value="0.2"/></emitter>"""
     renderer = load(tmp_path, small.replace("</emitter>", SEEN) if camera else small)
     picture = renderer.image(renderer.start, seed=7, spp=1024)
-    assert (picture.max() > 30.0) == camera
+    assert (picture.max() > 8.0) == camera
     groups, got = recorded(renderer, renderer.start)
     np.testing.assert_allclose(got.sum(axis=0), groups.average(picture).sum(axis=0), rtol=0.01)
 
