@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solve.bounded_least_squares import NormalEquations
-from ..solve.noisy_least_squares import CrossProducts, SafeMatrix, cautious_step, cross_equations
+from ..solve.noisy_least_squares import SafeMatrix, cautious_step, cross_equations
 from ..types.image import Pixels
 from .course import Course, Stage
+from .tile_pools import TilePools
 from .tile_rows import TileRows
 from .uncertainty import WEAK_BELOW
 
@@ -29,8 +30,9 @@ GEOMETRIC = ("roughness", "ior")  # they move the paths
 ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
-FAR, NEAR = {"roughness": 0.12, "ior": 0.06}, {"roughness": 0.06, "ior": 0.03}
+SECANTS = {"roughness": 0.12, "ior": 0.06}
 TILE_SIZES = (1, 2, 4, 8)
+DEBUG = lambda *a: None
 TRUST = 0.25  # of the range: the longest step
 
 
@@ -118,21 +120,26 @@ class TransmissionFit:
         seed: int,
         samples: int,
         jacobian: bool = True,
-        near: bool = False,
         moving: bool = True,
     ) -> list[Samples]:
         """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
 
-        Without `moving` the derivatives by roughness and index stay those of fixed paths; `near` takes shorter secants.
+        Without `moving` the derivatives by roughness and index stay those of fixed paths.
         """
-        tables = self._tables(tiles, xs, seed, samples, jacobian, near, moving)
+        tables = self._tables(tiles.pixels, xs, seed, samples, jacobian, moving)
         return [[tiles.rows(half) for half in np.split(table, 2)] for table in tables]
 
     def _tables(
-        self, tiles: TileRows, xs: Vector, seed: int, samples: int, jacobian: bool, near: bool, moving: bool
+        self,
+        pixels: NDArray[np.int64],
+        xs: Vector,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        moving: bool = True,
     ) -> NDArray[np.float32]:
         """Pictures with derivatives (m, 2 p, 3, 1 + k), the pixels twice."""
-        pixels = np.concatenate([tiles.pixels, tiles.pixels])  # the second time with other random numbers
+        pixels = np.concatenate([pixels, pixels])  # the second time with other random numbers
 
         def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
             return self.paths.images(
@@ -141,10 +148,10 @@ class TransmissionFit:
 
         tables = trace(xs, jacobian)
         if jacobian and moving:
-            self._secants(tables, xs, trace, near)
+            self._secants(tables, xs, trace)
         return tables
 
-    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable, near: bool) -> None:
+    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable) -> None:
         """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
         moved, where = [], []
         for i, x in enumerate(xs):
@@ -154,7 +161,7 @@ class TransmissionFit:
                 if name not in self.table.names:
                     continue
                 k = self.table.slice_of(name).start
-                h = (NEAR if near else FAR)[name]
+                h = SECANTS[name]
                 h = -h if x[k] + h > self.table.upper[k] else h
                 trial = x.copy()
                 trial[k] += h
@@ -211,9 +218,7 @@ class TransmissionFit:
             best = runners[0]
             for turn in range(plan.race_steps + 1):
                 trials = [r.x if r.equations is None else r.x + self._damped(r) for r in runners]
-                rows = self.halves(
-                    tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples, near=turn > 3
-                )
+                rows = self.halves(tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples)
                 if self.course.should_stop():
                     break
                 for runner, trial, pair in zip(runners, trials, rows, strict=True):
@@ -263,39 +268,32 @@ class TransmissionFit:
         return ends
 
     def _pool(self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int) -> Polished:
-        plan, columns = self.plan, 1 + self.table.length
-        x, variance, floor = start.copy(), np.diag(self._width**2), 0.0
+        plan = self.plan
+        x, variance = start.copy(), np.diag(self._width**2)
         equations, noise = None, variance
-        single = self.tiles(1, plan.polish_pixels)
+        pools = TilePools.of((self.tiles(size, plan.polish_pixels) for size in TILE_SIZES), 1 + self.table.length)
         # few pixels need more paths each: products of two noisy numbers average slowly
-        samples = int(np.clip(plan.polish_paths // len(single), 4, 16))
-        tiles, pool = single, CrossProducts(3, columns)
+        samples = int(np.clip(plan.polish_paths // len(pools.pixels), 4, 16))
+        errors: list[float] = []
         for turn in range(plan.polish_steps):
-            seed = self._seed(stream + turn)
-            if turn == 0:
-                (table,) = self._tables(single, x[None], seed, samples, True, True, True)
-                halves = np.split(table, 2)
-                floor = 2.0 * _two_half(*(single.rows(half) for half in halves)).cost
-                tiles, pair = self._best_tiles(single, halves)
-                pool = CrossProducts(3 * len(tiles), columns)
-            else:
-                (pair,) = self.halves(tiles, x[None], seed=seed, samples=samples, near=True)
+            (table,) = self._tables(pools.pixels, x[None], self._seed(stream + turn), samples)
             if self.course.should_stop():
                 break
+            table[..., 1:][..., frozen] = 0.0
             if turn in (1, 2):
-                pool.fade(0.25)
-            for sample in pair:
-                sample[:, 1:][:, frozen] = 0.0
-                pool.add(sample)
-            equations, noise = cross_equations(pool.gram()), pool.gradient_noise(3)
+                pools.fade(0.25)
+            pools.add(np.split(table, 2))
+            equations, noise, size = pools.best(self._width)
             self._note(stage, x, equations.cost)
             step = self._step(equations, x, 1e-3, 0.1 if turn < 2 else 0.05, frozen, noise)
             x = x + step
-            pool.shifted(step)
+            pools.shifted(step)
             stage.vector = x
-            matrix = SafeMatrix(equations, self._width)
-            variance = matrix.covariance(noise)
-            if turn >= 3 and matrix.expected_error(noise) < plan.enough * floor:
+            variance = SafeMatrix(equations, self._width).covariance(noise)
+            share = pools.expected_error(equations, noise, self._width)
+            errors.append(share)
+            DEBUG(turn, size, share, x, np.sqrt(np.diag(variance)))
+            if turn >= 3 and share < plan.enough:
                 break
         return Polished(x, variance, frozen, equations, noise)
 
@@ -320,27 +318,6 @@ class TransmissionFit:
             held[self.table.slice_of(worst)] = True
             names.remove(worst)
         return held
-
-    def _best_tiles(self, single: TileRows, halves: Samples) -> tuple[TileRows, Samples]:
-        """The size of tiles that leaves the least uncertainty, with the rows of both halves.
-
-        Small tiles show more of a sharp picture's detail, large ones average the noise before it is multiplied.
-        """
-        best: tuple[float, TileRows, Samples] | None = None
-        for size in TILE_SIZES:
-            tiles = self.tiles(size, self.plan.polish_pixels)
-            order = np.searchsorted(single.pixels, tiles.pixels)
-            rows = [tiles.rows(half[order]) for half in halves]
-            pool = CrossProducts(3 * len(tiles), 1 + self.table.length)
-            for sample in rows:
-                pool.add(sample)
-            matrix = SafeMatrix(cross_equations(pool.gram()), self._width)
-            variance = matrix.covariance(pool.gradient_noise(3))
-            total = float(np.minimum(np.diag(variance) / self._width**2, 1.0).sum())
-            if best is None or total < best[0]:
-                best = total, tiles, rows
-        assert best is not None
-        return best[1], best[2]
 
     def choose(self, candidates: list[Vector]) -> int:
         """The first candidate, unless another is better by two standard errors on paths that none has seen."""

@@ -105,8 +105,7 @@ class SafeMatrix:
 
         A column without effect may lie anywhere in its width, and none is less sure than that.
         """
-        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
-        result = inverse @ noise @ inverse
+        result = self.solution_covariance(noise)
         sd = np.sqrt(np.maximum(np.diag(result), 1e-300))
         shrink = np.minimum(self._width / sd, 1.0)
         result *= np.outer(shrink, shrink)
@@ -114,10 +113,10 @@ class SafeMatrix:
         result[self._blind, self._blind] = self._width[self._blind] ** 2
         return result
 
-    def expected_error(self, noise: Vector) -> float:
-        """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""
+    def solution_covariance(self, noise: Vector) -> Vector:
+        """The sandwich itself, however wide it is."""
         inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
-        return float(np.trace(inverse @ noise))
+        return inverse @ noise @ inverse
 
 
 def cautious_step(
