@@ -80,9 +80,13 @@ class TilePools:
     def expected_error(self, equations: NormalEquations, noise: Vector, width: Vector) -> float:
         """Mean square that `noise` in the gradient of `equations` leaves in single pixels, in parts of what is there.
 
-        That is the reference's noise once the fit is near: a product of different samples holds none of their own.
+        What is there is the reference's noise once the fit is near: a product of different samples holds none of their
+        own. Infinite while there are too few samples to tell.
         """
         single = cross_equations(self.pools[0].gram())
-        left = SafeMatrix(equations, width).solution_covariance(noise)
-        error = max(float(np.sum(single.hessian * left)), float(np.sum(equations.hessian * left)))
-        return error / max(2.0 * single.cost, 1e-30)
+        safe = SafeMatrix(equations, width)
+        left = safe.solution_covariance(noise)
+        if single.cost <= 0.0 or np.any(np.diag(single.hessian) < 0.0):
+            return np.inf
+        error = max(float(np.sum(single.hessian * left)), safe.expected_error(noise))
+        return error / (2.0 * single.cost)

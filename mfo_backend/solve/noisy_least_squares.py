@@ -118,6 +118,11 @@ class SafeMatrix:
         inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
         return inverse @ noise @ inverse
 
+    def expected_error(self, noise: Vector) -> float:
+        """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""
+        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
+        return float(np.trace(inverse @ noise))
+
 
 def cautious_step(
     equations: NormalEquations,
