@@ -75,9 +75,7 @@ def fit_material(
             candidates = verified
     best = _best(candidates, losses[-1])
     errors = picture_errors(reference, candidates[0].image, candidates[best].image, mask, display)
-    result = final_result(
-        renderer, candidates, best, status=status, stages=stages.reports, errors=errors, began=began
-    )
+    result = final_result(renderer, candidates, best, status=status, stages=stages.reports, errors=errors, began=began)
     return FitOutcome(result, candidates[0].image, candidates[best].image)
 
 

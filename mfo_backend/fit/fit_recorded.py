@@ -14,7 +14,6 @@ from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..types.event import Listener, Preview, Started
 from ..types.image import Encoding, Image, Pixels
-from ..types.result import FitResult
 from ..types.status import Status
 from .course import Course
 from .displayed_residual import DisplayedResidual

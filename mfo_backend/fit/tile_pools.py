@@ -23,13 +23,7 @@ CHANNELS = 3  # of a tile share their noise
 
 @dataclass(frozen=True)
 class TilePools:
-    """Samples of the same pixels in tiles of growing size; the first are single pixels.
-
-    Attributes
-    ----------
-    pixels
-        Flat indices of the pixels every sample has to hold, in this order.
-    """
+    """Samples of the same pixels in tiles of growing size; the first are single pixels."""
 
     tiles: tuple[TileRows, ...]
     pools: list[CrossProducts]
@@ -44,6 +38,7 @@ class TilePools:
 
     @property
     def pixels(self) -> NDArray[np.int64]:
+        """Flat indices of the pixels every sample has to hold, in this order."""
         return self.tiles[0].pixels
 
     def add(self, samples: Sequence[NDArray[np.float32]]) -> None:
@@ -63,7 +58,7 @@ class TilePools:
             pool.shifted(step)
 
     def best(self, width: Vector) -> tuple[NormalEquations, Vector, int]:
-        """Equations, the covariance of their gradient and the number of the size that leaves the least uncertainty.
+        """Equations, the covariance of their gradient and the index of the size that leaves the least uncertainty.
 
         `width` scales the unknowns; one that is unsure by all of it counts as much as one without effect.
         """

@@ -57,7 +57,7 @@ class TransmissionPlan:
     race_samples: int = 8
     race_steps: int = 7
     polish_pixels: int = 16_000
-    polish_paths: int = 40_000
+    polish_paths: int = 20_000
     polish_steps: int = 32
     guard_samples: int = 4
     enough: float = 0.005
@@ -198,6 +198,7 @@ class TransmissionFit:
             for name in held:
                 frozen[table.slice_of(name)] = True
             equations: list[NormalEquations] = []
+            order = np.arange(len(xs))
             for turn in range(plan.scan_steps + 1):
                 rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
                 equations = [_two_half(*pair) for pair in rows]
@@ -290,7 +291,7 @@ class TransmissionFit:
         equations, noise = None, variance
         pools = TilePools.of((self.tiles(size, plan.polish_pixels) for size in TILE_SIZES), 1 + self.table.length)
         # few pixels need more paths each: products of two noisy numbers average slowly
-        samples = int(np.clip(plan.polish_paths // len(pools.pixels), 4, 16))
+        samples = int(np.clip(plan.polish_paths // len(pools.pixels), 2, 16))
         moved, settled = 0.0, 0
         for turn in range(plan.polish_steps):
             (table,) = self._tables(pools.pixels, x[None], self._seed(stream + turn), samples)
@@ -300,7 +301,7 @@ class TransmissionFit:
             if moved > FAR:
                 pools.fade(0.25)
             pools.add(np.split(table, 2))
-            equations, noise, size = pools.best(self._width)
+            equations, noise, _ = pools.best(self._width)
             self._note(stage, x, equations.cost)
             step = self._step(equations, x, 1e-3, 0.1, frozen, noise)
             moved = float(np.max(np.abs(step) / self._width))
@@ -341,6 +342,7 @@ class TransmissionFit:
         tiles = self.tiles(4, self.plan.polish_pixels)
         xs, samples = np.array(candidates), self.plan.guard_samples
         gains: list[Vector] = []
+        mean = error = np.zeros(len(xs))
         for part in range(GUARD_PARTS):
             rows = self.halves(tiles, xs, seed=self._seed(999 + part), samples=samples, jacobian=False)
             if self.course.should_stop():

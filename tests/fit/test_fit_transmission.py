@@ -18,7 +18,6 @@ from tests.fit.stage_ends import assert_stages_leave_their_values
 from tests.render.scenes import AREA, FLOOR, SKY, write_scene
 
 NAMES = ["base_color", "roughness", "ior", "transmission_weight"]
-MOST_PASSES = 30.0
 TRUTH = {"base_color": (0.9, 0.6, 0.3), "roughness": 0.35, "ior": 1.4, "transmission_weight": 0.9}
 
 
@@ -159,7 +158,9 @@ def test_no_launch_is_longer_than_a_request_to_stop_may_wait(tmp_path, monkeypat
 
 def test_losses_of_the_users_choice_are_no_stages_of_glass(tmp_path):
     renderer = load(tmp_path, size=16)
-    settings = FitSettings(model="blender_principled", preset="fast", losses=("mse",), max_iterations=1, spp=1, verify_spp=1)
+    settings = FitSettings(
+        model="blender_principled", preset="fast", losses=("mse",), max_iterations=1, spp=1, verify_spp=1
+    )
     result = recover_material(
         renderer,
         Image(renderer.image(renderer.start, seed=5, spp=4), Encoding.LINEAR),
@@ -171,13 +172,18 @@ def test_losses_of_the_users_choice_are_no_stages_of_glass(tmp_path):
     assert "'paper' was used instead of 'fast'" in result.notes[-1]
 
 
-def test_paths_to_the_noise_of_a_small_picture(tmp_path):
-    """A count that does not depend on the machine: so many paths, whatever changes in the stages."""
+def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
     renderer = load(tmp_path, size=64)
-    passes = []
+    from mfo_backend.render.traced_paths import TracedPaths
+
+    launch, launches, passes = TracedPaths._launch, [], []
+    monkeypatch.setattr(TracedPaths, "_launch", lambda *given: launches.append(given) or launch(*given))
     for truth in ({}, {"roughness": 0.1, "ior": 1.6}, {"roughness": 0.5, "ior": 1.8, "base_color": (0.4, 0.5, 0.6)}):
         reference = renderer.image(renderer.table.pack({**TRUTH, **truth}), seed=5, spp=32)
         before = renderer.passes
         result, _ = fit(renderer, reference)
         passes.append(result.passes - before)
-    assert np.median(passes) < MOST_PASSES, passes
+    # 28, 56 and 25, of which verification is 2, in 70 launches when this was written (43, 68, 54 in 85 before samples
+    # were pooled over all sizes of tiles): counts that no machine changes; a quarter more is a change worth a look
+    assert np.sum(passes) < 140.0, passes
+    assert len(launches) < 90

@@ -56,7 +56,7 @@ def test_the_size_is_the_one_that_says_most(fine, of_columns, expected):
 
 
 def test_the_expected_error_is_that_of_the_solutions():
-    picture, columns = scene(False)
+    _, columns = scene(False)
     stated, found = [], []
     for seed in range(40):
         pools = filled(False, seed=seed)
