@@ -22,10 +22,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from .lamps.met_lamps import DELTA
 from .pixel_cells import PixelCells
 from .primary_rays import GAUSS, PrimaryRays
-
-DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 
 
 @dataclass(frozen=True)

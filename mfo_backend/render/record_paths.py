@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
 from .even_points import even_points
-from .highlight_cells import DELTA, Highlights, highlight_cells
+from .highlight_cells import Highlights, highlight_cells
+from .lamps.met_lamps import DELTA, SceneLamps
 from .pixel_cells import PixelCells
 from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_order
 from .proposal import DefensiveProposal
@@ -35,7 +36,8 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
-    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. With `highlights` more
+    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
+    are the only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more
     rays start where lights of no extent are mirrored.
     """
 
@@ -48,6 +50,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     light_paths: LightPaths | None = None
+    pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
 
 
@@ -87,6 +90,9 @@ def record_paths(
         If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
+        lamps = SceneLamps(scene)
+        if lamps and settings.light_paths is None:
+            settings = replace(settings, light_paths=LightPaths())  # Mitsuba's own integrators do not meet lamps
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
@@ -102,6 +108,9 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
+        if lamps.seen:
+            before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
+            glow = before if glow is None else glow + before
         si = _facing(shape, settings, si)
         held = ()
         if settings.held:
@@ -111,7 +120,7 @@ def record_paths(
         dr.eval(si, position, filter_weight, held)
         hits = _Hits(si, position, filter_weight, held)
         lanes = _delta_lights(scene, hits)
-        lanes += _sampled_lights(scene, hits, settings)
+        lanes += _sampled_lights(scene, hits, settings, lamps)
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
@@ -128,17 +137,19 @@ def record_paths(
 
 
 def indirect_share(
-    scene: mi.Scene, shape: mi.Shape, depth: int, two_sided: bool, light_paths: LightPaths | None = None
+    scene: mi.Scene,
+    shape: mi.Shape,
+    depth: int,
+    two_sided: bool,
+    light_paths: LightPaths | None = None,
+    *,
+    stride: int = 1,
 ) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
+    direct_only = RecordSettings(grid=1, depth=2, stride=stride, two_sided=two_sided)
+    with_others = replace(direct_only, depth=depth, light_paths=light_paths)
     with dr.suspend_grad():
-        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2, two_sided=two_sided), allow_dark=True)
-        everything = record_paths(
-            scene,
-            shape,
-            RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths),
-            allow_dark=True,
-        )
+        direct, everything = (record_paths(scene, shape, s, allow_dark=True) for s in (direct_only, with_others))
         lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
     return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
@@ -147,6 +158,9 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
     """Camera rays on the settings' grid, and more of them in narrow highlights if the settings say so."""
     sensor = scene.sensors()[0]
     order, tile = tile_order(width, height, settings.stride)
+    if settings.pixels is not None:
+        kept = settings.pixels.reshape(-1)[order]
+        order, tile = order[kept], tile[kept]
     per_axis = np.broadcast_to(settings.grid, (height, width)).reshape(-1)[order]
     if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
         return primary_rays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
@@ -192,7 +206,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
     return lanes
 
 
-def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> list[_Lanes]:
+def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps) -> list[_Lanes]:
     """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
     si, position, share = hits.si, hits.position, hits.share
     everywhere = list(scene.emitters())
@@ -235,6 +249,9 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
     ds = mi.DirectionSample3f(scene, far, si)
     light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
     weight = emission / (light_density + density)
+    if lamps:
+        weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
+        emission += lamps.met(ray, far, valid)
     if indirect:
         # a path tracer's radiance along the ray, less what the ray meets directly
         before = None
