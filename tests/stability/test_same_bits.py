@@ -3,15 +3,21 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from mfo_backend.scene.image_file import read_image
 
-from .test_extremes import POINT, SKY, run
+from .test_extremes import POINT, ROOT, SKY, run
+
+PRESETS, LIGHTS = ("fast", "balanced"), {"point": POINT, "sky": SKY}
 
 
 def without_times(result: dict[str, Any]) -> dict[str, Any]:
@@ -23,28 +29,46 @@ def without_times(result: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in result.items() if k != "seconds"} | {"stages": stages}
 
 
-@pytest.mark.parametrize("light", [POINT, SKY], ids=["point", "sky"])
-@pytest.mark.parametrize("preset", ["fast", "balanced"])
-def test_threads_change_no_bit(tmp_path: Path, light: str, preset: str) -> None:
-    from mfo_backend.render.variant import load_variant
+def results(threads: int, folder: Path) -> dict[str, Any]:
+    """Of every job the result and a digest of its picture."""
+    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+
+    if needs_llvm():
+        configure_llvm()
+    from mfo_backend.render.variant import load_variant, use_threads
 
     load_variant()
-    import drjit as dr
-
-    before, results, pictures = dr.thread_count(), [], []
-    try:
-        for number, threads in enumerate((1, 4, 4)):
-            dr.set_thread_count(threads)
-            folder = tmp_path / str(number)
-            folder.mkdir()
-            _, sentence, result = run(folder, light=light, power=1.0, preset=preset)
+    use_threads(threads)
+    found = {}
+    for preset in PRESETS:
+        for name, light in LIGHTS.items():
+            job = folder / f"{preset}_{name}"
+            job.mkdir()
+            _, sentence, result = run(job, light=light, power=1.0, preset=preset)
             assert result, sentence
-            results.append(without_times(result))
-            pictures.append(read_image(folder / "job" / "pictures" / "result.exr").pixels)
-    finally:
-        dr.set_thread_count(before)
-    assert "seconds" not in str(results[0])
-    assert results[0]["errors"]["flip"][0] > 0
-    for result, picture in zip(results[1:], pictures[1:], strict=True):
-        assert result == results[0]
-        np.testing.assert_array_equal(picture, pictures[0])
+            pixels = read_image(job / "job" / "pictures" / "result.exr").pixels
+            found[job.name] = [without_times(result), hashlib.sha256(pixels.tobytes()).hexdigest()]
+    return found
+
+
+@pytest.mark.slow
+def test_threads_change_no_bit(tmp_path: Path) -> None:
+    found = []
+    for number, threads in enumerate((1, 4, 4)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        words = [sys.executable, "-m", "tests.stability.test_same_bits", str(threads), str(folder)]
+        environment = dict(os.environ, PYTHONPATH=str(ROOT))
+        done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=250)
+        assert done.returncode == 0, done.stderr[-2000:]
+        found.append(json.loads(done.stdout.splitlines()[-1]))
+    assert list(found[0]) == ["fast_point", "fast_sky", "balanced_point", "balanced_sky"]
+    for name, (result, _) in found[0].items():
+        assert "seconds" not in str(result)
+        assert result["errors"]["flip"][0] > 0
+        assert [other[name] for other in found] == [found[0][name]] * 3
+
+
+if __name__ == "__main__":
+    print(json.dumps(results(int(sys.argv[1]), Path(sys.argv[2]))), flush=True)
+    os._exit(0)
