@@ -158,9 +158,13 @@ def load_mitsuba_renderer(
 
     from ..material import principled_plugin
     from . import cycles_path
+    from .lamps import lamp_plugins
 
     principled_plugin.register()
     cycles_path.register()
+    lamp_plugins.register()
+    if light_paths is None and any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter")):
+        light_paths = LightPaths()  # changes nothing but for rays that meet lamps, which Mitsuba's own integrators miss
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
     with two_threads():

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
+from .lamps.met_lamps import DELTA, SceneLamps
 from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
-
-DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 
 
 @dataclass(frozen=True)
@@ -86,6 +85,9 @@ def record_paths(
         If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
+        lamps = SceneLamps(scene)
+        if lamps and settings.light_paths is None:
+            settings = replace(settings, light_paths=LightPaths())  # Mitsuba's own integrators do not meet lamps
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         grid = np.broadcast_to(settings.grid, (height, width))
@@ -102,6 +104,9 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
+        if lamps.seen:
+            before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
+            glow = before if glow is None else glow + before
         if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
             si = _face_camera(si)
         held = ()
@@ -112,7 +117,7 @@ def record_paths(
         dr.eval(si, position, filter_weight, held)
         hits = _Hits(si, position, filter_weight, held)
         lanes = _delta_lights(scene, hits)
-        lanes += _sampled_lights(scene, hits, settings)
+        lanes += _sampled_lights(scene, hits, settings, lamps)
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
@@ -169,7 +174,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
     return lanes
 
 
-def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> list[_Lanes]:
+def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps) -> list[_Lanes]:
     """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
     si, position, share = hits.si, hits.position, hits.share
     everywhere = list(scene.emitters())
@@ -208,6 +213,9 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
     ds = mi.DirectionSample3f(scene, far, si)
     light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
     weight = emission / (light_density + density)
+    if lamps:
+        weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
+        emission += lamps.met(ray, far, valid)
     if indirect:
         # a path tracer's radiance along the ray, less what the ray meets directly
         before = None
