@@ -23,9 +23,14 @@ class SceneLamps:
 
     def __init__(self, scene: mi.Scene) -> None:
         self.lamps: list[tuple[Lamp, Any]] = []
-        for index, emitter in enumerate(scene.emitters()):
-            if hasattr(emitter, "crossing") and not mi.has_flag(emitter.flags(), DELTA):
-                self.lamps.append((emitter, dr.opaque(mi.Float, float(scene.pdf_emitter(mi.UInt32(index))[0]))))
+        met = [
+            (index, emitter)
+            for index, emitter in enumerate(scene.emitters())
+            if hasattr(emitter, "crossing") and not mi.has_flag(emitter.flags(), DELTA)
+        ]
+        if met:
+            chances = scene.pdf_emitter(mi.UInt32([index for index, _ in met])).numpy()
+            self.lamps = [(lamp, dr.opaque(mi.Float, float(c))) for (_, lamp), c in zip(met, chances, strict=True)]
 
     def __bool__(self) -> bool:
         return bool(self.lamps)
