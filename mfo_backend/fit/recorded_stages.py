@@ -30,13 +30,13 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 
 # Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
 LEAST_NOISE = 0.002
+# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
+# weights, which come from the solution that it is compared with, are only about right
+CLEARLY_LOWER = 0.97
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
-# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
-# weights, which come from the solution that it is compared with, are only about right
-CLEARLY_LOWER = 0.97
 MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
 
 
@@ -234,6 +234,12 @@ class RecordedFit:
         limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
+    def _rival(self, problem: Problem, solution: Solution, others: Sequence[Vector]) -> Vector | None:
+        """The best of the other basins on the same problem, if it is clearly better."""
+        found = [self._solve(problem.equations, x, self.plan.trial_evaluations) for x in others]
+        best = min(found, key=lambda rival: rival.equations.cost, default=solution)
+        return best.x if best.equations.cost < CLEARLY_LOWER * solution.equations.cost else None
+
     def refine(
         self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None, others: Sequence[Vector] = ()
     ) -> tuple[Solution, Problem]:
@@ -271,12 +277,6 @@ class RecordedFit:
                 solution, problem = self._refine_sampled(stage, rival, make, weigh)
                 stage.vector = solution.x
         return solution, problem
-
-    def _rival(self, problem: Problem, solution: Solution, others: Sequence[Vector]) -> Vector | None:
-        """The best of the other basins on the same problem, if it is clearly better."""
-        found = [self._solve(problem.equations, x, self.plan.trial_evaluations) for x in others]
-        best = min(found, key=lambda rival: rival.equations.cost, default=solution)
-        return best.x if best.equations.cost < CLEARLY_LOWER * solution.equations.cost else None
 
     def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
