@@ -33,7 +33,8 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
-    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`.
+    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
+    are the only ones looked at; where they hold all that see the target, nothing is missed.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -45,6 +46,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     light_paths: LightPaths | None = None
+    pixels: NDArray[np.bool_] | None = None
 
 
 @dataclass
@@ -89,7 +91,7 @@ def record_paths(
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         grid = np.broadcast_to(settings.grid, (height, width))
-        rays = primary_rays(sensor, grid, settings.seed, settings.stride)
+        rays = primary_rays(sensor, grid, settings.seed, settings.stride, settings.pixels)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
         dr.eval(rays, hit, on_target)
@@ -132,17 +134,19 @@ def record_paths(
 
 
 def indirect_share(
-    scene: mi.Scene, shape: mi.Shape, depth: int, two_sided: bool, light_paths: LightPaths | None = None
+    scene: mi.Scene,
+    shape: mi.Shape,
+    depth: int,
+    two_sided: bool,
+    light_paths: LightPaths | None = None,
+    *,
+    stride: int = 1,
 ) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
+    direct_only = RecordSettings(grid=1, depth=2, stride=stride, two_sided=two_sided)
+    with_others = replace(direct_only, depth=depth, light_paths=light_paths)
     with dr.suspend_grad():
-        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2, two_sided=two_sided), allow_dark=True)
-        everything = record_paths(
-            scene,
-            shape,
-            RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths),
-            allow_dark=True,
-        )
+        direct, everything = (record_paths(scene, shape, s, allow_dark=True) for s in (direct_only, with_others))
         lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
     return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
