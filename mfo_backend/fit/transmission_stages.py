@@ -36,7 +36,7 @@ TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
-FAR = 0.015  # of the range: samples from so far away count half, for their derivatives are others
+FAR = {True: 0.015, False: 0.06}  # of the range, of sharp materials and others: samples from so far away count half
 TRUST = 0.25  # of the range: the longest step
 
 
@@ -299,7 +299,8 @@ class TransmissionFit:
             if self.course.should_stop():
                 break
             table[..., 1:][..., frozen] = 0.0
-            pools.fade(1.0 / (1.0 + (moved / FAR) ** 2))
+            far = FAR[self.paths.roughness(x) < SECANT_BELOW]
+            pools.fade(1.0 / (1.0 + (moved / far) ** 2))
             pools.add(np.split(table, 2))
             equations, noise, _ = pools.best(self._width)
             self._note(stage, x, equations.cost)
@@ -310,13 +311,13 @@ class TransmissionFit:
             stage.vector = x
             variance = SafeMatrix(equations, self._width).covariance(noise)
             share = pools.expected_error(equations, noise, self._width)
-            settled = settled + 1 if moved <= FAR and share < plan.enough else 0
+            settled = settled + 1 if moved <= far and share < plan.enough else 0
             if settled == SETTLED:
                 break
         return Polished(x, variance, frozen, equations, noise)
 
     def _moved(self, step: Vector) -> float:
-        """How far a step goes in what shifts the paths, in parts of the range; in all else pictures are nearly linear."""
+        """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""
         parts = [self.table.slice_of(name) for name in GEOMETRIC if name in self.table.names]
         return max((float(np.max(np.abs(step[part]) / self._width[part])) for part in parts), default=0.0)
 
