@@ -176,6 +176,7 @@ def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
     renderer = load(tmp_path, size=64)
     from mfo_backend.render.traced_paths import TracedPaths
 
+    monkeypatch.setattr("mfo_backend.fit.course._PREVIEW_SECONDS", np.inf)  # they come by the clock
     launch, launches, passes = TracedPaths._launch, [], []
     monkeypatch.setattr(TracedPaths, "_launch", lambda *given: launches.append(given) or launch(*given))
     for truth in ({}, {"roughness": 0.1, "ior": 1.6}, {"roughness": 0.5, "ior": 1.8, "base_color": (0.4, 0.5, 0.6)}):
