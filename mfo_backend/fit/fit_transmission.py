@@ -125,7 +125,7 @@ def _picture(renderer: MitsubaRenderer, x: Vector, seed: int, spp: int, should_s
     return (total / done).astype(np.float32)
 
 
-def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, int], seed: int) -> Pixels:
+def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:
     """A coarse picture: few paths of one pixel in each block, so that its cost does not grow with the picture."""
     height, width = shape
     block = math.ceil(math.sqrt(height * width * _PREVIEW_SPP / _PREVIEW_PATHS))

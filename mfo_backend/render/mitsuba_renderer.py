@@ -80,11 +80,18 @@ class MitsubaRenderer:
             import drjit as dr
             import mitsuba as mi
 
-            theta = self._update(vector, differentiable=True)
-            gradient = mi.TensorXf(np.ascontiguousarray(pixel_gradient, dtype=np.float32))
-            self._integrator.render_backward(self._scene, self._params, gradient, self._sensor, _opaque(seed), spp)
+            from .ordered_picture import opaque, parts_of
+
+            total = np.zeros(len(vector))
+            for part in parts_of(pixel_gradient[..., 0].size, seed, spp):
+                theta = self._update(vector, differentiable=True)
+                gradient = mi.TensorXf(np.ascontiguousarray(part.share * pixel_gradient, dtype=np.float32))
+                self._integrator.render_backward(
+                    self._scene, self._params, gradient, self._sensor, opaque(part.seed), part.spp
+                )
+                total += np.array(dr.grad(theta), dtype=np.float64)
             self.passes += 2.0
-            return np.array(dr.grad(theta), dtype=np.float64)
+            return total
 
         return image, pullback
 
@@ -119,8 +126,9 @@ class MitsubaRenderer:
         return theta
 
     def _render(self, seed: int, spp: int) -> Pixels:
-        image = self._integrator.render(self._scene, self._sensor, seed=_opaque(seed), spp=spp)
-        pixels = np.array(image, dtype=np.float32)
+        from .ordered_picture import ordered_picture
+
+        pixels = ordered_picture(self._integrator, self._scene, self._sensor, seed=seed, spp=spp)
         pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
         return pixels
 
@@ -150,9 +158,13 @@ def load_mitsuba_renderer(
 
     from ..material import principled_plugin
     from . import cycles_path
+    from .lamps import lamp_plugins
 
     principled_plugin.register()
     cycles_path.register()
+    lamp_plugins.register()
+    if light_paths is None and any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter")):
+        light_paths = LightPaths()  # changes nothing but for rays that meet lamps, which Mitsuba's own integrators miss
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
     with two_threads():
@@ -188,14 +200,6 @@ def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[st
             raise BadInputError(f"Material {material.target.bsdf_id!r} has {len(found)} parameters {end!r}, not one.")
         keys[name] = found[0]
     return keys
-
-
-def _opaque(seed: int) -> Any:
-    """A seed whose value is not baked into the kernel, so that the next seed needs no compilation."""
-    import drjit as dr
-    import mitsuba as mi
-
-    return dr.opaque(mi.UInt32, seed)
 
 
 @contextlib.contextmanager

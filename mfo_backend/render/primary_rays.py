@@ -50,11 +50,23 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
     return sampler
 
 
-def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: int = 1) -> PrimaryRays:
-    """Camera rays, `grid` (height, width) squared for each pixel, in every `stride`-th tile along both axes."""
+def primary_rays(
+    sensor: mi.Sensor,
+    grid: NDArray[np.int64],
+    seed: int,
+    stride: int = 1,
+    only: NDArray[np.bool_] | None = None,
+) -> PrimaryRays:
+    """Camera rays, `grid` (height, width) squared for each pixel, in every `stride`-th tile along both axes.
+
+    With `only` (height, width) the other pixels have none.
+    """
     film = sensor.film()
     width, height = (int(v) for v in film.crop_size())
     order, tile = tile_order(width, height, stride)
+    if only is not None:
+        kept = only.reshape(-1)[order]
+        order, tile = order[kept], tile[kept]
     per_axis = grid.reshape(-1)[order]
     position = mi.UInt32(np.repeat(np.arange(len(order), dtype=np.uint32), per_axis**2))
     first = mi.UInt32(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]).astype(np.uint32))

@@ -10,16 +10,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
 from ..types.parameter import Value
+from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
+from .primary_rays import tile_order
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
 from .recorded_jacobian import RecordedJacobian
@@ -29,6 +33,9 @@ from .recorded_paths import LaneGroups, RecordedPaths
 # noise of 64 samples a pixel.
 NEGLIGIBLE_INDIRECT = 0.005
 MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
+# Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
+MOST_RAYS = 12_000_000
+BYTES_PER_RAY = 272
 DEEPEST = 16  # path length of a scene without a limit
 
 
@@ -70,7 +77,11 @@ class RecordedScene:
         depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
-        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths)
+        width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
+        stride = max(1, math.ceil(math.sqrt(width * height / MOST_RAYS)))
+        share = indirect_share(
+            scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths, stride=stride
+        )
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, 2, (note,))
@@ -92,10 +103,40 @@ class RecordedScene:
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
+        stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
-        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths)
+        settings = RecordSettings(
+            grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths, pixels
+        )
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def _affordable(self, grid: int | NDArray[np.int64], stride: int) -> tuple[int, NDArray[np.bool_] | None]:
+        """The stride with which a recording does not take too many camera rays, and the pixels it should look at.
+
+        Raises
+        ------
+        BadInputError
+            If even that is more than the memory that is left.
+        """
+        width, height = (int(n) for n in self.renderer.scene.sensors()[0].film().crop_size())
+        squares = np.broadcast_to(np.square(grid), (height, width))
+        pixels = None
+        count = _rays(squares, stride)
+        if count > MOST_RAYS:
+            pixels = self._near_target
+            while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
+                stride += 1
+        require_memory(
+            count * BYTES_PER_RAY, what="Tracing the light of this picture", cure="use a smaller picture or free some"
+        )
+        return stride, pixels
+
+    @cached_property
+    def _near_target(self) -> NDArray[np.bool_]:
+        """Pixels that may see the target: those that do and their neighbours in reach of the pixel filter."""
+        reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
+        return binary_dilation(self.renderer.target_mask(), np.ones((3, 3), bool), reach)
 
     def evaluator(
         self, paths: RecordedPaths, groups: LaneGroups
@@ -117,6 +158,15 @@ class RecordedScene:
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed[name]
+
+
+def _rays(squares: NDArray[np.int64], stride: int) -> int:
+    """Camera rays in every `stride`-th tile."""
+    if stride == 1:
+        return int(squares.sum())
+    height, width = squares.shape
+    order, _ = tile_order(width, height, stride)
+    return int(squares.reshape(-1)[order].sum())
 
 
 def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value | None]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mfo_backend.render.memory import MemoryLeft
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.errors import BadInputError
 from tests.render.scenes import AREA, FLOOR, POINT, SKY, SUN_AND_SPOT, write_scene
@@ -79,6 +80,35 @@ def test_a_large_picture_is_recorded_by_tiles(tmp_path, monkeypatch):
     paths = scene.record(renderer.start, grid=4, seed=0, near=False)
     assert paths.lanes <= 4000
     assert len(np.unique(paths.tile)) >= 2
+
+
+def test_many_rays_beside_a_small_target_are_left_out(tmp_path, monkeypatch):
+    renderer, scene = recorded_scene(tmp_path, POINT)
+    everything = scene.record(renderer.start, grid=3, seed=0, near=False)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 9 * int(scene._near_target.sum()))
+    from mfo_backend.render import record_paths  # needs the variant
+
+    taken = []
+    original = record_paths.primary_rays
+    monkeypatch.setattr(record_paths, "primary_rays", lambda *words: taken.append(original(*words)) or taken[-1])
+    near = scene.record(renderer.start, grid=3, seed=0, near=False)
+    assert len(taken[0].pixel) == scene._near_target.sum() < scene._near_target.size
+    for name in ("wi", "wo", "weight"):
+        np.testing.assert_array_equal(np.array(getattr(everything, name)), np.array(getattr(near, name)))
+    np.testing.assert_array_equal(everything.pixel, near.pixel)
+    np.testing.assert_array_equal(everything.constant, near.constant)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 1000)
+    assert 0 < scene.record(renderer.start, grid=3, seed=0, near=False).lanes <= 1000
+
+
+def test_a_recording_beyond_the_memory_is_refused_before_it_begins(tmp_path, monkeypatch):
+    renderer, scene = recorded_scene(tmp_path, POINT)
+    left = [MemoryLeft(50_000, "on this machine")]
+    monkeypatch.setattr("mfo_backend.render.memory.memory_left", lambda: left)
+    with pytest.raises(
+        BadInputError, match=r"needs about \d+ MB of memory and 0 MB are left on this machine: use a sm"
+    ):
+        scene.record(renderer.start, grid=3, seed=0, near=False)
 
 
 def test_the_same_seed_gives_the_same_recording(tmp_path):
