@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..render.primary_rays import TILE
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
@@ -37,7 +38,11 @@ MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
-MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
+# After a solve its recording is too old if the tiles changed by this share, or if one over the effective number of
+# samples grew by this factor. The first is what mends fits that began far away, though most of those keep their
+# samples; the second finds a lobe that became narrow in few tiles.
+MOVED = 0.15
+FEWER = 1.5
 
 
 @dataclass(frozen=True)
@@ -50,10 +55,14 @@ class RecordedPlan:
         Whether to look for starts; without it only the scene's own material and a random one are tried.
     grid_first, grid_last
         Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
+    side_last
+        Pixels along each side of the tiles of the last stage where light is sampled. Quarters of the tiles of the
+        stages before see twice the detail and lose fewer pixels to the silhouette; single pixels see too much of the
+        recording's own noise.
     scan_lanes, start_lanes
-        Recorded lanes the scan and the fits from its nodes look at.
-    refine_lanes
-        Those the last stage looks at where every light is exact: without noise more of them say nothing new.
+        Recorded lanes the scan and the fits from its nodes look at where light is sampled.
+    exact_scan_lanes, exact_start_lanes, refine_lanes
+        Those that they and the last stage look at where every light is exact: without noise more say nothing new.
     starts
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     trial_evaluations
@@ -67,9 +76,12 @@ class RecordedPlan:
     scan: bool = True
     grid_first: int = 4
     grid_last: int = 8
+    side_last: int = 2
     scan_lanes: int = 20_000
     start_lanes: int = 80_000
-    refine_lanes: int = 160_000
+    exact_scan_lanes: int = 8_000
+    exact_start_lanes: int = 20_000
+    refine_lanes: int = 80_000
     starts: int = 3
     trial_evaluations: int = 10
     keep_factor: float = 10.0
@@ -160,14 +172,16 @@ class RecordedFit:
             # where every light is exact, only the pixel's footprint is sampled
             grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
-            groups = all_groups(self.paths, tiles=sampled)
-            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make, calm=True)
+            groups = all_groups(self.paths, TILE if sampled else 1)
+            lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
+            few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             nodes = []
             if plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
                 stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
-            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make, calm=True)
+            lanes = plan.start_lanes if sampled else plan.exact_start_lanes
+            more = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             metals = [node for node in nodes if node.metal]
@@ -254,7 +268,7 @@ class RecordedFit:
                 grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
                 if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
                     self._record(start, grid, 1)
-                groups = fewer_groups(all_groups(self.paths, tiles=False), self.reference, self.plan.refine_lanes)
+                groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
                 problem = self.problem(groups, make)
                 solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
                 stage.vector = solution.x
@@ -263,9 +277,12 @@ class RecordedFit:
             for number in range(1, MOST_RECORDINGS + 1):
                 problem = None  # and with it the recording before
                 self._record(start, self.plan.grid_last, number)
+                fresh = self._own_variance(start)
                 solution, problem = self._refine_sampled(stage, start, make, weigh)
                 stage.vector = solution.x
-                if self._moved(problem, start, solution.x) < MOVED or self.course.should_stop():
+                fewer = self._own_variance(solution.x) > FEWER * fresh
+                moved = self._moved(problem, start, solution.x) > MOVED
+                if not (fewer or moved) or self.course.should_stop():
                     break
                 start = solution.x
             assert solution is not None
@@ -278,6 +295,11 @@ class RecordedFit:
                 stage.vector = solution.x
         return solution, problem
 
+    def _own_variance(self, x: Vector) -> float:
+        """Mean over the tiles of one over their effective number of samples: the recording's own relative variance."""
+        samples = self.scene.effective_samples(x, self.paths, all_groups(self.paths, TILE))
+        return float(np.mean(1.0 / samples[samples > 0.0])) if samples.any() else 0.0
+
     def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
@@ -287,27 +309,27 @@ class RecordedFit:
     def _refine_sampled(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
     ) -> tuple[Solution, Problem]:
-        groups = all_groups(self.paths, tiles=True)
+        groups = all_groups(self.paths, self.plan.side_last)
         if weigh is None:
             problem = self.problem(groups, make)
             return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
 
         def solve(x: Vector) -> tuple[Solution, Problem]:
-            self.noise = self._noise(x, groups)
+            self.noise = self._noise(x, groups, self.plan.side_last)
             problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
             return self._solve(self.course.watch(stage, problem.equations), x, 12), problem
 
         # the first weights come from a model that is still off
         return solve(solve(start)[0].x)
 
-    def _noise(self, x: Vector, groups: LaneGroups) -> TileNoise:
+    def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)[:, :, 0]
-        return tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior)
+        return tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior, side)
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
-        groups = all_groups(self.paths, tiles=True)
-        self.noise = self._noise(x, groups)
+        groups = all_groups(self.paths, TILE)
+        self.noise = self._noise(x, groups, TILE)
         problem = self.problem(groups, self._weighing(self.noise, groups))
         values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
         # as far as a few outliers go, it is their number that counts and not their size

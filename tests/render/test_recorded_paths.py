@@ -65,7 +65,9 @@ def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
 
 def test_delta_lights_take_one_lane_for_each_ray_and_36_bytes(tmp_path):
     renderer, scene = recorded_scene(tmp_path, POINT)
-    paths = scene.record(renderer.start, grid=2, seed=0, near=False)
+    from mfo_backend.render.highlight_cells import Highlights
+
+    paths = scene.record(renderer.start, grid=2, seed=0, near=False, highlights=Highlights(most=0))
     covered = int(renderer.target_mask().sum())
     assert not scene.needs.sampled
     assert paths.lanes <= 4 * covered
@@ -84,21 +86,24 @@ def test_a_large_picture_is_recorded_by_tiles(tmp_path, monkeypatch):
 
 def test_many_rays_beside_a_small_target_are_left_out(tmp_path, monkeypatch):
     renderer, scene = recorded_scene(tmp_path, POINT)
-    everything = scene.record(renderer.start, grid=3, seed=0, near=False)
-    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 9 * int(scene._near_target.sum()))
+    from mfo_backend.render.highlight_cells import Highlights
+
+    uniform = Highlights(most=0)
+    everything = scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 16 * int(scene._near_target.sum()))
     from mfo_backend.render import record_paths  # needs the variant
 
     taken = []
     original = record_paths.primary_rays
-    monkeypatch.setattr(record_paths, "primary_rays", lambda *words: taken.append(original(*words)) or taken[-1])
-    near = scene.record(renderer.start, grid=3, seed=0, near=False)
+    monkeypatch.setattr(record_paths, "primary_rays", lambda *a, **b: taken.append(original(*a, **b)) or taken[-1])
+    near = scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform)
     assert len(taken[0].pixel) == scene._near_target.sum() < scene._near_target.size
     for name in ("wi", "wo", "weight"):
         np.testing.assert_array_equal(np.array(getattr(everything, name)), np.array(getattr(near, name)))
     np.testing.assert_array_equal(everything.pixel, near.pixel)
     np.testing.assert_array_equal(everything.constant, near.constant)
     monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 1000)
-    assert 0 < scene.record(renderer.start, grid=3, seed=0, near=False).lanes <= 1000
+    assert 0 < scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform).lanes <= 1000
 
 
 def test_a_recording_beyond_the_memory_is_refused_before_it_begins(tmp_path, monkeypatch):
