@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +31,9 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 
 # Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
 LEAST_NOISE = 0.002
+# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
+# weights, which come from the solution that it is compared with, are only about right
+CLEARLY_LOWER = 0.97
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
@@ -245,10 +248,19 @@ class RecordedFit:
         limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
-    def refine(self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> tuple[Solution, Problem]:
+    def _rival(self, problem: Problem, solution: Solution, others: Sequence[Vector]) -> Vector | None:
+        """The best of the other basins on the same problem, if it is clearly better."""
+        found = [self._solve(problem.equations, x, self.plan.trial_evaluations) for x in others]
+        best = min(found, key=lambda rival: rival.equations.cost, default=solution)
+        return best.x if best.equations.cost < CLEARLY_LOWER * solution.equations.cost else None
+
+    def refine(
+        self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None, others: Sequence[Vector] = ()
+    ) -> tuple[Solution, Problem]:
         """Stage `refine`: all residuals, on a new and finer recording near the solution where the light is sampled.
 
-        There, residuals count in standard deviations of the reference's noise by `weigh` if given.
+        There, residuals count in standard deviations of the reference's noise by `weigh` if given, and solutions in
+        other basins (`others`) are tried: they may have cost more by the noise of the first recording alone.
         """
         with self.course.stage("refine") as stage:
             if not self.scene.needs.sampled:
@@ -273,8 +285,14 @@ class RecordedFit:
                 if not (fewer or moved) or self.course.should_stop():
                     break
                 start = solution.x
-        assert solution is not None
-        assert problem is not None
+            assert solution is not None
+            assert problem is not None
+            rival = self._rival(problem, solution, others)
+            if rival is not None:
+                problem = None
+                self._record(rival, self.plan.grid_last, self.recordings + 1)
+                solution, problem = self._refine_sampled(stage, rival, make, weigh)
+                stage.vector = solution.x
         return solution, problem
 
     def _own_variance(self, x: Vector) -> float:

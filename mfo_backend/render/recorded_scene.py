@@ -66,6 +66,7 @@ class RecordedScene:
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
         self._covered = covered
+        self._taken = 0  # bytes for the rays of the largest recording so far
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
@@ -138,9 +139,14 @@ class RecordedScene:
             pixels = self._near_target
             while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
                 stride += 1
-        require_memory(
-            count * BYTES_PER_RAY, what="Tracing the light of this picture", cure="use a smaller picture or free some"
-        )
+        needed = count * BYTES_PER_RAY
+        if needed > self._taken:  # Dr.Jit keeps what an earlier recording has freed
+            require_memory(
+                needed - self._taken,
+                what="Tracing the light of this picture",
+                cure="use a smaller picture or free some",
+            )
+            self._taken = needed
         return stride, pixels
 
     @cached_property

@@ -114,6 +114,12 @@ def test_a_recording_beyond_the_memory_is_refused_before_it_begins(tmp_path, mon
         BadInputError, match=r"needs about \d+ MB of memory and 0 MB are left on this machine: use a sm"
     ):
         scene.record(renderer.start, grid=3, seed=0, near=False)
+    left[0] = MemoryLeft(10**9, "on this machine")
+    scene.record(renderer.start, grid=3, seed=0, near=False)
+    left[0] = MemoryLeft(0, "on this machine")  # the next one takes what the first has given back
+    assert scene.record(renderer.start, grid=3, seed=1, near=False).lanes > 0
+    with pytest.raises(BadInputError, match="use a smaller picture"):
+        scene.record(renderer.start, grid=4, seed=1, near=False)
 
 
 def test_the_same_seed_gives_the_same_recording(tmp_path):
