@@ -80,8 +80,10 @@ class MitsubaRenderer:
             import drjit as dr
             import mitsuba as mi
 
+            from ..material.own_memory import own_memory
+
             theta = self._update(vector, differentiable=True)
-            gradient = mi.TensorXf(np.ascontiguousarray(pixel_gradient, dtype=np.float32))
+            gradient = mi.TensorXf(own_memory(pixel_gradient, mi.Float), pixel_gradient.shape)
             self._integrator.render_backward(self._scene, self._params, gradient, self._sensor, _opaque(seed), spp)
             self.passes += 2.0
             return np.array(dr.grad(theta), dtype=np.float64)
@@ -100,7 +102,9 @@ class MitsubaRenderer:
         position = mi.Point2f((column + 0.5) / columns, (row + 0.5) / rows)
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
         surface = self._scene.ray_intersect_preliminary(ray)
-        hit = surface.is_valid() & (surface.shape == mi.ShapePtr(self.shape))
+        target = mi.ShapePtr(self.shape)
+        dr.make_opaque(target)  # its number in this process is no part of the kernel
+        hit = surface.is_valid() & (surface.shape == target)
         return np.array(hit).reshape(height, _MASK_RAYS, width, _MASK_RAYS).any(axis=(1, 3))
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:
@@ -108,7 +112,9 @@ class MitsubaRenderer:
         import drjit as dr
         import mitsuba as mi
 
-        theta = mi.Float(np.asarray(vector, dtype=np.float32))
+        from ..material.own_memory import own_memory
+
+        theta = own_memory(vector, mi.Float)
         if differentiable:
             dr.enable_grad(theta)
         for name, key in self._keys.items():

@@ -14,6 +14,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
+
 TILE = 4  # pixels; a tile is the smallest residual when the recording itself is noisy
 
 
@@ -56,14 +58,14 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
     width, height = (int(v) for v in film.crop_size())
     order, tile = tile_order(width, height, stride)
     per_axis = grid.reshape(-1)[order]
-    position = mi.UInt32(np.repeat(np.arange(len(order), dtype=np.uint32), per_axis**2))
-    first = mi.UInt32(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]).astype(np.uint32))
+    position = own_memory(np.repeat(np.arange(len(order)), per_axis**2), mi.UInt32)
+    first = own_memory(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]), mi.UInt32)
     count = dr.width(position)
     # lanes past the end read 0, and an integer division by 0 kills the process
-    cells = dr.maximum(dr.gather(mi.UInt32, mi.UInt32(per_axis.astype(np.uint32)), position), 1)
+    cells = dr.maximum(dr.gather(mi.UInt32, own_memory(per_axis, mi.UInt32), position), 1)
     cell = dr.arange(mi.UInt32, count) - dr.gather(mi.UInt32, first, position)
     sampler = fresh_sampler(seed, count)
-    flat = dr.gather(mi.UInt32, mi.UInt32(order.astype(np.uint32)), position)
+    flat = dr.gather(mi.UInt32, own_memory(order, mi.UInt32), position)
     y = flat // width
     x = flat - y * width
     cell_y = cell // cells
@@ -90,9 +92,9 @@ def through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.
     if rfilter.is_box_filter():
         return u - 0.5, None
     edges = np.linspace(-rfilter.radius(), rfilter.radius(), 1025, dtype=np.float32)
-    value = np.array(rfilter.eval(mi.Float(0.5 * (edges[1:] + edges[:-1]))))
+    value = np.array(rfilter.eval(own_memory(0.5 * (edges[1:] + edges[:-1]), mi.Float)))
     cumulative = np.concatenate([[0.0], np.cumsum(np.abs(value))])
-    quantiles = mi.Float(np.interp(np.linspace(0, 1, 4097), cumulative / cumulative[-1], edges).astype(np.float32))
+    quantiles = own_memory(np.interp(np.linspace(0, 1, 4097), cumulative / cumulative[-1], edges), mi.Float)
 
     def inverse(t: mi.Float) -> mi.Float:
         cell = dr.minimum(mi.UInt32(t * 4096.0), 4095)

@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
 from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
@@ -89,7 +90,9 @@ def record_paths(
         grid = np.broadcast_to(settings.grid, (height, width))
         rays = primary_rays(sensor, grid, settings.seed, settings.stride)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
-        on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+        target = mi.ShapePtr(shape)
+        dr.make_opaque(target)  # its number in this process is no part of the kernel
+        on_target = hit.is_valid() & (hit.shape == target)
         dr.eval(rays, hit, on_target)
         index = dr.compress(on_target)
         if dr.width(index) == 0:
@@ -182,7 +185,7 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
     choice = 1.0 / max(len(extended), 1)
     lanes = []
     if extended:
-        table = mi.UInt32(np.array(extended, np.uint32))
+        table = own_memory(np.array(extended), mi.UInt32)
         turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, 1 + int(dr.max(position)[0])).next_1d() * 65536)
         pick = (dr.arange(mi.UInt32, count) + dr.gather(mi.UInt32, turns, position)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
@@ -270,7 +273,7 @@ def _background(
     image = np.zeros((width * height, 3), np.float32)
     beside = np.zeros(width * height, bool)
     beside[covered] = True
-    wanted = ~on_target & dr.gather(mi.Bool, mi.Bool(beside), rays.pixel_position)
+    wanted = ~on_target & dr.gather(mi.Bool, own_memory(beside, mi.Bool), rays.pixel_position)
     index = dr.compress(wanted)
     if dr.width(index) > 0:
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
@@ -303,7 +306,7 @@ def _merge(
     for part in lanes:
         end = begin + dr.width(part.position)
         if end > begin:
-            target = mi.UInt32(rank[begin:end])
+            target = own_memory(rank[begin:end], mi.UInt32)
             pairs = ((wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True))
             for merged, value in pairs:
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)

@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from ..material.recorded_models import RecordedModel
 from ..types.parameter import ParameterTable, Value
 from .recorded_paths import LaneGroups, RecordedPaths
@@ -63,7 +64,7 @@ class RecordedJacobian:
         self._held = [model.table[name] for name, value in values.items() if value is None]
         self._fixed_table = [model.table[n] for n, value in values.items() if value is not None and value != 0.0]
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
-        self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
+        self._constants = own_memory(np.concatenate([*constants, np.ones(1, np.float32)]), mi.Float)
         dr.eval(self._constants)
         self._evaluate = model.bind(values, free.names)
         self._warm_up()
@@ -74,7 +75,7 @@ class RecordedJacobian:
     def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
         """Mean radiance of the groups without the constant part, then its derivatives: (g, 3, 1 + K)."""
         width = self.table.length + 1
-        theta = mi.Float(np.asarray(vector, np.float32))
+        theta = own_memory(vector, mi.Float)
         start, stop, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
         dr.eval(theta, out)
@@ -123,7 +124,7 @@ class RecordedJacobian:
 
     def _warm_up(self) -> None:
         """Let the model load its tables: a frozen launch cannot."""
-        theta = mi.Float(self.table.pack({}).astype(np.float32))
+        theta = own_memory(self.table.pack({}), mi.Float)
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         up = mi.Vector3f(0.0, 0.0, 1.0)
         some = [mi.Color3f(0.5) if p.size == 3 else mi.Float(0.5) for p in self._held]

@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from ..types.image import Pixels
 
 ENOUGH_PARTS = 4096  # kernel lanes that keep the vector units of a few cores busy
@@ -87,9 +88,9 @@ class LaneGroups:
         bounds = [begin + length * k // parts_of for k in (number, number + 1)]
         scale = np.repeat(1.0 / np.diff(self.first), parts)
         arrays = (
-            mi.UInt32(bounds[0].astype(np.uint32)),
-            mi.UInt32(bounds[1].astype(np.uint32)),
-            mi.Float(scale.astype(np.float32)),
+            own_memory(bounds[0], mi.UInt32),
+            own_memory(bounds[1], mi.UInt32),
+            own_memory(scale, mi.Float),
         )
         dr.eval(arrays)
         return arrays
