@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cache of kernels stays below its limit, also with two processes at once. Dr.Jit does it, so a real one is asked."""
+"""The cache of kernels stays below its limit, also with two processes at once; Dr.Jit does it, so it is asked."""
 
 from __future__ import annotations
 
