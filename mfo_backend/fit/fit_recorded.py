@@ -26,8 +26,7 @@ from .picture_judge import NOISY, PictureJudge
 from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
-from .stages import Candidate
-from .verification import VERIFY_STREAM, check_reference, picture_errors
+from .verification import check_reference, picture_errors, verified_end
 from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
@@ -119,9 +118,8 @@ def fit_recorded(
         if counts is None:
             counts = _misfit(fit, last, _censored(log_residual, reference, view))
 
-    seed = settings.seed ^ VERIFY_STREAM
     spp = min(CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
-    pictures = [Candidate(end.x, renderer.image(end.x, seed=seed, spp=spp)) for end in ends]
+    pictures = [verified_end(renderer, end.x, seed=settings.seed, spp=spp) for end in ends]
     listener(Preview(pictures[-1].image))
     counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
@@ -146,7 +144,7 @@ def fit_recorded(
         notes=tuple(notes),
         weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image)
+    return FitOutcome(result, pictures[0].image, pictures[best].image, pictures[best].halves)
 
 
 def best_of(errors: Sequence[float]) -> int:

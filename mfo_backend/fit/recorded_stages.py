@@ -20,6 +20,7 @@ from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
+from .remembered import Remembered
 from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual, normal_equations
 from .tile_noise import TileNoise, tile_noise
 
@@ -116,6 +117,7 @@ class RecordedFit:
         self.scene, self.reference, self.mask = scene, reference, mask
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
+        self._tiles: tuple[LaneGroups, Remembered] | None = None  # of the present recording
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
@@ -144,7 +146,19 @@ class RecordedFit:
         residual = make(groups.average(self.calm if calm else self.reference))
         if self.clipped is not None:
             residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
-        return Problem(self.scene.evaluator(self.paths, groups), residual, groups)
+        return Problem(self._evaluator(groups), residual, groups)
+
+    def tiles(self) -> LaneGroups:
+        """All tiles of the present recording, whose evaluations are remembered from one problem to the next."""
+        if self._tiles is None:
+            groups = all_groups(self.paths, tiles=True)
+            self._tiles = groups, Remembered(self.scene.evaluator(self.paths, groups))
+        return self._tiles[0]
+
+    def _evaluator(self, groups: LaneGroups) -> ImageAndJacobian:
+        if self._tiles is not None and self._tiles[0] is groups:
+            return self._tiles[1]
+        return Remembered(self.scene.evaluator(self.paths, groups))
 
     def start_from_nothing(self, make: MakeResidual) -> list[Solution]:
         """Stages `scan` and `start`: solutions from the scan's nodes, the scene's material and a random one.
@@ -263,13 +277,14 @@ class RecordedFit:
     def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
+        self._tiles = None
         self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
         self.recordings = number
 
     def _refine_sampled(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
     ) -> tuple[Solution, Problem]:
-        groups = all_groups(self.paths, tiles=True)
+        groups = self.tiles()
         if weigh is None:
             problem = self.problem(groups, make)
             return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
@@ -283,12 +298,14 @@ class RecordedFit:
         return solve(solve(start)[0].x)
 
     def _noise(self, x: Vector, groups: LaneGroups) -> TileNoise:
-        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)[:, :, 0]
-        return tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior)
+        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)
+        if self._tiles is not None and self._tiles[0] is groups:
+            self._tiles[1].note(x, groups.mean_of_pixels(pixels))
+        return tile_noise(self.calm, pixels[:, :, 0], self.paths, groups, self.paths.interior)
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
-        groups = all_groups(self.paths, tiles=True)
+        groups = self.tiles()
         self.noise = self._noise(x, groups)
         problem = self.problem(groups, self._weighing(self.noise, groups))
         values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
@@ -309,7 +326,7 @@ class RecordedFit:
         """A stage with another residual on the same recording, from each start; None without finite numbers."""
         with self.course.stage(name) as stage:
             residual = make(groups.average(self.reference))
-            problem = Problem(self.scene.evaluator(self.paths, groups), residual, groups)
+            problem = Problem(self._evaluator(groups), residual, groups)
             watched = self.course.watch(stage, problem.equations)
             found = [self._solve(watched, start, 25, self.box) for start in starts]
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x

@@ -4,18 +4,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.loss import Loss, make_loss
 from ..metrics.tone_mapping import DisplayView, View
+from ..render.renderer import Renderer, Vector
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
 from .region import MaskedLoss, fill_outside
 from .settings import FitSettings
 
 VERIFY_STREAM = 0x5EED0000  # far from the seeds users choose, so that no iteration saw these random numbers
+
+_SECOND_HALF = 0x00A50000
+
+
+@dataclass(frozen=True)
+class VerifiedEnd:
+    """A vector with its picture, scene-linear, whose two halves have no random numbers in common."""
+
+    vector: Vector
+    image: Pixels = field(repr=False)
+    halves: tuple[Pixels, Pixels] = field(repr=False)
+
+
+def verified_end(renderer: Renderer, vector: Vector, *, seed: int, spp: int) -> VerifiedEnd:
+    """`vector` with a picture of about `spp` samples a pixel under random numbers no iteration of seed `seed` saw.
+
+    Ends that are compared get the same ones.
+    """
+    seeds = (seed ^ VERIFY_STREAM, seed ^ VERIFY_STREAM ^ _SECOND_HALF)
+    first, second = (renderer.image(vector, seed=s, spp=max(spp // 2, 1)) for s in seeds)
+    return VerifiedEnd(vector, 0.5 * (first + second), (first, second))
 
 
 def check_reference(reference: Image, mask: NDArray[np.bool_]) -> None:

@@ -23,6 +23,11 @@ from .renderer import Pullback, Vector
 from .variant import load_variant
 
 _MASK_RAYS = 4  # rays per pixel and axis that look for the target
+# Samples of one launch of a picture: each keeps 16 bytes of a random number generator, and a million keep the cores
+# busy. At 256 x 256, four launches of 16 samples a pixel take a tenth less time than one of 64
+_LAUNCH_SAMPLES = 2**20
+_LEAST_LAUNCH_SPP = 4  # a launch is traced in Python anew, for 0.04 s
+_NEXT_LAUNCH = 0x9E3779B1  # apart from all seeds in use
 
 
 class MitsubaRenderer:
@@ -45,12 +50,27 @@ class MitsubaRenderer:
         self._params = mi.traverse(scene)
         self._keys = _keys_of(list(self._params.keys()), material)
         self._params.keep(list(self._keys.values()))
+        self._mask: NDArray[np.bool_] | None = None
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`. A pixel that Mitsuba leaves non-finite is black."""
         self._update(vector, differentiable=False)
         self.passes += 1.0
-        return self._render(seed, spp)
+        launches = self._launches(spp)
+        if len(launches) == 1:
+            return self._render(seed, spp)
+        total = 0.0
+        for number, samples in enumerate(launches):
+            total = total + samples * self._render((seed + number * _NEXT_LAUNCH) % 2**32, samples)
+        return np.asarray(total / spp, np.float32)
+
+    def _launches(self, spp: int) -> list[int]:
+        """Samples a pixel of each launch of a picture, equal but for the last, for one kernel."""
+        width, height = (int(n) for n in self._sensor.film().crop_size())
+        most = max(_LAUNCH_SAMPLES // (width * height), _LEAST_LAUNCH_SPP)
+        count = -(-spp // most)
+        each = -(-spp // count)
+        return [each] * (spp // each) + [spp % each] * (spp % each > 0)
 
     @property
     def scene(self) -> Any:
@@ -74,7 +94,9 @@ class MitsubaRenderer:
         stale early: 12 random materials under a point light, 4 spp, ended at a mean FLIP of 0.30 instead of 0.21.
         """
         vector = np.array(vector)
-        image = self.image(vector, seed=seed, spp=spp)
+        self._update(vector, differentiable=False)
+        self.passes += 1.0
+        image = self._render(seed, spp)  # in one launch, as the pull-back's
 
         def pullback(pixel_gradient: Pixels) -> Vector:
             import drjit as dr
@@ -92,6 +114,11 @@ class MitsubaRenderer:
 
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer.target_mask`: a regular grid of rays in every pixel, without the pixel filter's tails."""
+        if self._mask is None:
+            self._mask = self._find_target()
+        return self._mask.copy()
+
+    def _find_target(self) -> NDArray[np.bool_]:
         import drjit as dr
         import mitsuba as mi
 

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
@@ -31,7 +31,8 @@ class RecordSettings:
 
     `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and
     directional lights take one sample for each of them; the other lights one light sample and one sample of the
-    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
+    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out, and so does
+    `direct_only`, which needs no other kernels than a recording with that light. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
@@ -47,6 +48,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     light_paths: LightPaths | None = None
+    direct_only: bool = False
 
 
 @dataclass
@@ -134,13 +136,9 @@ def indirect_share(
 ) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
     with dr.suspend_grad():
-        direct = record_paths(scene, shape, RecordSettings(grid=1, depth=2, two_sided=two_sided), allow_dark=True)
-        everything = record_paths(
-            scene,
-            shape,
-            RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths),
-            allow_dark=True,
-        )
+        settings = RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths)
+        direct = record_paths(scene, shape, replace(settings, direct_only=True), allow_dark=True)
+        everything = record_paths(scene, shape, settings, allow_dark=True)
         lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
     return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
@@ -213,8 +211,9 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
         if settings.light_paths is not None:
             value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo, valid)
             before = (likely, value / dr.maximum(likely, 1e-12))
-        radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, valid & far.is_valid(), before=before)
-        weight += dr.maximum(radiance - emission, 0.0) / density
+        traced = valid & far.is_valid() & dr.opaque(mi.Bool, not settings.direct_only)
+        radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, traced, before=before)
+        weight += dr.select(traced, dr.maximum(radiance - emission, 0.0) / density, 0.0)
     weight *= share
     lanes.append(_compress(hits, wo, weight, valid & (dr.max(weight) > 0.0)))
     return lanes

@@ -128,7 +128,7 @@ class RecordedJacobian:
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         up = mi.Vector3f(0.0, 0.0, 1.0)
         some = [mi.Color3f(0.5) if p.size == 3 else mi.Float(0.5) for p in self._held]
-        dr.eval(self._evaluate(self._parameters(values, self._constants, some), up, up))
+        self._evaluate(self._parameters(values, self._constants, some), up, up)  # traced, never run
 
     def _parameters(self, values: list[mi.Float], constants: mi.Float, held: list[Any]) -> dict[str, Any]:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)

@@ -114,6 +114,12 @@ class LaneGroups:
         longer = [np.flatnonzero(parts > k) for k in range(1, parts.max())]
         return first, [(groups, first[groups] + k) for k, groups in enumerate(longer, 1)]
 
+    def mean_of_pixels(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Means of rows (p, ...), one for each covered pixel of the recording, over each group: (g, ...)."""
+        sums = np.add.reduceat(rows[self.member], self.first[:-1], axis=0, dtype=np.float64)
+        count = np.diff(self.first).reshape(-1, *[1] * (rows.ndim - 1))
+        return (sums / count).astype(np.float32)
+
     def average(self, image: Pixels) -> NDArray[np.float32]:
         """Mean of `image` (height, width, 3) over the pixels of each group, shape (g, 3)."""
         flat = image.reshape(-1, image.shape[-1])[self.pixels]
