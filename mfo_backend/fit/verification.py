@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..metrics.loss import Loss, make_loss
 from ..metrics.tone_mapping import DisplayView, View
-from ..render.renderer import Renderer, Vector
+from ..render.mitsuba_renderer import MitsubaRenderer
+from ..render.renderer import Vector
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
 from .region import MaskedLoss, fill_outside
@@ -31,14 +32,19 @@ class VerifiedEnd:
     halves: tuple[Pixels, Pixels] = field(repr=False)
 
 
-def verified_end(renderer: Renderer, vector: Vector, *, seed: int, spp: int) -> VerifiedEnd:
-    """`vector` with a picture of about `spp` samples a pixel under random numbers no iteration of seed `seed` saw.
+def verify_later(renderer: MitsubaRenderer, vector: Vector, *, seed: int, spp: int) -> Callable[[], VerifiedEnd]:
+    """Start a picture of `vector` of about `spp` samples a pixel; returns what waits for it.
 
-    Ends that are compared get the same ones.
+    No iteration of a fit of seed `seed` saw its random numbers, which are the same for all ends.
     """
     seeds = (seed ^ VERIFY_STREAM, seed ^ VERIFY_STREAM ^ _SECOND_HALF)
-    first, second = (renderer.image(vector, seed=s, spp=max(spp // 2, 1)) for s in seeds)
-    return VerifiedEnd(vector, 0.5 * (first + second), (first, second))
+    halves = [renderer.image_later(vector, seed=s, spp=max(spp // 2, 1)) for s in seeds]
+
+    def wait() -> VerifiedEnd:
+        first, second = (half() for half in halves)
+        return VerifiedEnd(vector, 0.5 * (first + second), (first, second))
+
+    return wait
 
 
 def check_reference(reference: Image, mask: NDArray[np.bool_]) -> None:

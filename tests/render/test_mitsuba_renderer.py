@@ -236,3 +236,21 @@ def test_an_exr_world_loads_on_a_single_thread(tmp_path: Path) -> None:
         check=True,
     )
     assert done.stdout.strip() == "1"
+
+
+@pytest.mark.parametrize(("spp", "launches"), [(6, [6]), (12, [6, 6]), (15, [5, 5, 5]), (13, [5, 5, 3])])
+def test_a_large_picture_is_the_mean_of_several_launches(tmp_path, monkeypatch, spp, launches):
+    """Each with random numbers of its own, so the mean has the noise of all samples together."""
+    from mfo_backend.render import mitsuba_renderer
+
+    monkeypatch.setattr(mitsuba_renderer, "_LAUNCH_SAMPLES", 6 * 24 * 16)
+    renderer = load(tmp_path, light=SKY)
+    seen = []
+    launch = renderer._launch
+    monkeypatch.setattr(renderer, "_launch", lambda seed, spp: seen.append((seed, spp)) or launch(seed, spp))
+    image = renderer.image(renderer.start, seed=7, spp=spp)
+    assert [samples for _, samples in seen] == launches
+    assert len({seed for seed, _ in seen}) == len(launches)
+    parts = [np.array(launch(seed, samples)) for seed, samples in seen]
+    np.testing.assert_allclose(image, np.average(parts, axis=0, weights=launches), rtol=1e-5)
+    assert renderer.passes == 1.0
