@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,28 @@ def test_equals_the_path_traced_picture(tmp_path, lights, depth, rfilter, grid, 
     np.testing.assert_allclose(
         got.sum(axis=0), expected.sum(axis=0), rtol=0.5 * tolerance
     )  # noise averages out, bias would not
+
+
+def test_tiles_are_means_of_their_pixels(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, AREA)
+    x = renderer.table.pack(VALUES)
+    paths = scene.record(x, grid=4, seed=3, near=False)
+    tiles = paths.tile_groups()
+    pixels = scene.evaluator(paths, paths.pixel_groups())(x)
+    # sums of float32 in another order
+    np.testing.assert_allclose(tiles.mean_of_pixels(pixels), scene.evaluator(paths, tiles)(x), rtol=1e-4, atol=1e-5)
+
+
+def test_direct_light_alone_is_the_same_with_and_without_the_kernels_of_other_light(tmp_path):
+    renderer, _ = recorded_scene(tmp_path, AREA + FLOOR, depth=5)
+    from mfo_backend.render.record_paths import RecordSettings, record_paths  # needs the variant
+
+    settings = RecordSettings(grid=3, seed=4, depth=5, direct_only=True)
+    some, without = (record_paths(renderer.scene, renderer.shape, s) for s in (settings, replace(settings, depth=2)))
+    assert some.lanes == without.lanes
+    np.testing.assert_allclose(np.array(some.weight), np.array(without.weight), rtol=1e-5)
+    everything = record_paths(renderer.scene, renderer.shape, replace(settings, direct_only=False))
+    assert np.array(everything.weight).sum() > 1.02 * np.array(some.weight).sum()
 
 
 def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
