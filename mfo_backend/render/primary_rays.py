@@ -28,7 +28,7 @@ class PrimaryRays:
     `filter_weight` adds up to 1 within a pixel.
     """
 
-    ray: mi.RayDifferential3f
+    ray: mi.Ray3f
     pixel_position: mi.UInt32
     filter_weight: mi.Float
     pixel: NDArray[np.int64]
@@ -45,6 +45,15 @@ def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int
     return order, tile[order]
 
 
+def widened(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
+    """`mask` (height, width) with every pixel that is at most `pixels` away along each axis."""
+    height, width = mask.shape
+    for axis, size in enumerate((height, width)):
+        padded = np.pad(mask, [(pixels, pixels) if a == axis else (0, 0) for a in (0, 1)])
+        mask = np.logical_or.reduce([padded.take(range(k, k + size), axis) for k in range(2 * pixels + 1)])
+    return mask
+
+
 def fresh_sampler(seed: int, width: int) -> mi.Sampler:
     """Independent random numbers; the seed is data, so that another seed needs no other kernel."""
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
@@ -53,7 +62,7 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
 
 
 def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: int = 1) -> PrimaryRays:
-    """Camera rays, `grid` (height, width) squared for each pixel, in every `stride`-th tile along both axes."""
+    """Camera rays, `grid` (height, width) squared a pixel, 0 for none, in every `stride`-th tile along both axes."""
     film = sensor.film()
     width, height = (int(v) for v in film.crop_size())
     order, tile = tile_order(width, height, stride)
@@ -83,7 +92,7 @@ def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: 
     film_position = mi.Point2f(
         mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]
     ) / mi.Point2f(size)
-    ray, _ = sensor.sample_ray_differential(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
+    ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
     return PrimaryRays(ray, position, weight, order, tile)
 
 

@@ -101,7 +101,7 @@ def record_paths(
             raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
         position = dr.gather(mi.UInt32, rays.pixel_position, index)
         filter_weight = dr.gather(mi.Float, rays.filter_weight, index)
-        ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
+        ray = dr.gather(mi.Ray3f, rays.ray, index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
@@ -276,7 +276,7 @@ def _background(
     index = dr.compress(wanted)
     if dr.width(index) > 0:
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
-        ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
+        ray = dr.gather(mi.Ray3f, rays.ray, index)
         depth, hide = max(settings.depth, 2), settings.hide_emitters
         radiance = _traced(scene, sampler, ray, settings, depth, mi.Bool(True), hide=hide)
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)

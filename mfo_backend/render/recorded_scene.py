@@ -20,6 +20,7 @@ from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
 from ..types.parameter import Value
 from .mitsuba_renderer import MitsubaRenderer
+from .primary_rays import widened
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
 from .recorded_jacobian import RecordedJacobian
@@ -56,6 +57,9 @@ class RecordedScene:
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
         self._covered = covered
+        # a pixel's rays reach as far as the pixel filter; where they cannot meet the target they are only memory
+        reach = 1 + math.ceil(renderer.scene.sensors()[0].film().rfilter().radius())
+        self._near_target = widened(renderer.target_mask(), reach)
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
@@ -90,7 +94,9 @@ class RecordedScene:
         if near and isinstance(width, float):
             proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
-        rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
+        asked = grid
+        grid = np.where(self._near_target, asked, 0) if self._near_target.any() else asked
+        rays = float(self._covered) * float(np.mean(np.square(asked))) * (2 if self.needs.sampled else 1)
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths)

@@ -157,3 +157,26 @@ def test_a_texture_is_refused(tmp_path):
 
     with pytest.raises(BadInputError, match="'clearcoat' is a texture"):
         RecordedScene(renderer, 1)
+
+
+@pytest.mark.parametrize("rfilter", ["box", "gaussian"])
+def test_rays_far_from_the_target_are_left_out_and_change_nothing(tmp_path, rfilter):
+    renderer, scene = recorded_scene(tmp_path, AREA + FLOOR, depth=4, rfilter=rfilter, size=48)
+    from mfo_backend.render.primary_rays import primary_rays, widened
+
+    x = renderer.table.pack(VALUES)
+    few = scene.record(x, grid=4, seed=3, near=False)
+    near = scene._near_target
+    assert 0.3 < near.mean() < 0.8
+    sensor = renderer.scene.sensors()[0]
+    assert len(np.array(primary_rays(sensor, np.where(near, 4, 0), 3).pixel_position)) == 16 * near.sum()
+    scene._near_target = np.ones_like(near)
+    every = scene.record(x, grid=4, seed=3, near=False)
+    assert few.lanes == every.lanes
+    for name in ("wi", "wo", "weight"):
+        np.testing.assert_array_equal(np.array(getattr(few, name)), np.array(getattr(every, name)))
+    np.testing.assert_array_equal(few.pixel, every.pixel)
+    np.testing.assert_array_equal(few.constant, every.constant)
+    dot = np.zeros((5, 7), bool)
+    dot[1, 6] = True
+    assert np.argwhere(widened(dot, 1)).tolist() == [[r, c] for r in (0, 1, 2) for c in (5, 6)]
