@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much of the processors other programs use: seconds from a busy machine are not comparable."""
+"""How much of the processors this and other programs use: seconds from a busy machine are not comparable."""
 
 from __future__ import annotations
 
@@ -24,6 +24,10 @@ class BusyMark:
         """This moment."""
         own = os.times()
         return cls(time.monotonic(), own.user + own.system, _busy_seconds())
+
+    def own_seconds(self) -> float:
+        """Processor seconds that this process has used since, on all its threads."""
+        return BusyMark.now().own - self.own
 
     def others(self) -> float | None:
         """Share of all processors that other programs have used since."""

@@ -62,7 +62,7 @@ def ablations(rows: Sequence[Row]) -> Table | None:
 
 
 def time_parts(rows: Sequence[Row]) -> Table | None:
-    """Median seconds of loading and of the parts of a fit, and what the first fit costs more."""
+    """Median seconds of loading and of the parts of a fit, and what a process costs once: imports and kernels."""
     lines = []
     for scenario, method in dict.fromkeys((row.scenario, row.method) for row in rows):
         mine = [row for row in rows if (row.scenario, row.method) == (scenario, method) and row.parts]
@@ -72,6 +72,7 @@ def time_parts(rows: Sequence[Row]) -> Table | None:
             row for row in mine if row.warm_up_seconds and row.seconds and METHODS[method].settings["preset"] != "paper"
         ]
         first = [row.warm_up_seconds - (row.seconds or 0.0) - (row.load_seconds or 0.0) for row in warm]
+        imports = [row.machine["import_seconds"] for row in mine if "import_seconds" in row.machine]
         lines.append(
             (
                 scenario,
@@ -80,9 +81,10 @@ def time_parts(rows: Sequence[Row]) -> Table | None:
                 *(number(quantile([row.parts.get(part, 0.0) for row in mine], 0.5)) for part in PARTS),
                 number(quantile([row.seconds for row in mine if row.seconds is not None], 0.5)),
                 number(max(0.0, quantile(first, 0.5))) if first else "–",
+                number(quantile(imports, 0.5)),
             )
         )  # fmt: skip
-    heads = ("scenario", "method", "load", *PARTS, "fit", "kernels, once")
+    heads = ("scenario", "method", "load", *PARTS, "fit", "kernels, once", "imports, once")
     return Table(heads, lines) if lines else None
 
 

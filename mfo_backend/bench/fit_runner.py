@@ -35,6 +35,7 @@ class _Measured:
     outcome: FitOutcome
     load_seconds: float
     parts: Mapping[str, float] = field(default_factory=dict)
+    processor_seconds: float | None = None
     others_busy: float | None = None
 
 
@@ -143,7 +144,7 @@ class FitRunner:
                     outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
                 except UnrecordableError:
                     outcome = fit_transmission(renderer, self._judge.reference, settings, **common)
-        return _Measured(outcome, loaded, watch.parts, busy.others())
+        return _Measured(outcome, loaded, watch.parts, busy.own_seconds(), busy.others())
 
     def _row(self, task: Task, measured: _Measured, warm_up: float) -> Row:
         result, scene = measured.outcome.result, self._scene
@@ -173,6 +174,7 @@ class FitRunner:
             parts=dict(measured.parts),
             others_busy=measured.others_busy,
             passes=result.passes,
+            processor_seconds=measured.processor_seconds,
             flip=difference.flip,
             hdr_flip=difference.hdr_flip,
             relative_rmse=difference.relative_rmse,

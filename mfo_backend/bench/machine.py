@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import subprocess
 from pathlib import Path
@@ -12,12 +11,23 @@ from typing import Any
 from ..job.result import versions
 
 
-def machine_facts(variant: str) -> dict[str, Any]:
-    """Versions, Mitsuba variant, processor, threads it may use, and the commit of the checkout if it is one."""
+def machine_facts(variant: str, import_seconds: float) -> dict[str, Any]:
+    """Versions, Mitsuba variant, processor, threads of its kernels, and the commit of the checkout if it is one.
+
+    Parameters
+    ----------
+    variant
+        The one that is set.
+    import_seconds
+        What importing Mitsuba and setting it took in this process.
+    """
+    import drjit as dr
+
     return {
         "versions": versions(variant),
         "device": "GPU" if variant.startswith("cuda") else _processor(),
-        "threads": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "threads": dr.thread_count(),
+        "import_seconds": import_seconds,
         "commit": _commit(),
     }
 

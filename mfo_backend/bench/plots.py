@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 
 from .method import METHODS
 from .row import Row
-from .summary import error_of, quantile
+from .summary import comparable_seconds, error_of, quantile
 from .svg_axes import COLOURS, SvgAxes, around
 
+TimeOf = Callable[[Row], float | None]
 _ORDER = tuple(METHODS)
 
 
@@ -21,11 +21,12 @@ def time_to_quality(rows: Sequence[Row], target: float) -> str:
     A run counts from its end on; one that raises or ends above the target never does, so its curve stays below 100 %.
     Empty if no run has ended.
     """
-    return _reached(rows, target, "seconds of the fit")
+    name, seconds_of = comparable_seconds(rows)
+    return _reached(rows, target, f"{name} of the fit", seconds_of)
 
 
-def _reached(rows: Sequence[Row], target: float, x_name: str) -> str:
-    times = [row.seconds for row in rows if row.seconds]
+def _reached(rows: Sequence[Row], target: float, x_name: str, time_of: TimeOf) -> str:
+    times = [time for time in map(time_of, rows) if time]
     if not times:
         return ""
     axes = SvgAxes(
@@ -36,7 +37,7 @@ def _reached(rows: Sequence[Row], target: float, x_name: str) -> str:
         (0.0, 1.0),
     )
     for method, mine in _by_method(rows):
-        reached = sorted(row.seconds for row in mine if row.seconds and error_of(row.flip) <= target)
+        reached = sorted(time for row in mine if (time := time_of(row)) and error_of(row.flip) <= target)
         points = [(axes.x_range[0], 0.0)]
         for count, seconds in enumerate(reached, start=1):
             points += [(seconds, (count - 1) / len(mine)), (seconds, count / len(mine))]
@@ -48,8 +49,7 @@ def _reached(rows: Sequence[Row], target: float, x_name: str) -> str:
 
 def data_profile(rows: Sequence[Row], target: float) -> str:
     """As `time_to_quality`, over passes, which do not depend on the machine."""
-    counted = [replace(row, seconds=row.passes) for row in rows]
-    return _reached(counted, target, "passes (pictures at full size; an Adam step counts 3)")
+    return _reached(rows, target, "passes (pictures at full size; an Adam step counts 3)", lambda row: row.passes)
 
 
 def pareto(rows: Sequence[Row]) -> str:
@@ -58,9 +58,10 @@ def pareto(rows: Sequence[Row]) -> str:
     Runs that raised count as infinitely wrong; where they are half of a method's runs it has no dot, where a quarter
     its box reaches the top. Empty if nothing can be drawn.
     """
+    name, seconds_of = comparable_seconds(rows)
     boxes = []
     for method, mine in _by_method(rows):
-        seconds = [row.seconds for row in mine if row.seconds]
+        seconds = [time for time in map(seconds_of, mine) if time]
         flips = [max(error_of(row.flip), 1e-6) for row in mine]
         if seconds and math.isfinite(quantile(flips, 0.5)):
             shares = (0.25, 0.5, 0.75)
@@ -70,7 +71,7 @@ def pareto(rows: Sequence[Row]) -> str:
     errors = [flip for _, _, flips in boxes for flip in flips if math.isfinite(flip)]
     axes = SvgAxes(
         "Error against time",
-        "seconds of the fit",
+        f"{name} of the fit",
         "mean FLIP over the object",
         around([seconds for _, times, _ in boxes for seconds in times]),
         around(errors),

@@ -23,7 +23,7 @@ from .table import Table, number
 
 _HEADS = (
     "method", "runs", "raised", f"FLIP ≤ {SOLVED_FLIP:g}", "FLIP ≤ 0.05", "≤ 0.02 above the noise",
-    "median s", "p90 s", "s per solved",
+    "median s", "p90 s", "median CPU s", "s per solved",
     "median passes", "FLIP 25 %", "median", "75 %", "rel. RMSE", "relit FLIP", "relit rel. RMSE", "JOD mean", "min",
 )  # fmt: skip
 _READING = (
@@ -31,8 +31,8 @@ _READING = (
     "are not counted. Errors are means over the object between pictures of the recovered and the true values under "
     "the same new random numbers; relit: under lights no fit saw. Runs that raised stay in every share and count as "
     "infinite error (–). Above the noise: the FLIP between reference and result less that between reference and "
-    "true picture. Seconds per solved scene: the time of all runs over the number with FLIP ≤ "
-    f"{SOLVED_FLIP:g}.",
+    "true picture. CPU s: on all processors together. Seconds per solved scene: the time of all runs, processor "
+    f"seconds where every row has them, over the number with FLIP ≤ {SOLVED_FLIP:g}.",
     "JOD is ColorVideoVDP's score of the whole picture, 10 for no difference. The paper's is HDR-VDP-3's Q_JOD, "
     "another metric on another scale, on an NVIDIA RTX 3070, and the paper does not say how it chose Adam's rate and "
     "limits: its columns stand beside ours for orientation, not as a race. Its mean times leave out failed scenes.",
@@ -150,8 +150,8 @@ def _busy(rows: Sequence[Row]) -> list[str]:
         return []
     return [
         f"While {disturbed} of {len(shares)} rows were measured, other programs used more than {BUSY:.0%} of the "
-        f"processors (median {quantile(shares, 0.5):.0%}): seconds compare only roughly within this run and not with "
-        "another. Passes, errors and shares of scenes do not depend on that."
+        f"processors (median {quantile(shares, 0.5):.0%}): seconds of the clock compare only roughly within this run "
+        "and not with another. Processor seconds depend little on that, passes, errors and shares of scenes not at all."
     ]
 
 
@@ -202,7 +202,7 @@ def _cells(summary: Summary) -> tuple[str, ...]:
         share(summary.solved, summary.solved / summary.runs),
         share(summary.close, summary.close / summary.runs),
         share(summary.at_noise, summary.at_noise / summary.runs),
-        *(number(seconds) for seconds in (*summary.seconds, summary.seconds_per_solved)),
+        *(number(s) for s in (*summary.seconds, summary.processor_seconds, summary.seconds_per_solved)),
         number(summary.passes),
         *(number(flip) for flip in summary.flip),
         number(summary.relative_rmse),

@@ -38,6 +38,8 @@ class Row:
     seconds, passes
         Of the fit with its own final check; loading, warm-up and the judge's pictures are not counted. A pass is one
         picture, an Adam step counts 3.
+    processor_seconds
+        What the fit cost on all processors together: nearly the same on a busy machine, where `seconds` grow.
     load_seconds
         Of loading the scene for the fit.
     warm_up_seconds
@@ -83,6 +85,7 @@ class Row:
     parts: dict[str, float] = field(default_factory=dict)
     others_busy: float | None = None
     passes: float | None = None
+    processor_seconds: float | None = None
     flip: float | None = None
     hdr_flip: float | None = None
     relative_rmse: float | None = None

@@ -61,8 +61,7 @@ class FitRecipe:
             raise SetupError(f"This worker has other {' and '.join(differing)}: give every worker the same MFO_DATA.")
         kept = Path(self.pictures) if Path(self.pictures).is_dir() else None
         runner = FitRunner(Path(tempfile.mkdtemp(prefix="mfo-bench-")), self.size, assets, kept, threads=self.threads)
-        facts = machine_facts(runner.variant)
-        return runner, facts | ({"threads": self.threads} if self.threads else {})
+        return runner, machine_facts(runner.variant, runner.import_seconds)
 
 
 _RUNNERS: dict[Any, tuple[Any, dict[str, Any]]] = {}  # of this process

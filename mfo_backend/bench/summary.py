@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from .method import METHODS
@@ -21,8 +21,8 @@ class Summary:
 
     `solved` and `close` count runs with a mean FLIP of at most 0.02 and 0.05,
     `at_noise` those whose picture differs from the reference by no more than 0.02 above what the true one does.
-    `seconds` are of runs that did not
-    raise: median and 90th percentile. `seconds_per_solved` is the time of all runs over the number solved.
+    `seconds` are of runs that did not raise: median and 90th percentile; so is the median `processor_seconds`.
+    `seconds_per_solved` is the `comparable_seconds` of all runs over the number solved.
     `flip` holds the quartiles of all runs, `relit_flip` the median under all lights no fit saw, `jod` mean and minimum.
     """
 
@@ -34,6 +34,7 @@ class Summary:
     close: int
     at_noise: int
     seconds: tuple[float, float]
+    processor_seconds: float
     seconds_per_solved: float
     passes: float
     flip: tuple[float, float, float]
@@ -66,11 +67,23 @@ def comparable(rows: Iterable[Row]) -> Comparable:
 
 def summaries(rows: Iterable[Row]) -> list[Summary]:
     """One summary per scenario and method, in the order of the tables."""
+    rows = list(rows)
+    _, seconds_of = comparable_seconds(rows)
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.scenario, row.method), []).append(row)
     order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], tuple(METHODS))))
-    return [_summary(scenario, method, groups[scenario, method]) for scenario, method in order]
+    return [_summary(scenario, method, groups[scenario, method], seconds_of) for scenario, method in order]
+
+
+def comparable_seconds(rows: Iterable[Row]) -> tuple[str, Callable[[Row], float | None]]:
+    """The name and the getter of the seconds that rows are compared by.
+
+    Processor seconds, which other programs hardly change; those of the clock where a row of an older bench lacks them.
+    """
+    if all(row.processor_seconds is not None for row in rows if row.seconds is not None):
+        return "processor seconds", lambda row: row.processor_seconds
+    return "seconds", lambda row: row.seconds
 
 
 def quantile(values: Sequence[float], share: float) -> float:
@@ -91,7 +104,7 @@ def error_of(value: float | None) -> float:
     return math.inf if value is None or math.isnan(value) else value
 
 
-def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
+def _summary(scenario: str, method: str, rows: Sequence[Row], seconds_of: Callable[[Row], float | None]) -> Summary:
     seconds = [row.seconds for row in rows if row.seconds is not None]
     flips = [error_of(row.flip) for row in rows]
     jods = [row.jod for row in rows if row.jod is not None]
@@ -105,7 +118,8 @@ def _summary(scenario: str, method: str, rows: Sequence[Row]) -> Summary:
         close=sum(flip <= 0.05 for flip in flips),
         at_noise=sum(_above_noise(row) <= SOLVED_FLIP for row in rows),
         seconds=(quantile(seconds, 0.5), quantile(seconds, 0.9)),
-        seconds_per_solved=sum(seconds) / solved if solved else math.inf,
+        processor_seconds=quantile([r.processor_seconds for r in rows if r.processor_seconds is not None], 0.5),
+        seconds_per_solved=sum(seconds_of(row) or 0.0 for row in rows) / solved if solved else math.inf,
         passes=quantile([row.passes for row in rows if row.passes is not None], 0.5),
         flip=(quantile(flips, 0.25), quantile(flips, 0.5), quantile(flips, 0.75)),
         relative_rmse=quantile([error_of(row.relative_rmse) for row in rows], 0.5),

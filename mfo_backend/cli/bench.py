@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..bench.machine import machine_facts
 
     runner = FitRunner(arguments.out / "scenes", arguments.size, assets, pictures, host=_blender())
-    machine = machine_facts(runner.variant)
+    machine = machine_facts(runner.variant, runner.import_seconds)
     return work(arguments, partial(run_bench, runner=runner, machine=machine, log=partial(_log, arguments.out)))
 
 

@@ -48,13 +48,20 @@ def test_an_ablation_is_compared_on_common_scenes():
 
 
 def test_the_first_fit_costs_its_kernels_more():
-    first = row(Task("base", 0, "fast"), warm_up_seconds=5.0, seconds=2.0, load_seconds=0.5, parts={"solve": 2.0})
+    first = row(
+        Task("base", 0, "fast"),
+        warm_up_seconds=5.0,
+        seconds=2.0,
+        load_seconds=0.5,
+        parts={"solve": 2.0},
+        machine={"import_seconds": 1.5},
+    )
     second = row(Task("base", 1, "fast"), seconds=4.0, load_seconds=0.7, parts={"solve": 1.0, "record": 3.0})
     table = time_parts([first, second])
     assert table is not None
     cells = dict(zip(table.heads, table.rows[0], strict=True))
     assert (cells["load"], cells["solve"], cells["record"], cells["fit"]) == ("0.6", "1.5", "1.5", "3")
-    assert cells["kernels, once"] == "2.5"
+    assert (cells["kernels, once"], cells["imports, once"]) == ("2.5", "1.5")
 
 
 def test_stages_have_their_flip():

@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import math
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -43,6 +44,17 @@ def test_a_run_that_raised_stays_in_every_share():
     assert summary.seconds == pytest.approx((2.0, 2.8))  # of 1, 2, 3
     assert summary.seconds_per_solved == 3.0  # (1 + 2 + 3) / 2
     assert summary.flip == pytest.approx((0.0145, 0.0295, math.inf))  # of 0.001, 0.019, 0.04 and infinity
+
+
+def test_processor_seconds_count_where_every_row_has_them(tmp_path):
+    timed = [replace(r, processor_seconds=None if r.seconds is None else 10 * r.seconds) for r in ROWS]
+    (summary,) = summaries(timed)
+    assert summary.seconds == pytest.approx((2.0, 2.8))
+    assert (summary.processor_seconds, summary.seconds_per_solved) == (20.0, 30.0)
+    assert ">processor seconds of the fit<" in time_to_quality(timed, 0.02)
+    ours, theirs = summaries([*timed, *OTHERS])  # of which the others have none
+    assert (ours.seconds_per_solved, theirs.processor_seconds) == (3.0, pytest.approx(math.nan, nan_ok=True))
+    assert ">seconds of the fit<" in pareto([*timed, *OTHERS])
 
 
 def test_nothing_solved_costs_infinitely_much():
@@ -89,8 +101,8 @@ def test_the_report_says_what_raised_and_loads_nothing(tmp_path):
     for one in [*ROWS, *OTHERS]:
         RowFile(tmp_path).append(one)
     text = write_report(tmp_path, notes=["The machine was shared & busy."])
-    assert "| fast | 4 | 1 | 2 (50%) | 3 (75%) | 3 (75%) | 2 | 2.8 | 3 | 30 | 0.0145 | 0.0295 | – |" in text
-    assert "| mfo-hdr | 4 | 0 | 0 (0%) | 4 (100%) | 4 (100%) | 50 | 50 | – |" in text
+    assert "| fast | 4 | 1 | 2 (50%) | 3 (75%) | 3 (75%) | 2 | 2.8 | – | 3 | 30 | 0.0145 | 0.0295 | – |" in text
+    assert "| mfo-hdr | 4 | 0 | 0 (0%) | 4 (100%) | 4 (100%) | 50 | 50 | – | – |" in text
     assert "| base | fast | 1 | ValueError: no <light> |" in text
     assert "busy" in write_report(tmp_path)  # kept
     assert (tmp_path / "report.md").read_text("utf-8") == text
