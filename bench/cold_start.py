@@ -22,7 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -58,8 +58,9 @@ def main() -> None:
             print(table(name, found[name]), flush=True)
             if chosen.out is not None:
                 chosen.out.write_text(json.dumps(found, indent=1) + "\n")
+        last = chosen.scenes[-1]
         print("modules slowest to import, milliseconds each by itself, and how many there are:")
-        print("\n".join(slowest_modules(job, Path(folder) / "caches" / name, chosen.modules)))
+        print("\n".join(slowest_modules(Path(folder) / last / "job", Path(folder) / "caches" / last, chosen.modules)))
 
 
 def make_job(name: str, folder: Path, size: int) -> Path:
@@ -178,8 +179,8 @@ class Stages:
     """Wall and CPU seconds and kernels by phase; a phase within another is not counted twice."""
 
     def __init__(self) -> None:
-        self.wall: Counter[str] = Counter()
-        self.cpu: Counter[str] = Counter()
+        self.wall: defaultdict[str, float] = defaultdict(float)
+        self.cpu: defaultdict[str, float] = defaultdict(float)
         self.compiled = self.launched = 0
         self._open = ["import"]
         self._at = time.monotonic(), 0.0  # what the interpreter took before is import, too
