@@ -75,9 +75,9 @@ def fit_recorded(
     named = None if settings.losses is None else settings.stage_names(reference.encoding)
     measure = named[-1] if named else "flip-ldr" if ldr else "flip-hdr"
     light = linear_pixels(reference, view)
+    scene = RecordedScene(renderer, int(mask.sum()))  # refuses glass, so it comes first
     # the start's picture is rendered while the kernels of the fit are compiled
     start = verify_later(renderer, renderer.start, seed=settings.seed, spp=settings.verify_spp)
-    scene = RecordedScene(renderer, int(mask.sum()))
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
     names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))

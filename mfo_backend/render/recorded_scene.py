@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -64,7 +65,11 @@ class RecordedScene:
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
-        self.needs = self._probe()
+
+    @cached_property
+    def needs(self) -> SceneNeeds:
+        """What to record, found by tracing a few rays when it is first asked for."""
+        return self._probe()
 
     def _probe(self) -> SceneNeeds:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of 1 ray a pixel."""

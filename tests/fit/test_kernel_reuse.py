@@ -90,3 +90,23 @@ def test_another_fit_of_the_same_kind_compiles_nothing(case, tmp_path):
                 if k["type"] == dr.KernelType.JIT and (not k["cache_hit"] or k["cache_disk"])
             ]
     assert new == []
+
+
+def test_no_picture_is_rendered_for_a_material_that_recorded_paths_refuse(tmp_path, monkeypatch):
+    """The picture of the start is begun early, but not before it is known that the fit goes this way."""
+    from mfo_backend.fit.fit_recorded import fit_recorded
+    from mfo_backend.types.errors import UnrecordableError
+
+    sockets = {n: {"value": v, "linked": False} for n, v in GLASS[0].items()}
+    renderer = load_renderer(
+        write_scene(tmp_path, ROOMS[0], size=16, depth=4),
+        "target",
+        model="blender_principled",
+        parameters="all",
+        materials={"target_bsdf": {"sockets": sockets}},
+    )
+    reference = Image(renderer.image(renderer.start, seed=1, spp=4), Encoding.LINEAR)
+    before = renderer.passes
+    with pytest.raises(UnrecordableError):
+        fit_recorded(renderer, reference, FitSettings(), listener=lambda event: None, should_stop=lambda: False)
+    assert renderer.passes == before
