@@ -22,8 +22,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")  # as the `mfo` command does, before NumPy reads it
+
+import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -100,7 +103,8 @@ def excess(renderer: Any, found: NDArray[np.float64], truth: NDArray[np.float64]
     mask = renderer.target_mask()
     true = [renderer.image(truth, seed=s, spp=JUDGE_SPP)[mask].astype(np.float64) for s in (11, 12)]
     got = [renderer.image(found, seed=s, spp=JUDGE_SPP)[mask].astype(np.float64) for s in (11, 12)]
-    mean = 0.5 * (true[0] + true[1])
+    # weights of the noise that they weigh count dark fireflies more than bright ones: 64 samples said 1.015 for 1.002
+    mean = renderer.image(truth, seed=13, spp=2 * JUDGE_SPP)[mask].astype(np.float64)
     weight = 1.0 / (mean + 0.1 * mean.mean()) ** 2
     clean = float(np.mean((got[0] - true[0]) * (got[1] - true[1]) * weight))
     noise = float(np.mean((reference[mask] - true[0]) * (reference[mask] - true[1]) * weight))

@@ -159,9 +159,11 @@ def _unlink(context: bpy.types.Context, name: str) -> None:
 
 def _make_local(context: bpy.types.Context, _argument: str) -> None:
     material = _material(context)
-    local = material.make_local()
-    if local is None or not local.is_editable:
-        raise MendingError(f"Material '{material.name}' cannot be made local: make its object local first.")
+    name = material.name
+    material.make_local()
+    # the slot of a mesh that is linked too keeps the library's material
+    if not _material(context).is_editable:
+        raise MendingError(f"Material '{name}' cannot be made local: make its object and its mesh local first.")
 
 
 def _render_exr(_context: bpy.types.Context, _argument: str) -> None:

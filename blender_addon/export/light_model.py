@@ -34,6 +34,7 @@ class Light:
     size_x: float = 1.0
     size_y: float = 1.0
     spread: float = math.pi
+    camera: bool = False  # whether the camera sees it
 
     @property
     def position(self) -> Vector:
@@ -57,7 +58,7 @@ def point_intensity(light: Light) -> Vector:
 
 
 def sphere_radiance(light: Light) -> Vector:
-    """Radiance of a point light with a radius: P c / (4 pi^2 r^2); not normalised: P c / pi."""
+    """Radiance of a point or spot light with a radius: P c / (4 pi^2 r^2); not normalised: P c / pi."""
     area = 4.0 * math.pi * light.radius**2 if light.normalize else 1.0
     return light.color * light.power / (math.pi * area)
 
@@ -65,8 +66,8 @@ def sphere_radiance(light: Light) -> Vector:
 def area_of(light: Light) -> float:
     """Area in square metres of an area light, its object's scale included."""
     width, height = light.sizes
-    axes = np.cross(light.world[:3, 0] * width, light.world[:3, 1] * height)
-    return float(np.linalg.norm(axes)) * (math.pi / 4.0 if light.is_round else 1.0)
+    sides = np.linalg.norm(light.world[:3, 0] * width) * np.linalg.norm(light.world[:3, 1] * height)
+    return float(sides) * (math.pi / 4.0 if light.is_round else 1.0)
 
 
 def area_radiance(light: Light) -> Vector:
@@ -80,21 +81,9 @@ def sun_irradiance(light: Light) -> Vector:
     return light.color * light.power * (1.0 if light.normalize or solid == 0.0 else solid)
 
 
-def spot_falloff(cos_angle: NDArray[np.float64], spot_size: float, spot_blend: float) -> NDArray[np.float64]:
-    """Return Cycles' cone factor in [0, 1]: smoothstep of the cosine from the rim inwards (kernel/light/spot.h)."""
-    rim = math.cos(spot_size / 2.0)
-    t = np.clip((cos_angle - rim) / max((1.0 - rim) * spot_blend, 1e-9), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
-
-
-def spread_falloff(tangent: NDArray[np.float64], spread: float) -> NDArray[np.float64]:
-    """Return the factor an area light's spread puts on its radiance at `tangent` = tan of the angle to its axis.
-
-    Constant total power (kernel/light/area.h): (T - tan) / (T - half), T the tangent of half the spread.
-    """
-    half = max(spread, 1e-3) / 2.0
-    limit = math.tan(half)
-    return np.clip(limit - tangent, 0.0, None) / (limit - half)
+def sun_radiance(light: Light) -> Vector:
+    """Radiance of a sun's disk of angle a: P c / (pi sin^2(a / 2)); not normalised: P c."""
+    return sun_irradiance(light) / (math.pi * math.sin(light.sun_angle / 2.0) ** 2)
 
 
 def irradiance_at(light: Light, point: Vector) -> float:
@@ -104,6 +93,6 @@ def irradiance_at(light: Light, point: Vector) -> float:
     square = max(float(np.sum((light.position - point) ** 2)), 1e-6)
     if light.kind == "AREA":
         return float(area_radiance(light).mean()) * area_of(light) / (square + area_of(light))
-    if light.kind == "POINT" and light.radius > 0.0:
+    if light.radius > 0.0:
         return float(sphere_radiance(light).mean()) * math.pi * light.radius**2 / max(square, light.radius**2)
     return float(point_intensity(light).mean()) / square

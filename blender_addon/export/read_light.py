@@ -13,6 +13,9 @@ from .findings import Findings
 from .light_model import Light
 from .shader_graph import emission_of
 
+# cubic metres; a light thinner than any scene needs has no area that light could come from
+LEAST_VOLUME = 1e-18
+
 
 def read_light(
     evaluated: bpy.types.Object, matrix: NDArray[np.float64], exposure: float, findings: Findings
@@ -44,7 +47,8 @@ def read_light(
     if not data.use_shadow:
         findings.note(f"Light '{name}' casts no shadows in Blender; in the fit it does.")
     _note_linking(evaluated, findings)
-    return Light(
+    _note_rays(evaluated, findings)
+    light = Light(
         kind=data.type,
         name=name,
         world=matrix,
@@ -60,7 +64,24 @@ def read_light(
         size_x=getattr(data, "size", 1.0),
         size_y=getattr(data, "size_y", 1.0),
         spread=getattr(data, "spread", np.pi) if data.type == "AREA" else np.pi,
+        camera=evaluated.visible_camera,
     )
+    if light.kind in ("AREA", "SPOT") and abs(np.linalg.det(matrix[:3, :3])) * min(light.sizes) < LEAST_VOLUME:
+        findings.error(f"Light '{name}' is scaled or sized to nothing: give it a size and a scale above 0.")
+        return None
+    return light
+
+
+def _note_rays(evaluated: bpy.types.Object, findings: Findings) -> None:
+    off = [kind for kind in ("diffuse", "glossy", "transmission") if not getattr(evaluated, f"visible_{kind}")]
+    if off:
+        findings.note(f"Light '{evaluated.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
+    cycles = cycles_settings(evaluated.data)
+    if cycles is not None and not cycles.use_multiple_importance_sampling:
+        findings.note(
+            f"Light '{evaluated.name}' is without Multiple Importance Sampling: mirrors do not show it in Cycles, but "
+            "in the fit they do."
+        )
 
 
 def _note_linking(evaluated: bpy.types.Object, findings: Findings) -> None:

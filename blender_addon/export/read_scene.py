@@ -55,10 +55,16 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         if camera is None or material is None:
             return None
         data = SceneData(camera, settings, read_world(scene, settings.exposure, findings))
-        _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings).run()
+        walk = _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings)
+        walk.run()
         if data.target is None:
             if target.name_full not in rendered_objects(view_layer):
                 findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
+            elif walk.target_left_out:
+                findings.error(
+                    f"All faces of '{target.name}' with its active material have corners at NaN, infinite or absurdly "
+                    "far positions (1e18 m): move or scale the object, or mend its mesh."
+                )
             else:
                 findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
             return None
@@ -118,6 +124,7 @@ class _Walk:
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
         self.target_pieces: list[tuple[TriangleMesh, bool]] = []
+        self.target_left_out = 0  # triangles
         data.materials[TARGET_BSDF] = material
         self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
 
@@ -167,6 +174,8 @@ class _Walk:
                     f"Object '{item.name}' has {left_out} triangles with corners at NaN, infinite or absurdly far "
                     "positions; they are left out."
                 )
+            if is_target and slot == self.slot:
+                self.target_left_out += left_out
             if not len(piece.triangles):
                 continue
             if is_target and slot == self.slot:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .camera_model import sensor_element
 from .exr_file import write_exr
 from .findings import Findings
-from .light_elements import Surroundings, has_surface, light_elements
+from .light_elements import light_element
 from .light_model import irradiance_at
 from .material_elements import bsdf_element, emission_element
 from .material_model import Texture
@@ -72,7 +72,6 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     center, radius = scene.bounds()
     target = scene.target
     middle = center if target is None else target.mesh.positions.mean(axis=0).astype(np.float64)
-    around = Surroundings(center, radius, middle)
     children: list[Element] = [
         add(
             plugin("integrator", "path"),
@@ -86,8 +85,7 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     if world is not None:
         emitters.append((world, world_irradiance(scene.world)))
     for index, light in enumerate(scene.lights):
-        elements = light_elements(light, f"light_{index + 1:04d}", around, files.picture, findings)
-        emitters += [(element, irradiance_at(light, middle) / len(elements)) for element in elements]
+        emitters.append((light_element(light, f"light_{index + 1:04d}"), irradiance_at(light, middle)))
     _weigh(emitters)
     children += [element for element, _ in emitters]
     for identifier, material in scene.materials.items():
@@ -103,9 +101,7 @@ def _weigh(emitters: list[tuple[Element, float]]) -> None:
     """Let Mitsuba sample each emitter in proportion to what it gives the target, not all equally often."""
     most = max((irradiance for _, irradiance in emitters), default=0.0)
     for element, irradiance in emitters if len(emitters) > 1 else []:
-        emitter = element.find("emitter") if element.tag == "shape" else element
-        assert emitter is not None
-        add(emitter, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
+        add(element, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
 
 
 def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneFiles) -> list[Element]:
@@ -125,25 +121,10 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
 
 
 def _hide_emitters(scene: SceneData, findings: Findings) -> bool:
-    """Whether camera rays may pass through lights and miss the world; both or none, as Mitsuba has one switch."""
-    surfaces = [light for light in scene.lights if has_surface(light)]
+    """Whether camera rays may pass through glowing objects and miss the world; both or none: Mitsuba has one switch."""
     world_is_seen = scene.world.is_lit and not scene.settings.film_transparent
     if not world_is_seen and not scene.emitting:
-        return bool(surfaces) or scene.world.is_lit
+        return scene.world.is_lit
     if scene.settings.film_transparent and scene.world.is_lit:
         findings.note("The film is transparent, but glowing objects are in view: the world shows behind them.")
-    for light in surfaces:
-        if light.kind == "SUN":
-            continue
-        reach = light.radius if light.kind == "POINT" else 0.5 * float(np.hypot(*light.sizes))
-        place, depth = scene.camera.project(light.position[None, :])
-        x, y = place[0]
-        pixels = reach * scene.camera.fitted_pixels / max(float(depth[0]), 1e-6)
-        inside = -pixels < x < scene.camera.width + pixels and -pixels < y < scene.camera.height + pixels
-        if inside and depth[0] > 0.0:
-            findings.note(f"Light '{light.name}' is in view: Mitsuba shows its surface, Cycles does not.")
-    surfaces = [light for light in surfaces if light.kind != "SUN"]
-    if surfaces and (scene.world.is_lit or len(scene.lights) > 1):
-        names = ", ".join(f"'{light.name}'" for light in surfaces)
-        findings.note(f"Lights with a size ({names}) block light that comes from behind them; in Cycles they do not.")
     return False

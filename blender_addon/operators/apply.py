@@ -76,16 +76,12 @@ class MFO_OT_apply(bpy.types.Operator):
         return found
 
 
-class MFO_OT_revert(bpy.types.Operator):
-    """Give the active material the values back that it had before Apply"""
+class _OnAppliedMaterial:
+    """What Revert and Toggle share: the material to which values were applied, and what is said of it."""
 
-    bl_idname = "mfo.revert"
-    bl_label = "Revert Values"
     bl_options = {"REGISTER", "UNDO"}
 
-    material: StringProperty(
-        name="Material", description="Material to revert; empty: the active object's", options=_SCRIPT
-    )
+    material: StringProperty(name="Material", description="Empty: the active object's", options=_SCRIPT)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -97,9 +93,9 @@ class MFO_OT_revert(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set the kept values."""
+        """Set the other values, report what was skipped."""
         try:
-            notes = revert_values(applied_material(context, self.material))
+            notes = self._change(applied_material(context, self.material))
         except WriteBackError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -108,30 +104,20 @@ class MFO_OT_revert(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MFO_OT_toggle(bpy.types.Operator):
+class MFO_OT_revert(_OnAppliedMaterial, bpy.types.Operator):
+    """Give the active material the values back that it had before Apply"""
+
+    bl_idname = "mfo.revert"
+    bl_label = "Revert Values"
+    _change = staticmethod(revert_values)
+
+
+class MFO_OT_toggle(_OnAppliedMaterial, bpy.types.Operator):
     """Switch the active material between its own values (A) and the recovered ones (B)"""
 
     bl_idname = "mfo.toggle"
     bl_label = "Toggle Own and Recovered Values"
-    bl_options = {"REGISTER", "UNDO"}
-
-    material: StringProperty(name="Material", description="Empty: the active object's", options=_SCRIPT)
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """In windows only where values were applied."""
-        return MFO_OT_revert.poll.__func__(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set the other values."""
-        try:
-            notes = toggle_values(applied_material(context, self.material))
-        except WriteBackError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        for note in notes:
-            self.report({"WARNING"}, note)
-        return {"FINISHED"}
+    _change = staticmethod(toggle_values)
 
 
 def applied_material(context: bpy.types.Context, name: str) -> bpy.types.Material:

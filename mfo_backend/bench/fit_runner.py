@@ -63,7 +63,7 @@ class FitRunner:
 
         if needs_llvm():
             configure_llvm()  # before the first import of drjit
-        from ..render.variant import load_variant, use_threads
+        from ..render.variant import load_variant, thread_count, use_threads
 
         self.size = size
         began = time.monotonic()
@@ -71,6 +71,7 @@ class FitRunner:
         self.import_seconds = time.monotonic() - began
         if threads:
             use_threads(threads)
+        self.threads = thread_count()
         self._folder = folder
         self._assets = assets
         self._kept_at = pictures

@@ -11,22 +11,22 @@ from typing import Any
 from ..job.result import versions
 
 
-def machine_facts(variant: str, import_seconds: float) -> dict[str, Any]:
+def machine_facts(variant: str, *, threads: int, import_seconds: float) -> dict[str, Any]:
     """Versions, Mitsuba variant, processor, threads of its kernels, and the commit of the checkout if it is one.
 
     Parameters
     ----------
     variant
         The one that is set.
+    threads
+        Those its kernels run on.
     import_seconds
         What importing Mitsuba and setting it took in this process.
     """
-    import drjit as dr
-
     return {
         "versions": versions(variant),
         "device": "GPU" if variant.startswith("cuda") else _processor(),
-        "threads": dr.thread_count(),
+        "threads": threads,
         "import_seconds": import_seconds,
         "commit": _commit(),
     }

@@ -61,7 +61,7 @@ class FitRecipe:
             raise SetupError(f"This worker has other {' and '.join(differing)}: give every worker the same MFO_DATA.")
         kept = Path(self.pictures) if Path(self.pictures).is_dir() else None
         runner = FitRunner(Path(tempfile.mkdtemp(prefix="mfo-bench-")), self.size, assets, kept, threads=self.threads)
-        return runner, machine_facts(runner.variant, runner.import_seconds)
+        return runner, machine_facts(runner.variant, threads=runner.threads, import_seconds=runner.import_seconds)
 
 
 _RUNNERS: dict[Any, tuple[Any, dict[str, Any]]] = {}  # of this process

@@ -16,6 +16,7 @@ from ..job.stop import StopSignal
 from ..types.errors import BadInputError
 from ..types.status import Status
 from .cluster_options import add_cluster_options
+from .run import add_trust_option
 
 
 def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
@@ -28,6 +29,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("jobs", type=Path, nargs="+", metavar="JOB", help="folder with a request.json")
     parser.add_argument("--again", action="store_true", help="also run jobs that have a result")
     parser.add_argument("--json", action="store_true", help="print one JSON object a job")
+    add_trust_option(parser)
     add_cluster_options(parser)
     parser.set_defaults(func=run)
 
@@ -44,11 +46,11 @@ def run(arguments: argparse.Namespace) -> int:
     with stop.watching():
         if arguments.scheduler:
             with open_client(arguments.scheduler, 0) as client:
-                ends = _show(run_there(left, client, stop.requested), len(left), arguments.json)
+                ends = _show(run_there(left, client, stop.requested, arguments.trust), len(left), arguments.json)
         else:
             count = arguments.workers or 1
             threads = threads_each(count) if count > 1 else 0
-            ends = _show(run_here(left, count, threads, stop.requested), len(left), arguments.json)
+            ends = _show(run_here(left, count, threads, stop.requested, arguments.trust), len(left), arguments.json)
     if len(ends) < len(left):
         print("mfo: stopped; the same command goes on where it was.", file=sys.stderr)
         return Status.CANCELLED.exit_code

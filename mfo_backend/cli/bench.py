@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from ..bench.assets import Assets
+from ..bench.headline import fill
 from ..bench.method import DEFAULT_METHODS, METHODS, missing_for
 from ..bench.report import write_report
 from ..bench.row import Row
@@ -17,6 +18,7 @@ from ..bench.row_file import RowFile, keep_setup
 from ..bench.run_bench import all_tasks, run_bench
 from ..bench.scatter import FitRecipe, run_scattered
 from ..bench.scenario import SCENARIOS
+from ..job.atomic_file import write_atomically
 from ..job.cluster import open_client, threads_each
 from ..job.progress_bar import terminal_columns
 from ..job.stop import StopSignal
@@ -46,6 +48,8 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     report = actions.add_parser("report", help="print and write the report of a bench folder")
     report.add_argument("folder", type=Path, metavar="DIR", help="folder of a bench")
     report.add_argument("--note", action="append", default=[], help="a remark for the report, such as a busy machine")
+    page = "a Markdown page whose block `<!-- bench -->` gets the short table; again for more"
+    report.add_argument("--page", type=Path, action="append", default=[], metavar="FILE", help=page)
     report.set_defaults(func=run_report)
     add_surface_parser(actions)
 
@@ -67,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..bench.machine import machine_facts
 
     runner = FitRunner(arguments.out / "scenes", arguments.size, assets, pictures, host=_blender())
-    machine = machine_facts(runner.variant, runner.import_seconds)
+    machine = machine_facts(runner.variant, threads=runner.threads, import_seconds=runner.import_seconds)
     return work(arguments, partial(run_bench, runner=runner, machine=machine, log=partial(_log, arguments.out)))
 
 
@@ -129,10 +133,25 @@ def _log(folder: Path, text: str) -> None:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Print and write the report of a folder's rows."""
-    if not RowFile(arguments.folder).read():
+    rows = RowFile(arguments.folder).read()
+    if not rows:
         raise BadInputError(f"{arguments.folder} holds no rows of a bench: run `mfo bench --out {arguments.folder}`.")
+    for page in arguments.page:
+        write_atomically(page, fill(_page_text(page), rows).encode("utf-8"))
     print(write_report(arguments.folder, notes=arguments.note))
     return 0
+
+
+def _page_text(page: Path) -> str:
+    try:
+        text = page.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInputError(f"The page {page} cannot be read ({error}): give a Markdown file.") from None
+    if "<!-- bench -->" not in text:
+        raise BadInputError(
+            f"{page} has no block from `<!-- bench -->` to `<!-- end -->`: write one where the table is to be."
+        )
+    return text
 
 
 def _setup(arguments: argparse.Namespace, assets: Assets) -> dict:

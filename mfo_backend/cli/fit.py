@@ -52,7 +52,7 @@ def work(arguments: argparse.Namespace, fitter: Fitter) -> int:
     is_new = not folder.exists()
     make_job(arguments.scene, arguments.target, arguments.reference, settings, folder, view=view)
     stream = take_stdout() if arguments.json else None
-    done = run_folder(folder, fitter, is_new=is_new)
+    done = run_folder(folder, fitter, is_new=is_new, trusted=True)  # the user's own scene, named on the command line
     if done.result is None:
         report_error(done.status, done.sentence, stream=stream)
         return leave(done.status)

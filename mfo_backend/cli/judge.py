@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(arguments: argparse.Namespace) -> int:
     """Print the metrics and write both pictures; returns 0, or raises `BadInputError`."""
     folder = JobFolder.open(arguments.job)
-    request = read_request(folder)
+    request = read_request(folder, trusted=True)  # the scene is not loaded
     reference, _notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     picture = read_image(arguments.picture)

@@ -30,7 +30,15 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("--parent", type=int, metavar="PID", help="stop when this process is gone")
     parser.add_argument("--control", choices=("stdin",), help="read commands from stdin and stop at its end")
+    add_trust_option(parser)
     parser.set_defaults(func=run)
+
+
+def add_trust_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--trust``."""
+    parser.add_argument(
+        "--trust", action="store_true", help="take meshes and textures that Mitsuba reads unchecked (OBJ, PNG, ...)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -67,7 +75,7 @@ def work(arguments: argparse.Namespace, fitter: Fitter, *, orphan_grace: float =
         orphan_grace=orphan_grace,
     )
     with stop.watching():
-        status = run_job(arguments.job, events, stop, fitter=fitter)
+        status = run_job(arguments.job, events, stop, fitter=fitter, trusted=arguments.trust)
     if stream is not None:
         with contextlib.suppress(OSError):  # its reader is gone
             stream.close()

@@ -26,11 +26,11 @@ class FolderRun:
     result: Mapping[str, Any] | None
 
 
-def run_folder(folder: Path, fitter: Fitter, *, is_new: bool) -> FolderRun:
+def run_folder(folder: Path, fitter: Fitter, *, is_new: bool, trusted: bool = False) -> FolderRun:
     """Run the job in `folder` with a progress bar on stderr; a new folder whose job is refused is removed."""
     events = EventWriter(bar=True)
     with (stop := StopSignal(cancel_file=folder / "cancel")).watching():
-        status = run_job(folder, events, stop, fitter=fitter)
+        status = run_job(folder, events, stop, fitter=fitter, trusted=trusted)
     path = folder / "result.json"
     if is_new and status is Status.BAD_INPUT:
         shutil.rmtree(folder, ignore_errors=True)

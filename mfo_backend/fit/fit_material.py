@@ -16,6 +16,7 @@ from ..types.event import Listener, Started
 from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
+from .final_result import final_result
 from .settings import FitSettings
 from .stages import Candidate, run_stages
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
@@ -77,21 +78,8 @@ def fit_material(
         else:
             candidates = verified
     best = _best(candidates, losses[-1])
-    message = status.sentence
-    if best == 0 and status is not Status.CANCELLED:
-        message += " Nothing was better than the start, so the start was kept."
-    result = FitResult(
-        status=status,
-        message=message,
-        model=renderer.model,
-        initial=renderer.table.unpack(renderer.start),
-        recovered=renderer.table.unpack(candidates[best].vector),
-        bounds={p.name: (p.lower, p.upper) for p in renderer.table},
-        stages=stages.reports,
-        errors=picture_errors(reference, candidates[0].image, candidates[best].image, mask, display),
-        seconds=time.monotonic() - began,
-        passes=renderer.passes,
-    )
+    errors = picture_errors(reference, candidates[0].image, candidates[best].image, mask, display)
+    result = final_result(renderer, candidates, best, status=status, stages=stages.reports, errors=errors, began=began)
     return FitOutcome(result, candidates[0].image, candidates[best].image)
 
 

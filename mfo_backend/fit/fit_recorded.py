@@ -15,10 +15,10 @@ from ..metrics.tone_mapping import DisplayView, View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..types.event import Listener, Preview, Started
 from ..types.image import Encoding, Image, Pixels
-from ..types.result import FitResult
 from ..types.status import Status
 from .course import Course
 from .displayed_residual import DisplayedResidual
+from .final_result import final_result
 from .finishing import finishing_residuals
 from .fit_material import FitOutcome
 from .kept_values import box_holding, keep_values
@@ -129,24 +129,18 @@ def fit_recorded(
     counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
-    message = status.sentence
-    if best == 0:
-        message += " Nothing was better than the start, so the start was kept."
-    elif best == 1 and len(ends) > 2:
+    if best == 1 and len(ends) > 2:
         notes.append("No perceptual stage was better in a picture of its own, so the end of 'refine' was kept.")
-    result = FitResult(
+    result = final_result(
+        renderer,
+        pictures,
+        best,
         status=status,
-        message=message,
-        model=renderer.model,
-        initial=renderer.table.unpack(renderer.start),
-        recovered=renderer.table.unpack(ends[best].x),
-        bounds={p.name: (p.lower, p.upper) for p in renderer.table},
-        stages=tuple(course.reports),
+        stages=course.reports,
         errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
-        seconds=time.monotonic() - began,
-        passes=renderer.passes,
+        began=began,
         certainty=kept.certainty if kept else {},
-        notes=tuple(notes),
+        notes=notes,
         weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
     return FitOutcome(result, pictures[0].image, pictures[best].image, pictures[best].halves)

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,9 @@ from ..types.certainty import Certainty, Level
 from ..types.event import Listener, Preview, Started
 from ..types.image import Encoding, Image, Pixels
 from ..types.parameter import ParameterTable
-from ..types.result import FitResult
 from ..types.status import Status
 from .course import Course
+from .final_result import final_result
 from .fit_material import FitOutcome
 from .fit_recorded import CANCELLED_SPP, clipped_pixels, linear_pixels
 from .settings import FitSettings
@@ -27,8 +29,12 @@ from .transmission_stages import Polished, TransmissionFit, TransmissionPlan
 from .uncertainty import WEAK_BELOW, certainties
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 
+if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
+    from ..render.traced_paths import TracedPaths
+
 STAGES = ("scan", "race", "polish")
-_PATHS_OF_A_PART = 1 << 20
+PATHS_OF_A_PART = 1 << 18  # of a picture, after which a request to stop is heard: as long as a launch of traced paths
+_PREVIEW_PATHS, _PREVIEW_SPP = 1 << 16, 4  # half a launch at most, whatever the size of the picture
 Vector = NDArray[np.float64]
 
 
@@ -67,6 +73,7 @@ def fit_transmission(
     listener(Started(stages=STAGES, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, STAGES, listener, should_stop, began)
     light, clipped = linear_pixels(reference, view), clipped_pixels(reference, view)
+    course.picture = lambda x: _preview(paths, x, mask.shape, settings.seed ^ VERIFY_STREAM)
     fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
 
     certainty: dict[str, Certainty] = {}
@@ -91,30 +98,24 @@ def fit_transmission(
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
     best = int(np.argmin([loss.value(picture.image) for picture in pictures]))
     status = Status.CANCELLED if stopped or should_stop() else Status.CONVERGED
-    message = status.sentence
-    if best == 0:
-        message += " Nothing was better than the start, so the start was kept."
-    result = FitResult(
+    result = final_result(
+        renderer,
+        pictures,
+        best,
         status=status,
-        message=message,
-        model=renderer.model,
-        initial=renderer.table.unpack(renderer.start),
-        recovered=renderer.table.unpack(pictures[best].vector),
-        bounds={p.name: (p.lower, p.upper) for p in renderer.table},
-        stages=tuple(course.reports),
+        stages=course.reports,
         errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
-        seconds=time.monotonic() - began,
-        passes=renderer.passes,
+        began=began,
         certainty=certainty,
-        notes=tuple(notes),
+        notes=notes,
     )
     return FitOutcome(result, pictures[0].image, pictures[best].image)
 
 
 def _picture(renderer: MitsubaRenderer, x: Vector, seed: int, spp: int, should_stop: Callable[[], bool]) -> Pixels:
-    """A path-traced picture in parts of about a million paths, so that a request to stop need not wait for all."""
+    """A path-traced picture in parts, so that a request to stop need not wait for all."""
     passes, done, total = renderer.passes, 0, None
-    part = max(1, min(spp, _PATHS_OF_A_PART // renderer.target_mask().size))
+    part = max(1, min(spp, PATHS_OF_A_PART // renderer.target_mask().size))
     while total is None or (done < spp and not should_stop()):
         count = min(part, spp - done)
         image = renderer.image(x, seed=seed + done, spp=count).astype(np.float64) * count
@@ -122,6 +123,21 @@ def _picture(renderer: MitsubaRenderer, x: Vector, seed: int, spp: int, should_s
         done += count
     renderer.passes = passes + 1.0
     return (total / done).astype(np.float32)
+
+
+def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:
+    """A coarse picture: few paths of one pixel in each block, so that its cost does not grow with the picture."""
+    height, width = shape
+    block = math.ceil(math.sqrt(height * width * _PREVIEW_SPP / _PREVIEW_PATHS))
+    rows, columns = (np.arange(min(block // 2, n - 1), n, block) for n in shape)
+    pixels = (rows[:, None] * width + columns).ravel()
+    passes = paths.renderer.passes
+    seen = paths.images(x[None], pixels, seed=seed, samples=_PREVIEW_SPP, jacobian=False)[0, :, :, 0]
+    paths.renderer.passes = passes  # no part of the fit
+    coarse = seen.reshape(len(rows), len(columns), 3)
+    filled = np.repeat(np.repeat(coarse, block, axis=0), block, axis=1)
+    short = ((0, max(0, height - len(filled))), (0, max(0, width - filled.shape[1])), (0, 0))
+    return np.pad(filled, short, mode="edge")[:height, :width]
 
 
 def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certainty]:

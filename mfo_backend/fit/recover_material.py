@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,8 +14,10 @@ from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
 from .fit_recorded import fit_recorded
-from .fit_transmission import fit_transmission
+from .fit_transmission import STAGES, fit_transmission
 from .settings import FitSettings
+
+_TRACED = ", ".join(map(repr, STAGES))
 
 
 def recover_material(
@@ -31,7 +32,7 @@ def recover_material(
     """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`).
 
     A material that recorded paths cannot hold, such as glass, is fitted by `fit_transmission`; where that cannot do it
-    either, by `fit_material` whatever the preset, and a note says so.
+    either, by `fit_material` whatever the preset. The last of the result's notes says which and why.
     """
     reason = ""
     if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer):
@@ -40,13 +41,24 @@ def recover_material(
                 renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
             )
         except UnrecordableError as error:
-            reason = f"{error} So the preset 'paper' was used instead of {settings.preset!r}."
-        if settings.losses is None:  # its stages know no losses of the user's choice
-            with contextlib.suppress(UnrecordableError):
-                return fit_transmission(
+            reason = str(error)
+        if settings.losses is None:
+            try:
+                outcome = fit_transmission(
                     renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
                 )
+            except UnrecordableError as error:
+                reason = f"{reason} {error}"
+            else:
+                return _noted(outcome, f"{reason} So whole light paths were traced, by the stages {_TRACED}.")
+        else:
+            reason += " The stages on whole light paths know no losses of the user's choice."
+        reason += f" So the preset 'paper' was used instead of {settings.preset!r}."
     settings = replace(settings, preset="paper")
     outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
-    notes = (*outcome.result.notes, *([reason] if reason else []))
-    return replace(outcome, result=replace(outcome.result, notes=notes))
+    return _noted(outcome, reason) if reason else outcome
+
+
+def _noted(outcome: FitOutcome, note: str) -> FitOutcome:
+    """The outcome with one more note."""
+    return replace(outcome, result=replace(outcome.result, notes=(*outcome.result.notes, note)))

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solve.bounded_least_squares import NormalEquations
-from ..solve.noisy_least_squares import CrossProducts, SafeMatrix, cautious_step, cross_equations
+from ..solve.noisy_least_squares import SafeMatrix, cautious_step, cross_equations
 from ..types.image import Pixels
 from .course import Course, Stage
+from .tile_pools import TilePools
 from .tile_rows import TileRows
 from .uncertainty import WEAK_BELOW
 
@@ -29,8 +30,12 @@ GEOMETRIC = ("roughness", "ior")  # they move the paths
 ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
-FAR, NEAR = {"roughness": 0.12, "ior": 0.06}, {"roughness": 0.06, "ior": 0.03}
+SECANTS = {"roughness": 0.12, "ior": 0.06}
 TILE_SIZES = (1, 2, 4, 8)
+DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
+GUARD_PARTS = 4
+SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
+FAR = 0.03  # of the range, in any value: from there on derivatives of samples so far are no longer to be trusted
 TRUST = 0.25  # of the range: the longest step
 
 
@@ -48,14 +53,14 @@ class TransmissionPlan:
     scan_samples: int = 4
     scan_steps: int = 2
     starts: int = 2
-    race_pixels: int = 3000
+    race_pixels: int = 1500
     race_samples: int = 8
     race_steps: int = 7
     polish_pixels: int = 16_000
-    polish_paths: int = 40_000
+    polish_paths: int = 20_000
     polish_steps: int = 32
-    guard_samples: int = 16
-    enough: float = 0.003
+    guard_samples: int = 4
+    enough: float = 0.005
 
 
 @dataclass
@@ -118,21 +123,26 @@ class TransmissionFit:
         seed: int,
         samples: int,
         jacobian: bool = True,
-        near: bool = False,
         moving: bool = True,
     ) -> list[Samples]:
         """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
 
-        Without `moving` the derivatives by roughness and index stay those of fixed paths; `near` takes shorter secants.
+        Without `moving` the derivatives by roughness and index stay those of fixed paths.
         """
-        tables = self._tables(tiles, xs, seed, samples, jacobian, near, moving)
+        tables = self._tables(tiles.pixels, xs, seed, samples, jacobian, moving)
         return [[tiles.rows(half) for half in np.split(table, 2)] for table in tables]
 
     def _tables(
-        self, tiles: TileRows, xs: Vector, seed: int, samples: int, jacobian: bool, near: bool, moving: bool
+        self,
+        pixels: NDArray[np.int64],
+        xs: Vector,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        moving: bool = True,
     ) -> NDArray[np.float32]:
         """Pictures with derivatives (m, 2 p, 3, 1 + k), the pixels twice."""
-        pixels = np.concatenate([tiles.pixels, tiles.pixels])  # the second time with other random numbers
+        pixels = np.concatenate([pixels, pixels])  # the second time with other random numbers
 
         def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
             return self.paths.images(
@@ -141,10 +151,10 @@ class TransmissionFit:
 
         tables = trace(xs, jacobian)
         if jacobian and moving:
-            self._secants(tables, xs, trace, near)
+            self._secants(tables, xs, trace)
         return tables
 
-    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable, near: bool) -> None:
+    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable) -> None:
         """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
         moved, where = [], []
         for i, x in enumerate(xs):
@@ -154,7 +164,7 @@ class TransmissionFit:
                 if name not in self.table.names:
                     continue
                 k = self.table.slice_of(name).start
-                h = (NEAR if near else FAR)[name]
+                h = SECANTS[name]
                 h = -h if x[k] + h > self.table.upper[k] else h
                 trial = x.copy()
                 trial[k] += h
@@ -188,16 +198,17 @@ class TransmissionFit:
             for name in held:
                 frozen[table.slice_of(name)] = True
             equations: list[NormalEquations] = []
+            order = np.arange(len(xs))
             for turn in range(plan.scan_steps + 1):
                 rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
                 equations = [_two_half(*pair) for pair in rows]
-                best = int(np.argmin([e.cost for e in equations]))
-                self._note(stage, xs[best], equations[best].cost)
+                order = np.argsort([e.cost for e in equations])
+                self._note(stage, xs[order[0]], equations[order[0]].cost)
                 if turn == plan.scan_steps or frozen.all() or self.course.should_stop():
                     break
-                for i, e in enumerate(equations):
-                    xs[i] += self._step(e, xs[i], 0.02, 0.5, frozen)
-            order = np.argsort([e.cost for e in equations])
+                # the better half goes on
+                order = order[: -(-len(order) // 2)]
+                xs = np.array([xs[i] + self._step(equations[i], xs[i], 0.02, 0.5, frozen) for i in order])
             stage.vector = xs[order[0]]
             return [(equations[i].cost, xs[i]) for i in order]
 
@@ -206,16 +217,18 @@ class TransmissionFit:
         plan = self.plan
         with self.course.stage("race") as stage:
             tiles = self.tiles(4, plan.race_pixels)
+            few = len(tiles.pixels) < self.mask.sum()
             runners = [Runner(x.copy()) for x in self._different(nodes, plan.starts)]
             runners.append(Runner(self.table.clip(self.start)))
-            best = runners[0]
+            best, cost = runners[0], np.inf
             for turn in range(plan.race_steps + 1):
                 trials = [r.x if r.equations is None else r.x + self._damped(r) for r in runners]
-                rows = self.halves(
-                    tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples, near=turn > 3
-                )
+                rows = self.halves(tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples)
                 if self.course.should_stop():
                     break
+                if few and turn == 0 and _unsure(*rows[0]):
+                    tiles = self.tiles(4, 2 * plan.race_pixels)
+                    rows = self.halves(tiles, np.array(trials), seed=self._seed(3), samples=plan.race_samples)
                 for runner, trial, pair in zip(runners, trials, rows, strict=True):
                     self._accept(runner, trial, _two_half(*pair))
                 runners.sort(key=lambda r: r.equations.cost if r.equations else np.inf)
@@ -223,14 +236,24 @@ class TransmissionFit:
                 stage.vector = best.x
                 assert best.equations is not None
                 self._note(stage, best.x, best.equations.cost)
-                # those that fall behind are given up
+                gained = best.equations.cost < 0.8 * cost
+                cost = best.equations.cost
                 if turn >= 2:
-                    least = abs(best.equations.cost)
-                    runners = [r for r in runners if r.equations and r.equations.cost < best.equations.cost + 2 * least]
-                    runners = runners[:2]
-                if turn >= 4:
-                    runners = runners[:1]
+                    if not gained:
+                        break
+                    runners = self._leaders(runners)
             return best.x
+
+    def _leaders(self, runners: list[Runner]) -> list[Runner]:
+        """Those of the sorted runners that have not fallen behind and are not where a better one is."""
+        leader = runners[0].equations
+        assert leader is not None
+        kept: list[Runner] = []
+        for r in runners:
+            behind = r.equations is None or r.equations.cost > leader.cost + 2.0 * abs(leader.cost)
+            if not behind and all(np.max(np.abs(r.x - k.x) / self._width) > DIFFERENT for k in kept):
+                kept.append(r)
+        return kept[:2]
 
     def _damped(self, runner: Runner) -> Vector:
         assert runner.equations is not None
@@ -263,39 +286,32 @@ class TransmissionFit:
         return ends
 
     def _pool(self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int) -> Polished:
-        plan, columns = self.plan, 1 + self.table.length
-        x, variance, floor = start.copy(), np.diag(self._width**2), 0.0
+        plan = self.plan
+        x, variance = start.copy(), np.diag(self._width**2)
         equations, noise = None, variance
-        single = self.tiles(1, plan.polish_pixels)
+        pools = TilePools.of((self.tiles(size, plan.polish_pixels) for size in TILE_SIZES), 1 + self.table.length)
         # few pixels need more paths each: products of two noisy numbers average slowly
-        samples = int(np.clip(plan.polish_paths // len(single), 4, 16))
-        tiles, pool = single, CrossProducts(3, columns)
+        samples = int(np.clip(plan.polish_paths // len(pools.pixels), 2, 16))
+        moved, settled = 0.0, 0
         for turn in range(plan.polish_steps):
-            seed = self._seed(stream + turn)
-            if turn == 0:
-                (table,) = self._tables(single, x[None], seed, samples, True, True, True)
-                halves = np.split(table, 2)
-                floor = 2.0 * _two_half(*(single.rows(half) for half in halves)).cost
-                tiles, pair = self._best_tiles(single, halves)
-                pool = CrossProducts(3 * len(tiles), columns)
-            else:
-                (pair,) = self.halves(tiles, x[None], seed=seed, samples=samples, near=True)
+            (table,) = self._tables(pools.pixels, x[None], self._seed(stream + turn), samples)
             if self.course.should_stop():
                 break
-            if turn in (1, 2):
-                pool.fade(0.25)
-            for sample in pair:
-                sample[:, 1:][:, frozen] = 0.0
-                pool.add(sample)
-            equations, noise = cross_equations(pool.gram()), pool.gradient_noise(3)
+            table[..., 1:][..., frozen] = 0.0
+            if moved > FAR:
+                pools.fade(0.25)
+            pools.add(np.split(table, 2))
+            equations, noise, _ = pools.best(self._width)
             self._note(stage, x, equations.cost)
-            step = self._step(equations, x, 1e-3, 0.1 if turn < 2 else 0.05, frozen, noise)
+            step = self._step(equations, x, 1e-3, 0.1, frozen, noise)
+            moved = float(np.max(np.abs(step) / self._width))
             x = x + step
-            pool.shifted(step)
+            pools.shifted(step)
             stage.vector = x
-            matrix = SafeMatrix(equations, self._width)
-            variance = matrix.covariance(noise)
-            if turn >= 3 and matrix.expected_error(noise) < plan.enough * floor:
+            variance = SafeMatrix(equations, self._width).covariance(noise)
+            share = pools.expected_error(equations, noise, self._width)
+            settled = settled + 1 if moved <= FAR and share < plan.enough else 0
+            if settled == SETTLED:
                 break
         return Polished(x, variance, frozen, equations, noise)
 
@@ -321,40 +337,24 @@ class TransmissionFit:
             names.remove(worst)
         return held
 
-    def _best_tiles(self, single: TileRows, halves: Samples) -> tuple[TileRows, Samples]:
-        """The size of tiles that leaves the least uncertainty, with the rows of both halves.
-
-        Small tiles show more of a sharp picture's detail, large ones average the noise before it is multiplied.
-        """
-        best: tuple[float, TileRows, Samples] | None = None
-        for size in TILE_SIZES:
-            tiles = self.tiles(size, self.plan.polish_pixels)
-            order = np.searchsorted(single.pixels, tiles.pixels)
-            rows = [tiles.rows(half[order]) for half in halves]
-            pool = CrossProducts(3 * len(tiles), 1 + self.table.length)
-            for sample in rows:
-                pool.add(sample)
-            matrix = SafeMatrix(cross_equations(pool.gram()), self._width)
-            variance = matrix.covariance(pool.gradient_noise(3))
-            total = float(np.minimum(np.diag(variance) / self._width**2, 1.0).sum())
-            if best is None or total < best[0]:
-                best = total, tiles, rows
-        assert best is not None
-        return best[1], best[2]
-
     def choose(self, candidates: list[Vector]) -> int:
         """The first candidate, unless another is better by two standard errors on paths that none has seen."""
         tiles = self.tiles(4, self.plan.polish_pixels)
-        rows = self.halves(
-            tiles, np.array(candidates), seed=self._seed(999), samples=self.plan.guard_samples, jacobian=False
-        )
-        if self.course.should_stop():
-            return 0
-        costs = np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])
-        gain = costs[0] - costs
-        error = gain.std(axis=1) / np.sqrt(gain.shape[1])
-        sure = gain.mean(axis=1) > 2.0 * error
-        return int(np.argmax(np.where(sure, gain.mean(axis=1), 0.0)))
+        xs, samples = np.array(candidates), self.plan.guard_samples
+        gains: list[Vector] = []
+        mean = error = np.zeros(len(xs))
+        for part in range(GUARD_PARTS):
+            rows = self.halves(tiles, xs, seed=self._seed(999 + part), samples=samples, jacobian=False)
+            if self.course.should_stop():
+                return 0
+            costs = np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])
+            gains.append(costs[0] - costs)
+            gain = np.mean(gains, axis=0)
+            mean, error = gain.mean(axis=1), gain.std(axis=1) / np.sqrt(gain.shape[1])
+            # more paths only where another looks better and it is not sure
+            if not np.any((mean > error) & (mean <= 2.0 * error)):
+                break
+        return int(np.argmax(np.where(mean > 2.0 * error, mean, 0.0)))
 
     def _step(
         self,
@@ -374,7 +374,7 @@ class TransmissionFit:
     def _different(self, nodes: list[tuple[float, Vector]], count: int) -> list[Vector]:
         chosen: list[Vector] = []
         for _, x in nodes:
-            if all(np.max(np.abs(x - other) / self._width) > 0.12 for other in chosen):
+            if all(np.max(np.abs(x - other) / self._width) > DIFFERENT for other in chosen):
                 chosen.append(x)
             if len(chosen) == count:
                 break
@@ -391,3 +391,9 @@ def _two_half(a: NDArray[np.float32], b: NDArray[np.float32]) -> NormalEquations
     """The normal equations of two independent samples of the rows."""
     product_ = a.astype(np.float64).T @ b.astype(np.float64) / len(a)
     return cross_equations(0.5 * (product_ + product_.T))
+
+
+def _unsure(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
+    """Whether the mean square of two samples of the rows is not much more than its standard error over tiles."""
+    squares = (a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1)
+    return bool(squares.mean() < 3.0 * squares.std() / np.sqrt(len(squares)))

@@ -17,6 +17,7 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
 from .region import MaskedLoss, fill_outside
 from .settings import FitSettings
+from .stages import Candidate
 
 VERIFY_STREAM = 0x5EED0000  # far from the seeds users choose, so that no iteration saw these random numbers
 
@@ -24,11 +25,9 @@ _SECOND_HALF = 0x00A50000
 
 
 @dataclass(frozen=True)
-class VerifiedEnd:
+class VerifiedEnd(Candidate):
     """A vector with its picture, scene-linear, whose two halves have no random numbers in common."""
 
-    vector: Vector
-    image: Pixels = field(repr=False)
     halves: tuple[Pixels, Pixels] = field(repr=False)
 
 

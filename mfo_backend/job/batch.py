@@ -40,13 +40,16 @@ def is_done(job: Path) -> bool:
         return False
 
 
-def run_one(job: str, threads: int = 0, should_stop: Callable[[], bool] = lambda: False) -> JobEnd:
+def run_one(
+    job: str, threads: int = 0, should_stop: Callable[[], bool] = lambda: False, trusted: bool = False
+) -> JobEnd:
     """Run `mfo run` on a folder and wait for it; asked to stop, it keeps its best values."""
     began = time.monotonic()
     environment = dict(os.environ, PYTHONPATH=os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH")))))
     if threads:
         environment["MFO_THREADS"] = str(threads)
     words = [sys.executable, "-m", "mfo_backend", "run", job, "--progress", "none", "--parent", str(os.getpid())]
+    words += ["--trust"] * trusted
     process = subprocess.Popen(
         words, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
@@ -62,14 +65,31 @@ def run_one(job: str, threads: int = 0, should_stop: Callable[[], bool] = lambda
     said = [line for line in errors.splitlines() if line.startswith("mfo: ")]
     codes = {status.exit_code: status.value for status in Status if status.exit_code}
     status = codes.get(process.returncode, Status.CONVERGED.value if process.returncode == 0 else Status.FAILED.value)
-    sentence = said[0].removeprefix("mfo: ") if said else f"The process ended with code {process.returncode}."
+    sentence = said[0].removeprefix("mfo: ") if said else _end_sentence(process.returncode)
     return JobEnd(job, status, sentence, time.monotonic() - began)
 
 
-def run_here(jobs: Sequence[str], at_once: int, threads: int, should_stop: Callable[[], bool]) -> Iterator[JobEnd]:
+def _end_sentence(code: int) -> str:
+    """Why a process ended that could not say so itself."""
+    if code >= 0:
+        return f"The process ended with code {code}."
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    # native code that gets no memory ends in a segmentation fault (Dr.Jit 1.5.0, Embree 3)
+    ended = "was killed" if name == "SIGKILL" else "crashed"
+    return (
+        f"The process {ended} ({name}); the memory may have run out, so try a lower resolution or fewer jobs at once."
+    )
+
+
+def run_here(
+    jobs: Sequence[str], at_once: int, threads: int, should_stop: Callable[[], bool], trusted: bool = False
+) -> Iterator[JobEnd]:
     """Run jobs on this machine, `at_once` at a time; those not begun when asked to stop are left out."""
     with ThreadPoolExecutor(at_once) as pool:
-        waiting = {pool.submit(run_one, job, threads, should_stop) for job in jobs}
+        waiting = {pool.submit(run_one, job, threads, should_stop, trusted) for job in jobs}
         while waiting:
             ended, waiting = wait(waiting, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED)
             yield from (future.result() for future in ended)
@@ -77,9 +97,11 @@ def run_here(jobs: Sequence[str], at_once: int, threads: int, should_stop: Calla
                 waiting = {future for future in waiting if not future.cancel()}
 
 
-def run_there(jobs: Sequence[str], client: Any, should_stop: Callable[[], bool]) -> Iterator[JobEnd]:
+def run_there(
+    jobs: Sequence[str], client: Any, should_stop: Callable[[], bool], trusted: bool = False
+) -> Iterator[JobEnd]:
     """Run jobs on Dask workers, which must see the folders under the same names."""
-    futures = {job: client.submit(run_one, job, pure=False, retries=RETRIES) for job in jobs}
+    futures = {job: client.submit(run_one, job, trusted=trusted, pure=False, retries=RETRIES) for job in jobs}
     left = dict(futures)
     for job, future in as_they_come(client, futures, should_stop):
         del left[job]

@@ -86,8 +86,8 @@ class Request:
     generator: Mapping[str, Any] = field(default_factory=dict)
 
 
-def read_request(folder: JobFolder) -> Request:
-    """The checked request of a job folder.
+def read_request(folder: JobFolder, *, trusted: bool = False) -> Request:
+    """The checked request of a job folder; `trusted` is that of `check_scene_files`.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def read_request(folder: JobFolder) -> Request:
     folder.file(request.reference, what=f"{WHERE}: reference.path")
     if request.view_table is not None:
         folder.file(request.view_table.path, what=f"{WHERE}: view.lut.path")
-    check_scene_files(folder, request.scene)
+    check_scene_files(folder, request.scene, trusted=trusted)
     for bsdf_id, material in request.materials.items():
         for name, socket in material.sockets.items():
             if socket.texture is not None:

@@ -7,6 +7,7 @@ import sys
 import traceback
 from pathlib import Path
 
+from ..render.memory import require_memory
 from ..render.renderer import Interrupted
 from ..report.live_pictures import LivePictures
 from ..scene.image_file import check_reference, read_image
@@ -23,16 +24,22 @@ from .request import Request, read_request
 from .result import write_partial
 from .stop import StopSignal
 
+# Measured on Linux (docs/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are mapped
+# but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
+_STARTUP_BYTES, _MAPPED_BYTES, _BYTES_PER_PIXEL = 150_000_000, 380_000_000, 430
 _CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
 
 
-def run_job(path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter = fit_scene) -> Status:
+def run_job(
+    path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter = fit_scene, trusted: bool = False
+) -> Status:
     """Run the job in folder `path` and report its events; the last one is always `finished` or `failed`.
 
-    A request that cannot be used leaves the folder as it was. Tracebacks go to stderr only.
+    Only a `trusted` job may name files that Mitsuba reads unchecked (docs/threats.md). A request that cannot be used
+    leaves the folder as it was. Tracebacks go to stderr only.
     """
     try:
-        status, sentence = _run(path, events, stop, fitter)
+        status, sentence = _run(path, events, stop, fitter, trusted)
     except MfoError as error:
         return _fail(events, error.status, str(error))
     except Interrupted:
@@ -59,10 +66,16 @@ def run_job(path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter
     return status
 
 
-def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter) -> tuple[Status, str]:
+def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trusted: bool) -> tuple[Status, str]:
     stop.loading(lambda: events.failed(Status.CANCELLED, _CANCELLED_EARLY))
     folder = JobFolder.open(path)
-    request = read_request(folder)
+    request = read_request(folder, trusted=trusted)
+    require_memory(
+        _STARTUP_BYTES + request.width * request.height * _BYTES_PER_PIXEL,
+        mapped=_MAPPED_BYTES,
+        what=f"A fit of {request.width}x{request.height} pixels",
+        cure="lower the resolution, or free some memory or raise its limit",
+    )
     reference, notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     folder.require_space(bytes_needed(request))

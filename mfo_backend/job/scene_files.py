@@ -7,21 +7,25 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from ..scene.exr_file import check_exr
 from ..scene.ply_file import check_ply
 from ..scene.scene_xml import Element, is_file, read_scene, to_text
 from ..types.errors import BadInputError
 from .job_folder import JobFolder
 
 _MESHES = (".ply", ".obj", ".serialized")
+_CHECKED = {".ply": check_ply, ".exr": check_exr}  # all that the add-on's export writes
 
 
-def check_scene_files(folder: JobFolder, scene: str) -> None:
-    """Check that a job's scene names existing files of the job folder only, and that its meshes hold what they say.
+def check_scene_files(folder: JobFolder, scene: str, *, trusted: bool = False) -> None:
+    """Check that a job's scene names existing files of the job folder only, and that they hold what they say.
+
+    Files of kinds that are not checked here, which Mitsuba's own readers take as they are, are for `trusted` jobs only.
 
     Raises
     ------
     BadInputError
-        If the scene cannot be read, names a file that is missing or outside, or a PLY file is damaged.
+        If the scene cannot be read, names a file that is missing, outside, of another kind or damaged.
     """
     path = folder.root / scene
     for element, key in _named_files(read_scene(path), scene):
@@ -34,8 +38,14 @@ def check_scene_files(folder: JobFolder, scene: str) -> None:
             )
         if not is_file(file):
             raise BadInputError(f"{scene} names the file {element.get(key)!r}, which is not there: put it there.")
-        if file.suffix.lower() == ".ply":
-            check_ply(file)
+        check = _CHECKED.get(file.suffix.lower())
+        if check is not None:
+            check(file)
+        elif not trusted:
+            raise BadInputError(
+                f"{scene} names {element.get(key)!r}, which Mitsuba would read unchecked: make it "
+                f"{' or '.join(kind[1:].upper() for kind in _CHECKED)}, or run the job with --trust if it is your own."
+            )
 
 
 def pack_scene(source: Path, destination: Path) -> Element:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Mitsuba integrator `cycles_path`: a path tracer that treats indirect light as Cycles does.
 
-What differs from Mitsuba's `prb` is Filter Glossy, the clamping of indirect light and limits for one kind of bounce
-(Cycles 5.0: kernel/integrator/surface_shader.h, path_state.h, film/light_passes.h). Derivatives are those of path
+What differs from Mitsuba's `prb` is Filter Glossy, the clamping of indirect light, limits for one kind of bounce
+(Cycles 5.0: kernel/integrator/surface_shader.h, path_state.h, film/light_passes.h), and that rays meet lamps
+(`lamps.lamp`). Derivatives are those of path
 replay (Vicini, Speierer, Jakob 2021, "Path Replay Backpropagation"), for materials only: lights and shapes are held.
 Choose the variant before importing this.
 """
@@ -20,9 +21,10 @@ import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
 from ..types.light_paths import NO_LIMIT, LightPaths
+from .lamps.met_lamps import SceneLamps, alone
 
 PLUGIN_NAME = "cycles_path"
-CERTAIN = 1e30  # density before the first bounce
+CERTAIN = 1e30  # density before the first bounce, and of mirrors
 _LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
 DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
 TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
@@ -52,6 +54,7 @@ class CyclesPath(RBIntegrator):
     ) -> tuple[Any, Any, list[Any], Any]:
         """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it."""
         primal = mode == dr.ADMode.Primal
+        lamps = SceneLamps(scene)
         context = mi.BSDFContext()
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
@@ -84,16 +87,20 @@ class CyclesPath(RBIntegrator):
             ds = mi.DirectionSample3f(scene, si, previous)
             seen = active & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
-            weight = dr.select(delta, 1, density / dr.maximum(density + light_density, 1e-30))
-            met = throughput * weight * ds.emitter.eval(si, seen)
+            met = throughput * ds.emitter.eval(si, seen) * share(delta, density, light_density)
             met *= clamp_factor(self.clamp_indirect, first * met, bounce >= 2)
+            if dr.hint(lamps, mode="scalar"):
+                straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
+                likely = dr.select(delta, CERTAIN, density)
+                shine = throughput * lamps.met(ray, si, active, density=likely, camera=straight)
+                met += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
             ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, goes_on)
             lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
             with dr.resume_grad(when=not primal):
                 value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
-                weight = dr.detach(dr.select(ds.delta, 1, ds.pdf / dr.maximum(ds.pdf + chance, 1e-30)))
+                weight = dr.detach(share(alone(ds), ds.pdf, chance))
                 direct = dr.select(lit, throughput * value * light * weight, 0)
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
 
@@ -132,6 +139,11 @@ class CyclesPath(RBIntegrator):
             active = goes_on
 
         return radiance if primal else change, valid, [], radiance
+
+
+def share(alone: Any, density: Any, other: Any) -> Any:
+    """Weight of a sample of `density` that another technique finds with density `other` (Veach 1995), 1 if none can."""
+    return dr.select(alone, 1, density / dr.maximum(density + other, 1e-30))
 
 
 def least_alpha(filter_glossy: float, density: Any) -> Any:

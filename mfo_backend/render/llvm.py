@@ -54,8 +54,9 @@ def probe_llvm(path: Path, *, timeout: float = PROBE_SECONDS) -> LlvmVerdict:
     verdict = _probe_in_child(path, timeout)
     if verdict is None:  # says nothing about the library, so it is not kept
         return LlvmVerdict(str(path), False, f"gave no answer within {timeout:.0f} seconds")
-    # any other failure may be the machine's, and be gone after a repair
-    if not verdict.works and not any(mark in verdict.reason for mark in _LIBRARY_AT_FAULT):
+    # any other failure may be the machine's, and be gone after a repair; LLVM calls a want of memory its error too
+    at_fault = any(mark in verdict.reason for mark in _LIBRARY_AT_FAULT) and "out of memory" not in verdict.reason
+    if not verdict.works and not at_fault:
         return verdict
     with contextlib.suppress(OSError):
         remembered.parent.mkdir(parents=True, exist_ok=True)

@@ -23,11 +23,6 @@ from .renderer import Pullback, Vector
 from .variant import load_variant
 
 _MASK_RAYS = 4  # rays per pixel and axis that look for the target
-# Samples of one launch of a picture: each keeps 16 bytes of a random number generator, and far fewer keep the cores
-# busy. At 256 x 256, two launches of 32 samples a pixel take a tenth less time than one of 64
-_LAUNCH_SAMPLES = 2**21
-_LEAST_LAUNCH_SPP = 4  # a launch is traced in Python anew, for 0.04 s
-_NEXT_LAUNCH = 0x9E3779B1  # apart from all seeds in use
 
 
 class MitsubaRenderer:
@@ -57,28 +52,29 @@ class MitsubaRenderer:
         return self.image_later(vector, seed=seed, spp=spp)()
 
     def image_later(self, vector: Vector, *, seed: int, spp: int) -> Callable[[], Pixels]:
-        """Start to render `image` and return what waits for it: other kernels can be compiled meanwhile."""
+        """Start to render `image` and return what waits for it: other kernels can be compiled meanwhile.
+
+        Memory holds one part of a picture at a time, so one of several parts is rendered when it is waited for.
+        """
+        from .ordered_picture import parts_of, start_part
+
+        width, height = (int(n) for n in self._sensor.film().crop_size())
+        parts = list(parts_of(width * height, seed, spp))
         self._update(vector, differentiable=False)
         self.passes += 1.0
-        samples = self._launches(spp)
-        seeds = [(seed + number * _NEXT_LAUNCH) % 2**32 for number in range(len(samples))]
-        launched = [self._launch(*launch) for launch in zip(seeds, samples, strict=True)]
+        first = start_part(self._integrator, self._scene, self._sensor, parts[0])
 
         def wait() -> Pixels:
-            pixels = [_finite(image) for image in launched]
-            if len(pixels) == 1:
-                return pixels[0]
-            return np.average(pixels, axis=0, weights=samples).astype(np.float32)
+            total = parts[0].share * first()
+            if len(parts) > 1:
+                self._update(vector, differentiable=False)  # other values may have been shown since
+            for part in parts[1:]:
+                total += part.share * start_part(self._integrator, self._scene, self._sensor, part)()
+            pixels = total.astype(np.float32)
+            pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
+            return pixels
 
         return wait
-
-    def _launches(self, spp: int) -> list[int]:
-        """Samples a pixel of each launch of a picture, equal but for the last, for one kernel."""
-        width, height = (int(n) for n in self._sensor.film().crop_size())
-        most = max(_LAUNCH_SAMPLES // (width * height), _LEAST_LAUNCH_SPP)
-        count = -(-spp // most)
-        each = -(-spp // count)
-        return [each] * (spp // each) + [spp % each] * (spp % each > 0)
 
     @property
     def scene(self) -> Any:
@@ -102,21 +98,25 @@ class MitsubaRenderer:
         stale early: 12 random materials under a point light, 4 spp, ended at a mean FLIP of 0.30 instead of 0.21.
         """
         vector = np.array(vector)
-        self._update(vector, differentiable=False)
-        self.passes += 1.0
-        image = _finite(self._launch(seed, spp))  # in one launch, as the pull-back's
+        image = self.image(vector, seed=seed, spp=spp)
 
         def pullback(pixel_gradient: Pixels) -> Vector:
             import drjit as dr
             import mitsuba as mi
 
             from ..material.own_memory import own_memory
+            from .ordered_picture import opaque, parts_of
 
-            theta = self._update(vector, differentiable=True)
-            gradient = mi.TensorXf(own_memory(pixel_gradient, mi.Float), pixel_gradient.shape)
-            self._integrator.render_backward(self._scene, self._params, gradient, self._sensor, _opaque(seed), spp)
+            total = np.zeros(len(vector))
+            for part in parts_of(pixel_gradient[..., 0].size, seed, spp):
+                theta = self._update(vector, differentiable=True)
+                gradient = mi.TensorXf(own_memory(part.share * pixel_gradient, mi.Float), pixel_gradient.shape)
+                self._integrator.render_backward(
+                    self._scene, self._params, gradient, self._sensor, opaque(part.seed), part.spp
+                )
+                total += np.array(dr.grad(theta), dtype=np.float64)
             self.passes += 2.0
-            return np.array(dr.grad(theta), dtype=np.float64)
+            return total
 
         return image, pullback
 
@@ -159,9 +159,6 @@ class MitsubaRenderer:
         self._params.update()
         return theta
 
-    def _launch(self, seed: int, spp: int) -> Any:
-        return self._integrator.render(self._scene, self._sensor, seed=_opaque(seed), spp=spp)
-
 
 def load_mitsuba_renderer(
     scene_xml: Path,
@@ -188,9 +185,13 @@ def load_mitsuba_renderer(
 
     from ..material import principled_plugin
     from . import cycles_path
+    from .lamps import lamp_plugins
 
     principled_plugin.register()
     cycles_path.register()
+    lamp_plugins.register()
+    if light_paths is None and any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter")):
+        light_paths = LightPaths()  # changes nothing but for rays that meet lamps, which Mitsuba's own integrators miss
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
     with two_threads():
@@ -226,20 +227,6 @@ def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[st
             raise BadInputError(f"Material {material.target.bsdf_id!r} has {len(found)} parameters {end!r}, not one.")
         keys[name] = found[0]
     return keys
-
-
-def _finite(image: Any) -> Pixels:
-    pixels = np.array(image, dtype=np.float32)
-    pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
-    return pixels
-
-
-def _opaque(seed: int) -> Any:
-    """A seed whose value is not baked into the kernel, so that the next seed needs no compilation."""
-    import drjit as dr
-    import mitsuba as mi
-
-    return dr.opaque(mi.UInt32, seed)
 
 
 @contextlib.contextmanager

@@ -10,7 +10,8 @@ from typing import Any
 from ..scene.scene_xml import Element
 from ..types.errors import BadInputError
 
-OURS = ("blender_principled",)  # registered from Python
+# registered from Python
+OURS = ("blender_principled", "blender_point", "blender_spot", "blender_sharp_spot", "blender_area", "blender_sun")
 
 
 def trust_only_mitsuba() -> None:

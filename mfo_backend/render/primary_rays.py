@@ -46,9 +46,11 @@ def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int
 
 
 def widened(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
-    """`mask` (height, width) with every pixel that is at most `pixels` away along each axis."""
-    height, width = mask.shape
-    for axis, size in enumerate((height, width)):
+    """`mask` (height, width) with every pixel that is at most `pixels` away along each axis.
+
+    As SciPy's `binary_dilation`, whose package takes a tenth of a second to import.
+    """
+    for axis, size in enumerate(mask.shape):
         padded = np.pad(mask, [(pixels, pixels) if a == axis else (0, 0) for a in (0, 1)])
         mask = np.logical_or.reduce([padded.take(range(k, k + size), axis) for k in range(2 * pixels + 1)])
     return mask
@@ -61,11 +63,23 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
     return sampler
 
 
-def primary_rays(sensor: mi.Sensor, grid: NDArray[np.int64], seed: int, stride: int = 1) -> PrimaryRays:
-    """Camera rays, `grid` (height, width) squared a pixel, 0 for none, in every `stride`-th tile along both axes."""
+def primary_rays(
+    sensor: mi.Sensor,
+    grid: NDArray[np.int64],
+    seed: int,
+    stride: int = 1,
+    only: NDArray[np.bool_] | None = None,
+) -> PrimaryRays:
+    """Camera rays, `grid` (height, width) squared a pixel, 0 for none, in every `stride`-th tile along both axes.
+
+    With `only` (height, width) the other pixels have none.
+    """
     film = sensor.film()
     width, height = (int(v) for v in film.crop_size())
     order, tile = tile_order(width, height, stride)
+    if only is not None:
+        kept = only.reshape(-1)[order]
+        order, tile = order[kept], tile[kept]
     per_axis = grid.reshape(-1)[order]
     position = own_memory(np.repeat(np.arange(len(order)), per_axis**2), mi.UInt32)
     first = own_memory(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]), mi.UInt32)

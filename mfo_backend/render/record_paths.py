@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from ..material.own_memory import own_memory
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
+from .lamps.met_lamps import DELTA, SceneLamps
 from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
-
-DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,8 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
-    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`.
+    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
+    are the only ones looked at; where they hold all that see the target, nothing is missed.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -48,6 +48,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     light_paths: LightPaths | None = None
+    pixels: NDArray[np.bool_] | None = None
     direct_only: bool = False
 
 
@@ -87,10 +88,13 @@ def record_paths(
         If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
+        lamps = SceneLamps(scene)
+        if lamps and settings.light_paths is None:
+            settings = replace(settings, light_paths=LightPaths())  # Mitsuba's own integrators do not meet lamps
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         grid = np.broadcast_to(settings.grid, (height, width))
-        rays = primary_rays(sensor, grid, settings.seed, settings.stride)
+        rays = primary_rays(sensor, grid, settings.seed, settings.stride, settings.pixels)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         target = mi.ShapePtr(shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
@@ -105,6 +109,9 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
+        if lamps.seen:
+            before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
+            glow = before if glow is None else glow + before
         if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
             si = _face_camera(si)
         held = ()
@@ -115,7 +122,7 @@ def record_paths(
         dr.eval(si, position, filter_weight, held)
         hits = _Hits(si, position, filter_weight, held)
         lanes = _delta_lights(scene, hits)
-        lanes += _sampled_lights(scene, hits, settings)
+        lanes += _sampled_lights(scene, hits, settings, lamps)
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
@@ -132,13 +139,19 @@ def record_paths(
 
 
 def indirect_share(
-    scene: mi.Scene, shape: mi.Shape, depth: int, two_sided: bool, light_paths: LightPaths | None = None
+    scene: mi.Scene,
+    shape: mi.Shape,
+    depth: int,
+    two_sided: bool,
+    light_paths: LightPaths | None = None,
+    *,
+    stride: int = 1,
 ) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
+    with_others = RecordSettings(grid=1, depth=depth, stride=stride, two_sided=two_sided, light_paths=light_paths)
+    direct_only = replace(with_others, direct_only=True)
     with dr.suspend_grad():
-        settings = RecordSettings(grid=1, depth=depth, two_sided=two_sided, light_paths=light_paths)
-        direct = record_paths(scene, shape, replace(settings, direct_only=True), allow_dark=True)
-        everything = record_paths(scene, shape, settings, allow_dark=True)
+        direct, everything = (record_paths(scene, shape, s, allow_dark=True) for s in (direct_only, with_others))
         lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
     return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
@@ -166,7 +179,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
     return lanes
 
 
-def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> list[_Lanes]:
+def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps) -> list[_Lanes]:
     """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
     si, position, share = hits.si, hits.position, hits.share
     everywhere = list(scene.emitters())
@@ -205,6 +218,9 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings) -> l
     ds = mi.DirectionSample3f(scene, far, si)
     light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
     weight = emission / (light_density + density)
+    if lamps:
+        weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
+        emission += lamps.met(ray, far, valid)
     if indirect:
         # a path tracer's radiance along the ray, less what the ray meets directly
         before = None

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
 from ..types.parameter import Value
+from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
-from .primary_rays import widened
+from .primary_rays import tile_order, widened
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
 from .recorded_jacobian import RecordedJacobian
@@ -31,6 +32,9 @@ from .recorded_paths import LaneGroups, RecordedPaths
 # noise of 64 samples a pixel.
 NEGLIGIBLE_INDIRECT = 0.005
 MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
+# Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
+MOST_RAYS = 12_000_000
+BYTES_PER_RAY = 272
 DEEPEST = 16  # path length of a scene without a limit
 
 
@@ -58,9 +62,6 @@ class RecordedScene:
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
         self._covered = covered
-        # a pixel's rays reach as far as the pixel filter; where they cannot meet the target they are only memory
-        reach = 1 + math.ceil(renderer.scene.sensors()[0].film().rfilter().radius())
-        self._near_target = widened(renderer.target_mask(), reach)
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
@@ -79,7 +80,11 @@ class RecordedScene:
         depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
-        share = indirect_share(scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths)
+        width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
+        stride = max(1, math.ceil(math.sqrt(width * height / MOST_RAYS)))
+        share = indirect_share(
+            scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths, stride=stride
+        )
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, 2, (note,))
@@ -99,14 +104,44 @@ class RecordedScene:
         if near and isinstance(width, float):
             proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
-        asked = grid
-        grid = np.where(self._near_target, asked, 0) if self._near_target.any() else asked
-        rays = float(self._covered) * float(np.mean(np.square(asked))) * (2 if self.needs.sampled else 1)
+        rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
+        if self._near_target.any():
+            grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
+        stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
-        settings = RecordSettings(grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths)
+        settings = RecordSettings(
+            grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths, pixels
+        )
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def _affordable(self, grid: int | NDArray[np.int64], stride: int) -> tuple[int, NDArray[np.bool_] | None]:
+        """The stride with which a recording does not take too many camera rays, and the pixels it should look at.
+
+        Raises
+        ------
+        BadInputError
+            If even that is more than the memory that is left.
+        """
+        width, height = (int(n) for n in self.renderer.scene.sensors()[0].film().crop_size())
+        squares = np.broadcast_to(np.square(grid), (height, width))
+        pixels = None
+        count = _rays(squares, stride)
+        if count > MOST_RAYS:
+            pixels = self._near_target
+            while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
+                stride += 1
+        require_memory(
+            count * BYTES_PER_RAY, what="Tracing the light of this picture", cure="use a smaller picture or free some"
+        )
+        return stride, pixels
+
+    @cached_property
+    def _near_target(self) -> NDArray[np.bool_]:
+        """Pixels that may see the target: those that do and their neighbours in reach of the pixel filter."""
+        reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
+        return widened(self.renderer.target_mask(), reach)
 
     def evaluator(
         self, paths: RecordedPaths, groups: LaneGroups
@@ -128,6 +163,15 @@ class RecordedScene:
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed[name]
+
+
+def _rays(squares: NDArray[np.int64], stride: int) -> int:
+    """Camera rays in every `stride`-th tile."""
+    if stride == 1:
+        return int(squares.sum())
+    height, width = squares.shape
+    order, _ = tile_order(width, height, stride)
+    return int(squares.reshape(-1)[order].sum())
 
 
 def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value | None]:

@@ -29,6 +29,7 @@ from ..material.own_memory import own_memory
 from ..material.principled_plugin import BlenderPrincipled
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable
+from .lamps.met_lamps import SceneLamps, alone
 from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import through_filter
 
@@ -103,6 +104,7 @@ class TracedPaths:
         if self._hide and renderer.shape.is_emitter():
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self._light_paths = renderer.light_paths
+        self._lamps = SceneLamps(scene)
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
 
@@ -219,6 +221,12 @@ class TracedPaths:
             emission = dr.select(active, emission, 0.0)
             emission *= self._clamp(beta[0] * emission, depth >= 2)
             total = [t + b * emission for t, b in zip(total, beta, strict=True)]
+            if self._lamps:
+                straight = s["bounces"][0] + s["bounces"][1] + s["bounces"][2] == 0
+                likely = dr.select(s["delta"], 1e30, s["density"])
+                shine = self._lamps.met(ray, si, active, density=likely, camera=straight)
+                shine *= self._clamp(beta[0] * shine, depth >= 2)
+                total = [t + b * shine for t, b in zip(total, beta, strict=True)]
             active = active & si.is_valid() & (s["left"] > 1)
             # light sampled from here
             ds, value = scene.sample_emitter_direction(si, rng.pair(2 + 3 * depth), True, active)
@@ -240,7 +248,7 @@ class TracedPaths:
                 pdf_next = dr.select(off, bs.pdf, pdf_next)
                 local = dr.select(off, bs.wo, local)
                 kind = dr.select(off, bs.sampled_type, kind)
-            weight = value * dr.select(ds.delta, 1.0, self._share(ds.pdf, pdf_light))
+            weight = value * dr.select(alone(ds), 1.0, self._share(ds.pdf, pdf_light))
             weight = dr.select(lit, weight, 0.0)
             weight *= self._clamp(beta[0] * f_light[0] * weight, depth >= 1)
             total[0] += beta[0] * f_light[0] * weight

@@ -54,3 +54,10 @@ def use_threads(count: int) -> None:
     import drjit as dr
 
     dr.set_thread_count(count)
+
+
+def thread_count() -> int:
+    """Threads this process' kernels run on."""
+    import drjit as dr
+
+    return dr.thread_count()

@@ -33,22 +33,8 @@ def read_exr(path: Path, size: Size | None = None) -> Image:
     """
     import OpenEXR
 
-    try:
-        header = OpenEXR.File(str(path), separate_channels=True, header_only=True)
-        headers = [part.header for part in header.parts]
-        names = [[channel.name for channel in part["channels"]] for part in headers]
-    except Exception as error:  # the package raises RuntimeError, ValueError and its own type
-        raise _damaged(path) from error
-    if not headers:
-        raise _damaged(path)
-    for part in headers:
-        _check_size(path, part)
-    samples = sum(math.prod(_size(part, "dataWindow")) * len(part["channels"]) for part in headers)
-    if samples > MAX_SAMPLES:
-        raise BadInputError(
-            f"Image {path.name!r} declares {samples} samples in all its layers: at most {MAX_SAMPLES} are read, so "
-            "export fewer layers."
-        )
+    headers = check_exr(path)
+    names = [[channel.name for channel in part["channels"]] for part in headers]
     index, colour, alpha = _choose(path, names)
     check_declared_size(path.name, _size(headers[index], "displayWindow"), size)
     _check_channels(path, headers[index], [*colour, *([alpha] if alpha else [])])
@@ -62,6 +48,36 @@ def read_exr(path: Path, size: Size | None = None) -> Image:
         raise _damaged(path) from error
     pixels = np.stack(planes * 3 if len(planes) == 1 else planes, axis=-1)
     return Image(np.ascontiguousarray(pixels, np.float32), Encoding.LINEAR, coverage)
+
+
+def check_exr(path: Path) -> list[dict[str, Any]]:
+    """The headers of all parts of an EXR file, none of which declares too large a size.
+
+    Raises
+    ------
+    BadInputError
+        If one does, or the file cannot be read.
+    """
+    import OpenEXR
+
+    try:
+        parts = OpenEXR.File(str(path), separate_channels=True, header_only=True).parts
+        headers = [part.header for part in parts]
+        # a name that is no text raises here
+        channels = [len([channel.name for channel in part["channels"]]) for part in headers]
+    except Exception as error:  # the package raises RuntimeError, ValueError and its own type
+        raise _damaged(path) from error
+    if not headers:
+        raise _damaged(path)
+    for part in headers:
+        _check_size(path, part)
+    samples = sum(math.prod(_size(part, "dataWindow")) * n for part, n in zip(headers, channels, strict=True))
+    if samples > MAX_SAMPLES:
+        raise BadInputError(
+            f"Image {path.name!r} declares {samples} samples in all its layers: at most {MAX_SAMPLES} are read, so "
+            "export fewer layers."
+        )
+    return headers
 
 
 def write_exr(path: Path | str, pixels: NDArray[np.floating]) -> None:

@@ -105,14 +105,18 @@ class SafeMatrix:
 
         A column without effect may lie anywhere in its width, and none is less sure than that.
         """
-        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
-        result = inverse @ noise @ inverse
+        result = self.solution_covariance(noise)
         sd = np.sqrt(np.maximum(np.diag(result), 1e-300))
         shrink = np.minimum(self._width / sd, 1.0)
         result *= np.outer(shrink, shrink)
         result[self._blind] = result[:, self._blind] = 0.0
         result[self._blind, self._blind] = self._width[self._blind] ** 2
         return result
+
+    def solution_covariance(self, noise: Vector) -> Vector:
+        """The sandwich itself, however wide it is."""
+        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
+        return inverse @ noise @ inverse
 
     def expected_error(self, noise: Vector) -> float:
         """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -172,6 +173,57 @@ def test_linked_values_are_ignored_not_refused(scene: SimpleNamespace) -> None:
     assert any(f.level == "ignored" and f.sentence.endswith("not fitted: Roughness.") for f in check(scene))
 
 
+def from_library(scene: SimpleNamespace, folder: Path, kind: str, name: str):
+    """Save the scene, and take a datablock of that file into it as a link."""
+    bpy, file = scene.bpy, str(folder / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file, copy=True)
+    with bpy.data.libraries.load(file, link=True) as (_, wanted):
+        setattr(wanted, kind, [name])
+    (linked,) = getattr(wanted, kind)
+    return linked
+
+
+def test_a_material_of_a_library_is_made_local_by_its_button(scene: SimpleNamespace, tmp_path: Path) -> None:
+    linked = from_library(scene, tmp_path, "materials", "Glaze")
+    target = scene.bpy.data.objects["Väse"]
+    target.active_material = linked
+    found = next(f for f in check(scene) if {fix.kind for fix in f.fixes} == {"make_local"})
+    assert found.level == "ignored"
+    assert not target.active_material.is_editable
+    assert scene.bpy.ops.mfo.mend(kind="make_local") == {"FINISHED"}
+    assert target.active_material.is_editable
+    assert target.active_material.library is None
+    assert found.sentence not in {f.sentence for f in check(scene)}
+    assert stopping(scene) == {}
+
+
+def test_a_material_that_stays_in_its_library_is_said_to(scene: SimpleNamespace, tmp_path: Path) -> None:
+    linked = from_library(scene, tmp_path, "objects", "Väse")
+    scene.bpy.context.scene.collection.objects.link(linked)
+    scene.bpy.context.view_layer.objects.active = linked
+    assert {"make_local"} in [{fix.kind for fix in f.fixes} for f in check(scene)]
+    with pytest.raises(RuntimeError, match="cannot be made local: make its object and its mesh local first"):
+        scene.bpy.ops.mfo.mend(kind="make_local")
+
+
+def test_render_exr_makes_a_reference_of_the_scene(scene: SimpleNamespace, tmp_path: Path) -> None:
+    from mfo_backend.scene.image_file import read_image
+
+    assert stopping(scene) == {}
+    another_view(scene)
+    scene.bpy.context.scene.cycles.samples = 1
+    (found,) = (f for f in check(scene) if "render_exr" in {fix.kind for fix in f.fixes})
+    assert scene.bpy.ops.mfo.mend(kind="render_exr") == {"FINISHED"}
+    path = Path(scene.bpy.context.scene.mfo.reference_path)
+    try:
+        assert path.suffix == ".exr"
+        assert read_image(path).pixels.shape == (64, 96, 3)
+        assert stopping(scene) == {}  # scene-linear values have no view
+        assert found.sentence not in {f.sentence for f in check(scene)}
+    finally:
+        shutil.rmtree(path.parent)
+
+
 def test_no_pixel_is_read(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     """A check must not take longer for a large picture: reading one raises here."""
     bpy = scene.bpy
@@ -188,9 +240,10 @@ def test_no_pixel_is_read(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatc
 def test_everything_an_export_says_comes_with_the_button(scene: SimpleNamespace) -> None:
     from blender_addon import preflight
 
+    scene.bpy.data.lights[0].use_shadow = False
     assert scene.bpy.ops.mfo.check() == {"FINISHED"}
     assert preflight.is_thorough
-    assert any("Soft Falloff" in f.sentence for f in preflight.by_export())
+    assert any("casts no shadows" in f.sentence for f in preflight.by_export())
     check(scene)
     preflight.check_now(scene.bpy.context.scene, scene.bpy.context.view_layer)
     assert preflight.by_export() or not preflight.is_thorough

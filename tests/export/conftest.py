@@ -21,6 +21,7 @@ collect_ignore = (
         "test_bad_input.py",
         "test_camera.py",
         "test_geometry.py",
+        "test_lamps.py",
         "test_light_levels.py",
         "test_materials.py",
         "test_reference.py",
@@ -36,6 +37,9 @@ def mitsuba() -> Any:
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
+    from mfo_backend.render.lamps.lamp_plugins import register
+
+    register()
     return mi
 
 
@@ -93,7 +97,8 @@ def export(tmp_path: Path) -> Callable[..., Any]:
 @pytest.fixture
 def render_mitsuba(mitsuba: Any) -> Callable[..., Pixels]:
     def render(report: Any, spp: int = 64) -> Pixels:
-        """Return what `mi.load_file` and `mi.render` make of the job's scene."""
-        return np.array(mitsuba.render(mitsuba.load_file(str(report.folder / "scene.xml")), spp=spp))[:, :, :3]
+        """Return what `mi.load_file` and `mi.render` make of the job's scene, with our lamps registered."""
+        scene = mitsuba.load_file(str(report.folder / "scene.xml"), parallel=False)  # plugins in Python
+        return np.array(mitsuba.render(scene, spp=spp))[:, :, :3]
 
     return render

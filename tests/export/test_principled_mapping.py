@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from blender_addon.export.principled_mapping import (
     _ggx_albedos,
@@ -83,3 +85,25 @@ def test_metal_albedo_factor() -> None:
     assert 1.2 < rough["base_color"][0] / 0.4 < 1.6
     smooth = sockets_to_mitsuba({**DEFAULTS, "Metallic": 1.0, "Roughness": 0.1, "Base Color": (0.4, 0.4, 0.4)})
     assert smooth["base_color"][0] == pytest.approx(0.4, rel=0.02)
+
+
+UNIT = st.floats(0.0, 1.0)
+COLOUR = st.tuples(*[st.floats(0.02, 0.98)] * 3)
+
+
+@given(
+    start=st.fixed_dictionaries(
+        {
+            "Base Color": COLOUR, "Metallic": UNIT, "Roughness": st.floats(0.05, 1.0), "IOR": st.floats(1.05, 2.5),
+            "Specular IOR Level": st.just(0.5), "Specular Tint": st.just((1.0, 1.0, 1.0)), "Anisotropic": UNIT,
+            "Transmission Weight": UNIT, "Coat Weight": st.floats(0.0, 0.25), "Coat Roughness": st.floats(0.04, 0.3),
+            "Sheen Weight": st.floats(0.0, 0.15), "Sheen Tint": st.just((1.0, 1.0, 1.0)),
+        }
+    )
+)  # fmt: skip
+def test_any_sockets_that_have_a_counterpart_come_back(start: dict) -> None:
+    values = sockets_to_mitsuba(start)
+    assume(max(values["base_color"]) < 1.0)  # Mitsuba's colour ends there
+    for name, value in mitsuba_to_sockets(values, start).items():
+        # the colour under a little metal is the root of a bisection, and roughness cancels in it twice
+        np.testing.assert_allclose(value, start[name], atol=1e-5, err_msg=name)

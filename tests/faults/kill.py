@@ -17,13 +17,13 @@ import subprocess
 import tempfile
 import threading
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from .scene import ROOT, DemoFiles, in_blender, make_demo
 
 ORPHAN_SECONDS = 12.0  # the backend promises ten
-SAVING_SECONDS = 0.15  # apply and save take about this long
 LEFT = (".tmp", ".partial", ".old", "@")  # of the backend, of an export, of Blender's own saving
 
 
@@ -46,18 +46,18 @@ def main() -> None:
 def kill_blender(files: DemoFiles, folder: Path, moments: int, seed: int = 11) -> dict[str, Any]:
     """Counts over runs of fit, apply and save whose Blender is killed."""
     rng = random.Random(seed)
-    begin = time.monotonic()
-    _run(files, folder / "whole", None)
-    whole = time.monotonic() - begin
+    unkilled = _run(files, folder / "whole", None)
+    whole = unkilled.at["saved"]
+    saving = whole - unkilled.at["fitted"]
     steps: dict[str, int] = {}
     orphans = 0
     for index in range(moments):
         # every second one while it applies and saves, which is a small part of the whole
         since = "fitted" if index % 2 else "begin"
-        at = rng.uniform(0.0, SAVING_SECONDS if index % 2 else 1.1 * whole)
-        step, backend = _run(files, folder / f"run_{index:03d}", at, since)
-        steps[step] = steps.get(step, 0) + 1
-        orphans += not _ends(backend)
+        at = rng.uniform(0.0, 1.1 * (saving if index % 2 else whole))
+        run = _run(files, folder / f"run_{index:03d}", at, since)
+        steps[run.last] = steps.get(run.last, 0) + 1
+        orphans += not _ends(run.backend)
     # the next start cleans up: an export beside what the killed ones left
     _run(files, folder / "next", None, jobs=folder / "jobs")
     blends = [folder / "whole" / "a.blend", *(folder / f"run_{i:03d}" / "a.blend" for i in range(moments))]
@@ -67,6 +67,7 @@ def kill_blender(files: DemoFiles, folder: Path, moments: int, seed: int = 11) -
     return {
         "moments": moments,
         "seconds_unkilled": round(whole, 1),
+        "seconds_saving": round(saving, 3),
         "killed_after": steps,
         "unchanged": states.count("unchanged"),
         "complete": states.count("complete"),
@@ -97,15 +98,26 @@ def kill_backend(files: DemoFiles, folder: Path, moments: int, longest: float) -
     }
 
 
-def _run(
-    files: DemoFiles, folder: Path, at: float | None, since: str = "begin", jobs: Path | None = None
-) -> tuple[str, int]:
-    """One run in a copy of the .blend, killed `at` seconds after a step; its last step and the backend's id."""
+@dataclass(frozen=True)
+class Run:
+    """Seconds from the beginning to every step it reached, and its backend's process id (0 before it has one)."""
+
+    at: dict[str, float]
+    backend: int
+
+    @property
+    def last(self) -> str:
+        """The last step reached."""
+        return next(reversed(self.at), "none")
+
+
+def _run(files: DemoFiles, folder: Path, at: float | None, since: str = "begin", jobs: Path | None = None) -> Run:
+    """One run in a copy of the .blend, killed `at` seconds after a step."""
     folder.mkdir(parents=True)
     blend = folder / "a.blend"
     shutil.copyfile(files.start, blend)
     job = (jobs or folder.parent / "jobs") / folder.name
-    last, backend = "none", 0
+    begin, steps, backend = time.monotonic(), {}, 0
     with in_blender("fit", blend, files.reference, job, start_new_session=True) as blender:
         timer = threading.Timer(at if at is not None else 600.0, _kill, [blender])
         if since == "begin":
@@ -114,12 +126,14 @@ def _run(
         for line in blender.stdout:
             if line.startswith('{"step"'):
                 event = json.loads(line)
-                last, backend = event["step"], event.get("backend", backend)
-                if last == since:
+                steps[event["step"]] = time.monotonic() - begin
+                backend = event.get("backend", backend)
+                if event["step"] == since:
                     timer.start()
         timer.cancel()
-    assert at is not None or last == "saved", f"a run that nobody killed ended after {last!r}"
-    return last, backend
+    run = Run(steps, backend)
+    assert at is not None or run.last == "saved", f"a run that nobody killed ended after {run.last!r}"
+    return run
 
 
 def _kill(process: subprocess.Popen[str]) -> None:

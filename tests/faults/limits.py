@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real jobs that run out of something: ``python -m tests.faults.limits``; the record goes into `docs/reliability.md`.
 
-Memory by RLIMIT_AS, the disk by a small tmpfs (as root only), the folder removed under way, a CUDA driver that is none.
+Memory by RLIMIT_AS, the disk by a small tmpfs (as root only), the folder removed or closed under way, no LLVM or one
+that is too old, a CUDA driver that is none.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,11 @@ from mfo_backend.scene.image_file import write_exr
 from ..stability.test_extremes import POINT, SCENE, SKY
 from .scene import ROOT, environment
 
+# root without these capabilities is bound by the permissions of its own files
+BOUND = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
+if os.geteuid() != 0 or shutil.which("setpriv") is None:
+    BOUND = ()
+PERMISSIONS_BIND = os.geteuid() != 0 or bool(BOUND)
 SPHERE = '<shape type="sphere" id="target"><ref id="b"/></shape>'
 
 
@@ -48,9 +54,20 @@ def all_faults() -> Iterator[dict[str, Any]]:
     """One row a fault: exit code, status and sentence of the backend, and what it left."""
     with tempfile.TemporaryDirectory(prefix="mfo-limits-") as name:
         folder = Path(name)
-        for megabytes in (300, 450, 600):
+        for megabytes in (300, 450, 600, 900):
             yield run(f"{megabytes} MB of address space, 16x16", job(folder, 16), limit=megabytes << 20)
-        yield run("1100 MB of address space, 1400x1400", job(folder, 1400, SKY.format(1.0)), limit=1100 << 20)
+        for size, megabytes in ((512, 1200), (1400, 1100)):
+            path = job(folder, size, SKY.format(1.0))
+            yield run(f"{megabytes} MB of address space, {size}x{size}, sky", path, limit=megabytes << 20)
+        yield run("no LLVM", job(folder, 16), only_llvm=[])
+        for version in (14, 15):
+            if (library := Path(f"/usr/lib/x86_64-linux-gnu/libLLVM-{version}.so")).exists():
+                yield run(f"LLVM {version} alone", job(folder, 16), only_llvm=[library])
+        if PERMISSIONS_BIND:
+            path = job(folder, 24)
+            path.chmod(0o555)
+            yield run("job folder that may only be read", path)
+            yield run("permission to write taken away after the start", job(folder, 24), on_start=close)
         yield run("job folder removed after the start", job(folder, 24), on_start=shutil.rmtree)
         yield run("a CUDA driver that is none", job(folder, 16), DRJIT_LIBCUDA_PATH="/etc/hostname")
         if os.geteuid() == 0:
@@ -60,7 +77,7 @@ def all_faults() -> Iterator[dict[str, Any]]:
                 yield run("disk full after the start", job(disk, 24), on_start=_fill)
 
 
-def job(folder: Path, size: int, light: str = "") -> Path:
+def job(folder: Path, size: int, light: str = "", *, preset: str = "fast") -> Path:
     """A job of a sphere with a flat reference."""
     path = folder / f"job_{size}_{len(list(folder.iterdir()))}"
     source = path.with_suffix(".source")
@@ -68,15 +85,32 @@ def job(folder: Path, size: int, light: str = "") -> Path:
     text = SCENE.format(width=size, height=size, shape=SPHERE, light=light or POINT.format(40.0))
     (source / "scene.xml").write_text(text)
     write_exr(source / "r.exr", np.full((size, size, 3), 0.5, np.float32))
-    settings = FitSettings(preset="paper" if size == 24 else "fast", max_iterations=60)
+    settings = FitSettings(preset="paper" if size == 24 else preset, max_iterations=60)
     make_job(source / "scene.xml", "target", source / "r.exr", settings, path)
     shutil.rmtree(source)
     return path
 
 
-def run(fault: str, path: Path, *, limit: int = 0, on_start: Callable[[Path], Any] | None = None, **variables: str):
-    """The job in a new process, `on_start` called at its first progress."""
-    command = [sys.executable, "-m", "mfo_backend", "run", str(path), "--progress", "json"]
+def close(path: Path) -> None:
+    """Take away the permission to write a job folder."""
+    for folder in (path / "pictures", path):
+        folder.chmod(0o555)
+
+
+def run(
+    fault: str,
+    path: Path,
+    *,
+    limit: int = 0,
+    on_start: Callable[[Path], Any] | None = None,
+    only_llvm: Sequence[Path] | None = None,
+    **variables: str,
+) -> dict[str, Any]:
+    """The job in a new process that permissions bind, `on_start` called at its first progress."""
+    words = ["run", str(path), "--progress", "json"]
+    command = [*BOUND, sys.executable, "-m", "mfo_backend", *words]
+    if only_llvm is not None:
+        command = [*BOUND, sys.executable, "-m", "tests.faults.with_llvm", *map(str, only_llvm), "--", *words]
     with subprocess.Popen(
         command, cwd=ROOT, env=environment(**variables), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=(lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))) if limit else None,

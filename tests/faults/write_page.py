@@ -85,6 +85,11 @@ def _limits(record: Any) -> str:
     return _table(("fault", "backend", "its last sentence", "result", "temporary files"), rows)
 
 
+def _heavy(record: Any) -> str:
+    rows = [(r["what"], r["exit"], r["sentence"], f"{r['megabytes']:,} MB", f"{r['cpu_seconds']} s") for r in record]
+    return _table(("run", "exit code", "its sentence", "peak resident memory", "processor time"), rows)
+
+
 def _endurance(record: Any) -> str:
     rows = [
         ("fits, of them failed", f"{record['fits']}, {record['bad']}"),
@@ -118,6 +123,7 @@ TABLES: dict[str, Callable[[Any], str]] = {
     "fuzz": _fuzz,
     "kill": _kill,
     "limits": _limits,
+    "heavy": _heavy,
     "backend": _endurance,
     "blender": _endurance,
     "repeat": _repeat,

@@ -6,10 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from mfo_backend.job.job_folder import JobFolder
 from mfo_backend.job.scene_files import check_scene_files, film_size, pack_scene
+from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.errors import BadInputError
 
 PLY = """ply
@@ -67,8 +69,27 @@ def test_a_job_scene_names_files_of_the_job_only(root: Path, inner: str, words: 
 
 
 def test_files_of_the_job_are_fine(root: Path) -> None:
-    (root / "scene.xml").write_text(scene_with(mesh("a/mesh.ply") + '<spectrum name="eta" filename="metal.spd"/>'))
+    write_exr(root / "sky.exr", np.ones((2, 3, 3), np.float32))
+    sky = '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'
+    (root / "scene.xml").write_text(scene_with(mesh("a/mesh.ply") + sky))
     check_scene_files(JobFolder.open(root), "scene.xml")
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.serialized", "a.vol", "a.png", "metal.spd", "noextension"])
+def test_what_mitsuba_would_read_unchecked_is_for_trusted_jobs(root: Path, name: str) -> None:
+    (root / name).write_bytes(b"anything")
+    (root / "scene.xml").write_text(scene_with(mesh(name)))
+    with pytest.raises(BadInputError, match=f"names .*{name}', which Mitsuba would read unchecked.*with --trust if it"):
+        check_scene_files(JobFolder.open(root), "scene.xml")
+    check_scene_files(JobFolder.open(root), "scene.xml", trusted=True)
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+def test_a_texture_that_is_no_picture_is_refused(root: Path, trusted: bool) -> None:
+    (root / "sky.exr").write_bytes(b"no picture")
+    (root / "scene.xml").write_text(scene_with(mesh("sky.exr")))
+    with pytest.raises(BadInputError, match=r"Image 'sky\.exr' cannot be read"):
+        check_scene_files(JobFolder.open(root), "scene.xml", trusted=trusted)
 
 
 def test_packing_copies_every_file_once(root: Path, tmp_path: Path) -> None:
@@ -78,7 +99,7 @@ def test_packing_copies_every_file_once(root: Path, tmp_path: Path) -> None:
     job = tmp_path / "job"
     job.mkdir()
     pack_scene(root / "scene.xml", job)
-    check_scene_files(JobFolder.open(job), "scene.xml")
+    check_scene_files(JobFolder.open(job), "scene.xml", trusted=True)
     named = [e.get("value") for e in ElementTree.parse(job / "scene.xml").getroot().iter("string")]
     assert [(job / name).read_text().split("\n")[2] for name in named] == [
         f"comment {name}" for name in ("first", "second", "first")

@@ -19,6 +19,29 @@ AREA = """<shape type="sphere"><point name="center" x="2" y="-2" z="2"/><float n
 FLOOR = """<shape type="rectangle" id="floor"><transform name="to_world"><scale value="3"/>
 <translate z="-1"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="0.8, 0.3, 0.2"/></bsdf></shape>"""
 
+_DOWN = """<transform name="to_world"><scale x="0.6" y="0.4"/><lookat origin="1.5, -2, 2.5" target="0, 0, 0"
+up="0, 0, 1"/></transform>"""
+# one of each of Blender's lights that Mitsuba has no equal of; all light the ball from the camera's side
+LAMPS = {
+    "soft point": f"""<emitter type="blender_point">{_DOWN}<rgb name="radiance" value="30, 28, 24"/>
+<float name="radius" value="0.5"/></emitter>""",
+    "sphere": f"""<emitter type="blender_point">{_DOWN}<rgb name="radiance" value="30, 28, 24"/>
+<float name="radius" value="0.5"/><boolean name="soft_falloff" value="false"/></emitter>""",
+    "spot": f"""<emitter type="blender_spot">{_DOWN}<rgb name="radiance" value="60, 56, 48"/>
+<float name="radius" value="0.4"/><float name="cone" value="60"/><float name="blend" value="0.5"/></emitter>""",
+    "sharp spot": f"""<emitter type="blender_sharp_spot">{_DOWN}<rgb name="intensity" value="40, 36, 30"/>
+<float name="cone" value="60"/><float name="blend" value="0.15"/></emitter>""",
+    "spread": f"""<emitter type="blender_area">{_DOWN}<rgb name="radiance" value="15, 14, 12"/>
+<float name="spread" value="90"/></emitter>""",
+    "round": f"""<emitter type="blender_area">{_DOWN}<rgb name="radiance" value="25, 24, 22"/>
+<boolean name="round" value="true"/></emitter>""",
+    "beam": """<emitter type="blender_area"><transform name="to_world"><scale value="2"/><lookat
+origin="1.5, -2, 2.5" target="0, 0, 0" up="0, 0, 1"/></transform><rgb name="radiance" value="1, 1, 0.9"/>
+<float name="spread" value="0"/></emitter>""",
+    "sun": f"""<emitter type="blender_sun">{_DOWN}<rgb name="radiance" value="40, 40, 44"/>
+<float name="angle" value="20"/></emitter>""",
+}
+
 
 def write_scene(
     folder: Path,

@@ -193,6 +193,15 @@ def test_a_missing_system_library_is_named_and_not_remembered(tmp_path: Path, mo
     assert llvm.configure_llvm() == tmp_path / "libLLVM-19.so"
 
 
+def test_a_library_is_not_blamed_for_a_want_of_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    library = tmp_path / "libLLVM-19.so"
+    library.touch()
+    for reason, works in (("LLVM ERROR: out of memory", False), ("compiled and ran a kernel", True)):
+        verdict = llvm.LlvmVerdict(str(library), works, reason)
+        monkeypatch.setattr(llvm, "_probe_in_child", lambda path, timeout, verdict=verdict: verdict)
+        assert llvm.probe_llvm(library).works is works
+
+
 def test_without_mitsuba_llvm_is_not_blamed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(llvm.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(SetupError, match="mitsuba and drjit are not installed in") as caught:

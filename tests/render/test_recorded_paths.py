@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mfo_backend.render.memory import MemoryLeft
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.errors import BadInputError
 from tests.render.scenes import AREA, FLOOR, POINT, SKY, SUN_AND_SPOT, write_scene
@@ -105,6 +106,36 @@ def test_a_large_picture_is_recorded_by_tiles(tmp_path, monkeypatch):
     assert len(np.unique(paths.tile)) >= 2
 
 
+def test_many_rays_beside_a_small_target_are_left_out(tmp_path, monkeypatch):
+    renderer, scene = recorded_scene(tmp_path, POINT)
+    everything = scene.record(renderer.start, grid=3, seed=0, near=False)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 9 * int(scene._near_target.sum()))
+    from mfo_backend.render import record_paths  # needs the variant
+
+    taken = []
+    original = record_paths.primary_rays
+    monkeypatch.setattr(record_paths, "primary_rays", lambda *words: taken.append(original(*words)) or taken[-1])
+    near = scene.record(renderer.start, grid=3, seed=0, near=False)
+    rays = len(np.array(taken[0].pixel_position))
+    assert rays == 9 * scene._near_target.sum() < 9 * scene._near_target.size
+    for name in ("wi", "wo", "weight"):
+        np.testing.assert_array_equal(np.array(getattr(everything, name)), np.array(getattr(near, name)))
+    np.testing.assert_array_equal(everything.pixel, near.pixel)
+    np.testing.assert_array_equal(everything.constant, near.constant)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 1000)
+    assert 0 < scene.record(renderer.start, grid=3, seed=0, near=False).lanes <= 1000
+
+
+def test_a_recording_beyond_the_memory_is_refused_before_it_begins(tmp_path, monkeypatch):
+    renderer, scene = recorded_scene(tmp_path, POINT)
+    left = [MemoryLeft(50_000, "on this machine")]
+    monkeypatch.setattr("mfo_backend.render.memory.memory_left", lambda: left)
+    with pytest.raises(
+        BadInputError, match=r"needs about \d+ MB of memory and 0 MB are left on this machine: use a sm"
+    ):
+        scene.record(renderer.start, grid=3, seed=0, near=False)
+
+
 def test_the_same_seed_gives_the_same_recording(tmp_path):
     renderer, scene = recorded_scene(tmp_path, SKY)
     first, second = (scene.record(renderer.start, grid=3, seed=11, near=False) for _ in range(2))
@@ -162,7 +193,7 @@ def test_a_texture_is_refused(tmp_path):
 @pytest.mark.parametrize("rfilter", ["box", "gaussian"])
 def test_rays_far_from_the_target_are_left_out_and_change_nothing(tmp_path, rfilter):
     renderer, scene = recorded_scene(tmp_path, AREA + FLOOR, depth=4, rfilter=rfilter, size=48)
-    from mfo_backend.render.primary_rays import primary_rays, widened
+    from mfo_backend.render.primary_rays import primary_rays
 
     x = renderer.table.pack(VALUES)
     few = scene.record(x, grid=4, seed=3, near=False)
@@ -177,6 +208,13 @@ def test_rays_far_from_the_target_are_left_out_and_change_nothing(tmp_path, rfil
         np.testing.assert_array_equal(np.array(getattr(few, name)), np.array(getattr(every, name)))
     np.testing.assert_array_equal(few.pixel, every.pixel)
     np.testing.assert_array_equal(few.constant, every.constant)
-    dot = np.zeros((5, 7), bool)
-    dot[1, 6] = True
-    assert np.argwhere(widened(dot, 1)).tolist() == [[r, c] for r in (0, 1, 2) for c in (5, 6)]
+
+
+def test_a_mask_is_widened_as_by_scipy():
+    from scipy.ndimage import binary_dilation
+
+    from mfo_backend.render.primary_rays import widened
+
+    mask = np.random.default_rng(3).random((17, 23)) < 0.03
+    for reach in (1, 3):
+        np.testing.assert_array_equal(widened(mask, reach), binary_dilation(mask, np.ones((3, 3), bool), reach))

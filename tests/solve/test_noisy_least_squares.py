@@ -107,3 +107,16 @@ def test_a_column_without_effect_is_as_unsure_as_its_range():
     matrix = SafeMatrix(cross_equations(gram), np.array([1.0, 2.0]))
     covariance = matrix.covariance(np.diag([1e-4, 0.0]))
     np.testing.assert_allclose(np.diag(covariance), [1e-4, 4.0])
+    np.testing.assert_allclose(matrix.solution_covariance(np.diag([1e-4, 0.0]))[0, 0], 1e-4)
+
+
+def test_the_expected_error_is_that_of_the_solutions(problem):
+    rng, jacobian = problem
+    errors, stated = [], []
+    for _ in range(60):
+        pool = pooled(samples(rng, jacobian, 4, 0.5, 2.0 * rng.normal(size=3000)))
+        equations = cross_equations(pool.gram())
+        off = cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0) - TRUE
+        errors.append(np.mean((jacobian @ off) ** 2))
+        stated.append(SafeMatrix(equations, WIDTH).expected_error(pool.gradient_noise(3)))
+    assert 0.5 < np.mean(stated) / np.mean(errors) < 2.0  # as the variances above

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The short table of a bench for pages that name its figures, such as the README, so that nobody types them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from .row import Row
+from .summary import SOLVED_FLIP, comparable_seconds, quantile, summaries
+from .table import Table, number
+
+OURS, PAPERS = "balanced", "mfo-hdr"
+_BLOCK = re.compile(r"<!-- bench -->\n.*?<!-- end -->", re.DOTALL)
+
+
+def headline(rows: Sequence[Row]) -> Table:
+    """Per scenario what the default preset and the paper's loop solve, how exactly and how long they take.
+
+    The last column is the median, over the scenes that both have, of the loop's time over the preset's.
+    """
+    time_name, seconds_of = comparable_seconds(rows)
+    found = {(summary.scenario, summary.method): summary for summary in summaries(rows)}
+    lines = []
+    for scenario in dict.fromkeys(scenario for scenario, _ in found):
+        line = [f"`{scenario}`"]
+        for method in (OURS, PAPERS):
+            mine = [row for row in rows if (row.scenario, row.method) == (scenario, method)]
+            if not mine:
+                line += ["–"] * 3
+                continue
+            summary = found[scenario, method]
+            times = [time for time in map(seconds_of, mine) if time is not None]
+            line += [f"{summary.solved} of {summary.runs}", number(summary.flip[1]), number(quantile(times, 0.5))]
+        ratios = _ratios([row for row in rows if row.scenario == scenario], seconds_of)
+        lines.append([*line, number(quantile(ratios, 0.5))])
+    unit = "CPU s" if time_name.startswith("processor") else "s"
+    heads = [f"{who}{what}" for who in (f"`{OURS}`: ", "paper's loop: ") for what in ("solved", "FLIP", unit)]
+    return Table(["scenes", *heads, "times longer"], lines)
+
+
+def fill(page: str, rows: Sequence[Row]) -> str:
+    """The page with everything between ``<!-- bench -->`` and ``<!-- end -->`` made anew; unchanged without them."""
+    text = (
+        f"{chr(10).join(headline(rows).markdown())}\n\n"
+        f"Solved: mean FLIP over the object of at most {SOLVED_FLIP:g}. FLIP and time are medians.\n"
+    )
+    return _BLOCK.sub(lambda _: f"<!-- bench -->\n{text}<!-- end -->", page)
+
+
+def _ratios(rows: Sequence[Row], seconds_of: Callable[[Row], float | None]) -> list[float]:
+    times = {(row.method, row.scene): seconds_of(row) for row in rows}
+    pairs = [(times.get((OURS, row.scene)), seconds_of(row)) for row in rows if row.method == PAPERS]
+    return [theirs / ours for ours, theirs in pairs if ours and theirs]

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noisy pictures of one material with their derivatives, pooled over tiles of several sizes at once.
+
+Small tiles show more of a sharp picture's detail, large ones average the noise before it is multiplied. Which size
+says most changes as samples come in, so all of them are kept and the best is chosen anew each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solve.bounded_least_squares import NormalEquations
+from ..solve.noisy_least_squares import CrossProducts, SafeMatrix, cross_equations
+from .tile_rows import TileRows
+
+Vector = NDArray[np.float64]
+CHANNELS = 3  # of a tile share their noise
+
+
+@dataclass(frozen=True)
+class TilePools:
+    """Samples of the same pixels in tiles of growing size; the first are single pixels."""
+
+    tiles: tuple[TileRows, ...]
+    pools: list[CrossProducts]
+    order: tuple[NDArray[np.int64], ...]  # of the pixels in each size
+
+    @staticmethod
+    def of(tiles: Iterable[TileRows], columns: int) -> TilePools:
+        """Empty pools for pictures (p, 3, columns); the tiles are given by size, single pixels first."""
+        tiles = tuple(tiles)
+        order = tuple(np.searchsorted(tiles[0].pixels, t.pixels) for t in tiles)
+        return TilePools(tiles, [CrossProducts(CHANNELS * len(t), columns) for t in tiles], order)
+
+    @property
+    def pixels(self) -> NDArray[np.int64]:
+        """Flat indices of the pixels every sample has to hold, in this order."""
+        return self.tiles[0].pixels
+
+    def add(self, samples: Sequence[NDArray[np.float32]]) -> None:
+        """Take independent pictures with derivatives (p, 3, columns)."""
+        for tiles, pool, order in zip(self.tiles, self.pools, self.order, strict=True):
+            for sample in samples:
+                pool.add(tiles.rows(sample[order]))
+
+    def fade(self, factor: float) -> None:
+        """Multiply the weight of all samples so far."""
+        for pool in self.pools:
+            pool.fade(factor)
+
+    def shifted(self, step: Vector) -> None:
+        """Count the residuals from a point `step` further on."""
+        for pool in self.pools:
+            pool.shifted(step)
+
+    def best(self, width: Vector) -> tuple[NormalEquations, Vector, int]:
+        """Equations, the covariance of their gradient and the index of the size that leaves the least uncertainty.
+
+        `width` scales the unknowns; one that is unsure by all of it counts as much as one without effect.
+        """
+        chosen: tuple[float, NormalEquations, Vector, int] | None = None
+        for size, pool in enumerate(self.pools):
+            equations, noise = cross_equations(pool.gram()), pool.gradient_noise(CHANNELS)
+            variance = np.diag(SafeMatrix(equations, width).covariance(noise)) / width**2
+            total = float(np.minimum(variance, 1.0).sum())
+            if chosen is None or total < chosen[0]:
+                chosen = total, equations, noise, size
+        assert chosen is not None
+        return chosen[1:]
+
+    def expected_error(self, equations: NormalEquations, noise: Vector, width: Vector) -> float:
+        """Mean square that `noise` in the gradient of `equations` leaves in single pixels, in parts of what is there.
+
+        What is there is the reference's noise once the fit is near: a product of different samples holds none of their
+        own. Infinite while there are too few samples to tell.
+        """
+        single = cross_equations(self.pools[0].gram())
+        safe = SafeMatrix(equations, width)
+        left = safe.solution_covariance(noise)
+        if single.cost <= 0.0 or np.any(np.diag(single.hessian) < 0.0):
+            return np.inf
+        error = max(float(np.sum(single.hessian * left)), safe.expected_error(noise))
+        return error / (2.0 * single.cost)

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The names of the lamps in scene files. Choose the variant before importing this."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+
+from .area_lamp import AreaLamp
+from .point_lamp import PointLamp, SharpSpot, SpotLamp
+from .sun_lamp import SunLamp
+
+PLUGINS = {
+    "blender_point": PointLamp,
+    "blender_spot": SpotLamp,
+    "blender_sharp_spot": SharpSpot,
+    "blender_area": AreaLamp,
+    "blender_sun": SunLamp,
+}
+
+
+def register() -> None:
+    """Make the lamps known to Mitsuba in the current variant."""
+    for name, plugin in PLUGINS.items():
+        mi.register_emitter(name, plugin)
