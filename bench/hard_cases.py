@@ -37,7 +37,7 @@ def main() -> None:
     from mfo_backend.bench.hard_runs import HardRun, hard_table, run_hard_case
 
     rows = arguments.rows.read_text("utf-8").splitlines() if arguments.rows.exists() else []
-    runs = [HardRun(**{**row, "guards": tuple(row["guards"])}) for row in map(json.loads, rows)]
+    runs = [HardRun(**{k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(row).items()}) for row in rows]
     done = {(run.case, run.seed) for run in runs}
     for seed in range(arguments.seeds):
         for name in arguments.case or HARD_CASES:

@@ -43,7 +43,7 @@ def measure_scene(target: Any, folder: Path, samples: int) -> tuple[Difference, 
         bpy.ops.render.render(write_still=True)
         halves.append(np.asarray(read_image(path).pixels, float))
     job = export_job(bpy.context, target, folder / "job", reference=folder / "cycles_0.exr", fit={})
-    return compare(render_job(folder / "job", samples), (halves[0], halves[1])), job.notes
+    return compare(render_job(folder / "job", samples), (halves[0], halves[1])), list(job.notes)
 
 
 INTRODUCTION = """# Lights here and in Cycles

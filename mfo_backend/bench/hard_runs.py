@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,18 +13,24 @@ from numpy.typing import NDArray
 from ..fit.choose_groups import detail_grid
 from ..fit.recover_material import recover_material
 from ..fit.settings import FitSettings
+from ..fit.uncertainty import DETERMINED_BELOW
 from ..metrics.compare import compare_images
 from ..metrics.tone_mapping import DisplayView
+from ..render.highlight_cells import Highlights
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Renderer, load_renderer
+from ..types.certainty import Level
 from ..types.errors import MfoError
 from ..types.image import Encoding, Image, Pixels
+from ..types.parameter import ParameterTable, Value
+from ..types.result import FitResult
 from .hard_cases import HardCase, HardScene, write_hard_scene
 from .judge import relative_rmse
 from .scene import SHAPE
 
 _REFERENCE_SEED, _JUDGE_SEED = 0x4A2D0000, 0x4A2D8000
 _JUDGE_SPP = 256
+_FINE = Highlights(share=0.2, most=400_000)
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,8 @@ class HardRun:
     """One fit of one case.
 
     `error` is what the case's limit is for. `guards` are the sentences in which the fit said what it left out, kept or
-    refused. `finite` says that no value and no error is NaN or infinite.
+    refused. `finite` says that no value and no error is NaN or infinite. `wrong` names values that the fit calls
+    determined and that are not the truth's: a run that is not solved and has some failed in silence.
     """
 
     case: str
@@ -43,6 +50,12 @@ class HardRun:
     finite: bool
     passes: float
     guards: tuple[str, ...]
+    wrong: tuple[str, ...] = ()
+
+    @property
+    def silent(self) -> bool:
+        """Whether it failed and said the opposite."""
+        return not self.solved and bool(self.wrong)
 
 
 def run_hard_case(case: HardCase, seed: int, size: int, folder: Path, preset: str = "balanced") -> HardRun:
@@ -75,14 +88,30 @@ def run_hard_case(case: HardCase, seed: int, size: int, folder: Path, preset: st
     # errors of pictures with noise: a start that is the best cannot be told from the result by less
     solved = finite and error <= case.limit and error <= start_error + 0.005
     guards = tuple(result.notes) if "so the start was kept" not in result.message else (*result.notes, result.message)
-    return HardRun(case.name, seed, solved, error, start_error, finite, result.passes, guards)
+    known = np.isfinite(case.limit)  # elsewhere no value is right
+    wrong = wrongly_determined(result, scene.truth, true.table) if known else ()
+    return HardRun(case.name, seed, solved, error, start_error, finite, result.passes, guards, wrong)
+
+
+def wrongly_determined(result: FitResult, truth: Mapping[str, Value], table: ParameterTable) -> tuple[str, ...]:
+    """Names of values called determined that miss the truth by more than three of their standard deviations and by
+    more than "determined" promises."""
+    wrong = []
+    for name, certainty in result.certainty.items():
+        parameter = table[name]
+        miss = np.abs(np.subtract(result.recovered[name], np.clip(truth[name], parameter.lower, parameter.upper)))
+        least = DETERMINED_BELOW * (parameter.upper - parameter.lower)
+        if certainty.level is Level.DETERMINED and np.any(miss > np.maximum(3.0 * np.array(certainty.sd), least)):
+            wrong.append(name)
+    return tuple(wrong)
 
 
 def hard_table(runs: Sequence[HardRun]) -> str:
     """A line of Markdown for each case."""
     lines = [
-        "| case | runs | solved | worst error | median passes | not finite | guards that fired (runs) |",
-        "| --- | --: | --: | --: | --: | --: | --- |",
+        "| case | runs | solved | worst error | median passes | not finite | silent failures | "
+        "guards that fired (runs) |",
+        "| --- | --: | --: | --: | --: | --: | --: | --- |",
     ]
     for name in dict.fromkeys(run.case for run in runs):
         rows = [run for run in runs if run.case == name]
@@ -94,7 +123,7 @@ def hard_table(runs: Sequence[HardRun]) -> str:
         lines.append(
             f"| {name} | {len(rows)} | {100 * np.mean([r.solved for r in rows]):.0f} % | "
             f"{max(r.error for r in rows):.3g} | {np.median([r.passes for r in rows]):.0f} | "
-            f"{sum(not r.finite for r in rows)} | {guards or '-'} |"
+            f"{sum(not r.finite for r in rows)} | {sum(r.silent for r in rows)} | {guards or '-'} |"
         )
     return "\n".join(lines)
 
@@ -114,7 +143,7 @@ class ExactPicture:
         self._shape = (*mask.shape, 3)
         grid: int | NDArray[np.int64] = 6
         for _ in range(2):
-            self._paths = scene.record(vector, grid=grid, seed=_JUDGE_SEED, near=False)
+            self._paths = scene.record(vector, grid=grid, seed=_JUDGE_SEED, near=False, highlights=_FINE)
             self._evaluate = scene.evaluator(self._paths, self._paths.pixel_groups())
             grid = 2 * detail_grid(self(vector), mask) + 2
 

@@ -17,7 +17,10 @@ from ..types.errors import SetupError
 from ..types.image import Encoding, Image
 from .scenario import Scenario
 
-EVERY_LANE = 10**9
+_EVERY = 10**9
+_EVERYTHING = RecordedPlan(
+    scan_lanes=_EVERY, start_lanes=_EVERY, exact_scan_lanes=_EVERY, exact_start_lanes=_EVERY, refine_lanes=_EVERY
+)
 
 
 @dataclass(frozen=True)
@@ -57,11 +60,7 @@ PAPER_METHODS |= {"lpips": _paper(("lpips",), "ldr"), "lpips-pu": _paper(("lpips
 _BALANCED = OUR_METHODS["balanced"].settings
 ABLATIONS = {
     "balanced-no-scan": Method(_BALANCED, RecordedPlan(scan=False), compares_with="balanced"),
-    "balanced-no-subset": Method(
-        _BALANCED,
-        RecordedPlan(scan_lanes=EVERY_LANE, start_lanes=EVERY_LANE, refine_lanes=EVERY_LANE),
-        compares_with="balanced",
-    ),
+    "balanced-no-subset": Method(_BALANCED, _EVERYTHING, compares_with="balanced"),
     "mfo-hdr-kept": replace(_paper(("mse", "flip"), "hdr", keep_optimizer_state=True), compares_with="mfo-hdr"),
     "mfo-ldr-kept": replace(_paper(("mse", "flip"), "ldr", keep_optimizer_state=True), compares_with="mfo-ldr"),
     "mfo-hdr-new-seeds": replace(_paper(("mse", "flip"), "hdr"), new_seeds=True, compares_with="mfo-hdr"),

@@ -16,12 +16,15 @@ from pathlib import Path
 
 from ..render.cache_folder import cache_folder
 from ..render.llvm import find_llvm, library_cure, llvm_cure, missing_system_library, needs_llvm, require_mitsuba
+from ..render.memory import memory_left
 from ..types.errors import SetupError
 from .check import Check
 from .optional_checks import check_optional
 
 PINNED = {"mitsuba": "3.9.1", "drjit": "1.5.0"}  # those of pyproject.toml; a test compares them
 LEAST = {"numpy": "1.26", "scipy": "1.11", "OpenEXR": "3.3", "pillow": "11", "tqdm": "4.66"}
+
+ENOUGH_MEMORY = 1_000_000_000
 
 
 def check_machine() -> Iterator[Check]:
@@ -31,6 +34,7 @@ def check_machine() -> Iterator[Check]:
     yield from _renderer()
     yield _gpu()
     yield _threads()
+    yield _memory()
     yield _cache("cache", cache_folder(), "MFO_CACHE_DIR")
     kernels = os.environ.get("DRJIT_CACHE_DIR") or str(Path.home() / ".drjit")
     if sys.platform == "win32":
@@ -104,6 +108,16 @@ def _threads() -> Check:
     affinity = getattr(os, "sched_getaffinity", None)
     count = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
     return Check("threads", "ok", str(count))
+
+
+def _memory() -> Check:
+    left = min(memory_left(), key=lambda one: one.size, default=None)
+    if left is None:
+        return Check("memory", "ok", "not told by this system")
+    found = f"{left.size / 1e9:.1f} GB left {left.limit}"
+    if left.size < ENOUGH_MEMORY:
+        return Check("memory", "warning", found, "Free some, or raise the limit: a small fit takes about 1 GB.")
+    return Check("memory", "ok", found)
 
 
 def _cache(name: str, folder: Path, variable: str) -> Check:

@@ -14,10 +14,13 @@ from ..types.image import Pixels
 MINIMUM_INTERIOR_SHARE = 0.3
 
 
-def all_groups(paths: RecordedPaths, *, tiles: bool) -> LaneGroups:
-    """All pixels or tiles without background; those on the silhouette too where the target is small."""
+def all_groups(paths: RecordedPaths, side: int) -> LaneGroups:
+    """All pixels or tiles of this `side` without background; those on the silhouette too where the target is small."""
     interior = paths.interior
-    make = paths.tile_groups if tiles else paths.pixel_groups
+
+    def make(keep: NDArray[np.bool_] | None = None) -> LaneGroups:
+        return paths.pixel_groups(keep) if side == 1 else paths.tile_groups(keep, side)
+
     if interior.mean() < MINIMUM_INTERIOR_SHARE:
         return make()
     groups = make(interior)
@@ -39,9 +42,8 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
 
 
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
-# the next pixel; by half; by a factor of four. A highlight of roughness 0.06 on a sphere of 100 pixels is narrower
-# than one.
-GRID_PLAIN, GRID_DETAIL, GRID_HIGHLIGHT, GRID_PEAK = 2, 6, 20, 50
+# the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
+GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
 
 
 def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -60,6 +62,5 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
             change = np.maximum(change, np.abs(level - np.roll(level, shift, axis)))
     grid = np.full(level.shape, GRID_PLAIN)
     grid[mask & (change > 0.1)] = GRID_DETAIL
-    grid[inside & (change > 0.5)] = GRID_HIGHLIGHT
-    grid[inside & (change > 1.4)] = GRID_PEAK
+    grid[inside & (change > 0.5)] = GRID_EDGE
     return grid

@@ -131,7 +131,9 @@ class Course:
             self._shown = self._began
         if self.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
             return
+        passes = self._renderer.passes
         self._listener(Preview(self.picture(stage.best)))
+        self._renderer.passes = passes  # how many previews there are depends on the clock, and the fit needs none
         stage.best, self._shown = None, time.monotonic()
 
     def reached(self, stage: Stage, x: Vector, loss: float) -> None:

@@ -93,7 +93,8 @@ def fit_recorded(
         ends.append(End("start", basins[0].x))
     else:
         make = RelativeResidual if scene.needs.sampled else log_residual
-        solution, last = fit.refine(basins[0].x, _censored(make, reference, view), _weighted(reference, view))
+        first, *others = (basin.x for basin in basins)
+        solution, last = fit.refine(first, _censored(make, reference, view), _weighted(reference, view), others)
         weighted = scene.needs.sampled and not isinstance(view, BakedView)
         kept = keep_values(fit, last, solution.x, weighted=weighted)
         fit.box = box_holding(fit.table, renderer.start, kept.held)
@@ -112,8 +113,8 @@ def fit_recorded(
             blurred = linear and settings.losses is None and (scene.needs.sampled or noise > NOISY)
             judge = PictureJudge(measure, reference, light, mask, settings, view, blurred=blurred)
             counts = judge.value
-            others = [basin.x for basin in basins[1:]] if settings.preset == "best" else []
-            ends += perceptual_ends(fit, last, kept.x, others, finishing, judge, settings, notes)
+            tried = others if settings.preset == "best" else []
+            ends += perceptual_ends(fit, last, kept.x, tried, finishing, judge, settings, notes)
         if fit.fireflies:
             notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
         if fit.recordings > 1:

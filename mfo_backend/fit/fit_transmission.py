@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
 
 STAGES = ("scan", "race", "polish")
 PATHS_OF_A_PART = 1 << 18  # of a picture, after which a request to stop is heard: as long as a launch of traced paths
-_PREVIEW_PATHS, _PREVIEW_SPP = 1 << 16, 4  # half a launch at most, whatever the size of the picture
+_PREVIEW_PATHS, _PREVIEW_SPP = 1 << 15, 2  # a quarter of a launch, whatever the size of the picture
 Vector = NDArray[np.float64]
 
 

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..render.primary_rays import TILE
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
@@ -31,11 +32,18 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 
 # Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
 LEAST_NOISE = 0.002
+# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
+# weights, which come from the solution that it is compared with, are only about right
+CLEARLY_LOWER = 0.97
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
-MOVED = 0.15  # relative change of the tiles by a solve after which its recording is too old
+# After a solve its recording is too old if the tiles changed by this share, or if one over the effective number of
+# samples grew by this factor. The first is what mends fits that began far away, though most of those keep their
+# samples; the second finds a lobe that became narrow in few tiles.
+MOVED = 0.15
+FEWER = 1.5
 
 
 @dataclass(frozen=True)
@@ -48,10 +56,14 @@ class RecordedPlan:
         Whether to look for starts; without it only the scene's own material and a random one are tried.
     grid_first, grid_last
         Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
+    side_last
+        Pixels along each side of the tiles of the last stage where light is sampled. Quarters of the tiles of the
+        stages before see twice the detail and lose fewer pixels to the silhouette; single pixels see too much of the
+        recording's own noise.
     scan_lanes, start_lanes
-        Recorded lanes the scan and the fits from its nodes look at.
-    refine_lanes
-        Those the last stage looks at where every light is exact: without noise more of them say nothing new.
+        Recorded lanes the scan and the fits from its nodes look at where light is sampled.
+    exact_scan_lanes, exact_start_lanes, refine_lanes
+        Those that they and the last stage look at where every light is exact: without noise more say nothing new.
     starts
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     trial_evaluations
@@ -65,9 +77,12 @@ class RecordedPlan:
     scan: bool = True
     grid_first: int = 4
     grid_last: int = 8
+    side_last: int = 2
     scan_lanes: int = 20_000
     start_lanes: int = 80_000
-    refine_lanes: int = 160_000
+    exact_scan_lanes: int = 8_000
+    exact_start_lanes: int = 20_000
+    refine_lanes: int = 80_000
     starts: int = 3
     trial_evaluations: int = 10
     keep_factor: float = 10.0
@@ -117,7 +132,8 @@ class RecordedFit:
         self.scene, self.reference, self.mask = scene, reference, mask
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
-        self._tiles: tuple[LaneGroups, Remembered] | None = None  # of the present recording
+        self._groups: dict[int, LaneGroups] = {}  # tiles of the present recording by side
+        self._tiles: dict[LaneGroups, Remembered] = {}
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
@@ -148,16 +164,17 @@ class RecordedFit:
             residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
         return Problem(self._evaluator(groups), residual, groups)
 
-    def tiles(self) -> LaneGroups:
-        """All tiles of the present recording, whose evaluations are remembered from one problem to the next."""
-        if self._tiles is None:
-            groups = all_groups(self.paths, tiles=True)
-            self._tiles = groups, Remembered(self.scene.evaluator(self.paths, groups))
-        return self._tiles[0]
+    def tiles(self, side: int) -> LaneGroups:
+        """All tiles of this side of the present recording; their evaluations are remembered between problems."""
+        if side not in self._groups:
+            groups = all_groups(self.paths, side)
+            self._groups[side] = groups
+            self._tiles[groups] = Remembered(self.scene.evaluator(self.paths, groups))
+        return self._groups[side]
 
     def _evaluator(self, groups: LaneGroups) -> ImageAndJacobian:
-        if self._tiles is not None and self._tiles[0] is groups:
-            return self._tiles[1]
+        if groups in self._tiles:
+            return self._tiles[groups]
         return Remembered(self.scene.evaluator(self.paths, groups))
 
     def start_from_nothing(self, make: MakeResidual) -> list[Solution]:
@@ -171,14 +188,16 @@ class RecordedFit:
             # where every light is exact, only the pixel's footprint is sampled
             grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
-            groups = all_groups(self.paths, tiles=sampled)
-            few = self.problem(fewer_groups(groups, self.reference, plan.scan_lanes), make, calm=True)
+            groups = all_groups(self.paths, TILE if sampled else 1)
+            lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
+            few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             nodes = []
             if plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
                 stage.vector = nodes[0].x
         with self.course.stage("start") as stage:
-            more = self.problem(fewer_groups(groups, self.reference, plan.start_lanes), make, calm=True)
+            lanes = plan.start_lanes if sampled else plan.exact_start_lanes
+            more = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             metals = [node for node in nodes if node.metal]
@@ -245,10 +264,19 @@ class RecordedFit:
         limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
-    def refine(self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> tuple[Solution, Problem]:
+    def _rival(self, problem: Problem, solution: Solution, others: Sequence[Vector]) -> Vector | None:
+        """The best of the other basins on the same problem, if it is clearly better."""
+        found = [self._solve(problem.equations, x, self.plan.trial_evaluations) for x in others]
+        best = min(found, key=lambda rival: rival.equations.cost, default=solution)
+        return best.x if best.equations.cost < CLEARLY_LOWER * solution.equations.cost else None
+
+    def refine(
+        self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None, others: Sequence[Vector] = ()
+    ) -> tuple[Solution, Problem]:
         """Stage `refine`: all residuals, on a new and finer recording near the solution where the light is sampled.
 
-        There, residuals count in standard deviations of the reference's noise by `weigh` if given.
+        There, residuals count in standard deviations of the reference's noise by `weigh` if given, and solutions in
+        other basins (`others`) are tried: they may have cost more by the noise of the first recording alone.
         """
         with self.course.stage("refine") as stage:
             if not self.scene.needs.sampled:
@@ -256,7 +284,7 @@ class RecordedFit:
                 grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
                 if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
                     self._record(start, grid, 1)
-                groups = fewer_groups(all_groups(self.paths, tiles=False), self.reference, self.plan.refine_lanes)
+                groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
                 problem = self.problem(groups, make)
                 solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
                 stage.vector = solution.x
@@ -265,48 +293,62 @@ class RecordedFit:
             for number in range(1, MOST_RECORDINGS + 1):
                 problem = None  # and with it the recording before
                 self._record(start, self.plan.grid_last, number)
+                fresh = self._own_variance(start)
                 solution, problem = self._refine_sampled(stage, start, make, weigh)
                 stage.vector = solution.x
-                if self._moved(problem, start, solution.x) < MOVED or self.course.should_stop():
+                fewer = self._own_variance(solution.x) > FEWER * fresh
+                moved = self._moved(problem, start, solution.x) > MOVED
+                if not (fewer or moved) or self.course.should_stop():
                     break
                 start = solution.x
-        assert solution is not None
-        assert problem is not None
+            assert solution is not None
+            assert problem is not None
+            rival = self._rival(problem, solution, others)
+            if rival is not None:
+                problem = None
+                self._record(rival, self.plan.grid_last, self.recordings + 1)
+                solution, problem = self._refine_sampled(stage, rival, make, weigh)
+                stage.vector = solution.x
         return solution, problem
+
+    def _own_variance(self, x: Vector) -> float:
+        """Mean over the tiles of one over their effective number of samples: the recording's own relative variance."""
+        samples = self.scene.effective_samples(x, self.paths, self.tiles(TILE))
+        return float(np.mean(1.0 / samples[samples > 0.0])) if samples.any() else 0.0
 
     def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
-        self._tiles = None
+        self._groups, self._tiles = {}, {}
         self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
         self.recordings = number
 
     def _refine_sampled(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
     ) -> tuple[Solution, Problem]:
-        groups = self.tiles()
+        groups = self.tiles(self.plan.side_last)
         if weigh is None:
             problem = self.problem(groups, make)
             return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
 
         def solve(x: Vector) -> tuple[Solution, Problem]:
-            self.noise = self._noise(x, groups)
+            self.noise = self._noise(x, groups, self.plan.side_last)
             problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
             return self._solve(self.course.watch(stage, problem.equations), x, 12), problem
 
         # the first weights come from a model that is still off
         return solve(solve(start)[0].x)
 
-    def _noise(self, x: Vector, groups: LaneGroups) -> TileNoise:
+    def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)
-        if self._tiles is not None and self._tiles[0] is groups:
-            self._tiles[1].note(x, groups.mean_of_pixels(pixels))
-        return tile_noise(self.calm, pixels[:, :, 0], self.paths, groups, self.paths.interior)
+        if groups in self._tiles:
+            self._tiles[groups].note(x, groups.mean_of_pixels(pixels))
+        return tile_noise(self.calm, pixels[:, :, 0], self.paths, groups, self.paths.interior, side)
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
-        groups = self.tiles()
-        self.noise = self._noise(x, groups)
+        groups = self.tiles(TILE)
+        self.noise = self._noise(x, groups, TILE)
         problem = self.problem(groups, self._weighing(self.noise, groups))
         values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
         # as far as a few outliers go, it is their number that counts and not their size

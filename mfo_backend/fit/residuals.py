@@ -15,6 +15,7 @@ from ..solve.bounded_least_squares import NormalEquations
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
 ImageAndJacobian = Callable[[Vector], Rows]  # (g, 3, 1 + k): the image and its derivatives
+LEAST_MEDIAN = 0.1
 
 
 class Residual(Protocol):
@@ -45,9 +46,13 @@ class ResponseResidual:
 
 
 def log_residual(reference: Rows) -> ResponseResidual:
-    """log(1 + 3 L / median): compressive, so highlights and shadows both count; the median lies mid-curve."""
+    """log(1 + 3 L / median): compressive, so highlights and shadows both count; the median lies mid-curve.
+
+    It is the mean's `LEAST_MEDIAN` at least. A metal under one lamp is black but for its highlight: there a smaller
+    scale would weigh differences that nobody sees as much as the highlight.
+    """
     lit = reference[reference > 0.0]
-    median = float(np.median(lit)) if lit.size else 1.0
+    median = max(float(np.median(lit)), LEAST_MEDIAN * float(lit.mean())) if lit.size else 1.0
     return ResponseResidual(Logarithmic(median / 3.0), reference)
 
 

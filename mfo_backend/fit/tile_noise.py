@@ -18,7 +18,7 @@ from ..render.primary_rays import TILE
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..types.image import Pixels
 
-REACH = 2  # tiles to each side that a tile's variance is taken from
+REACH = 8  # pixels to each side of a tile that its variance is taken from
 PRIOR_PAIRS = 8  # pairs of pixels that the variance of the whole picture counts for
 SKEW = 1.5  # mean over median of the tiles' variances under path tracing's skewed noise, about
 DARK = 0.1  # share of the mean below which noise no longer shrinks with the radiance
@@ -33,12 +33,17 @@ class TileNoise:
 
 
 def tile_noise(
-    reference: Pixels, model: NDArray[np.float32], paths: RecordedPaths, groups: LaneGroups, keep: NDArray[np.bool_]
+    reference: Pixels,
+    model: NDArray[np.float32],
+    paths: RecordedPaths,
+    groups: LaneGroups,
+    keep: NDArray[np.bool_],
+    side: int = TILE,
 ) -> TileNoise:
-    """Noise of the linear `reference` (height, width, 3) in the tiles `groups`, given the model's pixels (p, 3).
+    """Noise of the linear `reference` (height, width, 3) in `groups`, tiles of this `side`, given the model's pixels.
 
-    `model` has a row for each pixel of the recording; only pixels in `keep` (p,) are compared. The recording's own
-    noise is part of the answer, as it is of the residual.
+    `model` (p, 3) has a row for each pixel of the recording; only pixels in `keep` (p,) are compared. The recording's
+    own noise is part of the answer, as it is of the residual.
     """
     height, width = reference.shape[:2]
     inside = np.zeros(height * width, bool)
@@ -46,8 +51,10 @@ def tile_noise(
     shown = np.zeros((height * width, 3))
     shown[paths.pixel] = model
     inside, shown = inside.reshape(height, width, 1), shown.reshape(height, width, 3) * inside.reshape(height, width, 1)
-    level = _tiles(shown) / np.maximum(_tiles(inside), 1) + DARK * max(float(reference[inside[..., 0]].mean()), 1e-12)
-    residual = (reference - shown) * inside / np.repeat(np.repeat(level, TILE, 0), TILE, 1)[:height, :width]
+    level = _tiles(shown, side) / np.maximum(_tiles(inside, side), 1) + DARK * max(
+        float(reference[inside[..., 0]].mean()), 1e-12
+    )
+    residual = (reference - shown) * inside / np.repeat(np.repeat(level, side, 0), side, 1)[:height, :width]
 
     squares, pairs = np.zeros_like(residual), np.zeros((height, width, 1))
     for axis in (0, 1):
@@ -55,15 +62,16 @@ def tile_noise(
         both = inside[here] & inside[next_to]
         squares[here] += 0.5 * np.square(residual[here] - residual[next_to]) * both
         pairs[here] += both
-    squares, pairs = _tiles(squares), _tiles(pairs)
+    squares, pairs = _tiles(squares, side), _tiles(pairs, side)
     counted = pairs[..., 0] > 0
     if not counted.any():
         return TileNoise(np.ones((len(groups), 3)), 0.0)
     typical = SKEW * np.median(squares[counted] / pairs[counted], axis=0)  # which one firefly cannot move
-    variance = (_around(squares) + PRIOR_PAIRS * typical) / (_around(pairs) + PRIOR_PAIRS)
+    reach = REACH // side
+    variance = (_around(squares, reach) + PRIOR_PAIRS * typical) / (_around(pairs, reach) + PRIOR_PAIRS)
 
     row, column = np.divmod(groups.pixels[groups.first[:-1]], width)
-    at = row // TILE, column // TILE
+    at = row // side, column // side
     deviation = np.sqrt(variance[at] / np.diff(groups.first)[:, None]) * level[at]
     return TileNoise(deviation, float(np.sqrt(np.mean(variance[counted]))))
 
@@ -75,18 +83,20 @@ def _shifted(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     return tuple(here), tuple(next_to)
 
 
-def _tiles(pixels: NDArray) -> NDArray[np.float64]:
+def _tiles(pixels: NDArray, side: int) -> NDArray[np.float64]:
     """Sums over tiles of an image (height, width, channels)."""
     height, width, channels = pixels.shape
-    rows, columns = -(-height // TILE), -(-width // TILE)
-    padded = np.zeros((rows * TILE, columns * TILE, channels))
+    rows, columns = -(-height // side), -(-width // side)
+    padded = np.zeros((rows * side, columns * side, channels))
     padded[:height, :width] = pixels
-    return padded.reshape(rows, TILE, columns, TILE, channels).sum((1, 3))
+    return padded.reshape(rows, side, columns, side, channels).sum((1, 3))
 
 
-def _around(tiles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums over the neighbours of each tile without the tile itself."""
-    padded = np.pad(tiles, ((REACH, REACH), (REACH, REACH), (0, 0)))
-    rows, columns = tiles.shape[:2]
-    span = range(2 * REACH + 1)
-    return sum(padded[i : i + rows, j : j + columns] for i in span for j in span) - tiles
+def _around(tiles: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
+    """Sums over the neighbours of each tile, `reach` to each side, without the tile itself."""
+    total = tiles
+    for axis in (0, 1):
+        padded = np.pad(total, [(reach, reach) if k == axis else (0, 0) for k in range(3)])
+        size = tiles.shape[axis]
+        total = sum(np.take(padded, range(i, i + size), axis) for i in range(2 * reach + 1))
+    return total - tiles

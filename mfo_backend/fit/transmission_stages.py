@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solve.bounded_least_squares import NormalEquations
-from ..solve.noisy_least_squares import SafeMatrix, cautious_step, cross_equations
+from ..solve.noisy_least_squares import SafeMatrix, cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
 from .tile_pools import TilePools
 from .tile_rows import TileRows
+from .two_halves import is_unsure, two_half_equations
 from .uncertainty import WEAK_BELOW
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -35,7 +36,7 @@ TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
-FAR = 0.03  # of the range, in any value: from there on derivatives of samples so far are no longer to be trusted
+FAR = {True: 0.015, False: 0.06}  # of the range, of sharp materials and others: samples from so far away count half
 TRUST = 0.25  # of the range: the longest step
 
 
@@ -201,7 +202,7 @@ class TransmissionFit:
             order = np.arange(len(xs))
             for turn in range(plan.scan_steps + 1):
                 rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
-                equations = [_two_half(*pair) for pair in rows]
+                equations = [two_half_equations(*pair) for pair in rows]
                 order = np.argsort([e.cost for e in equations])
                 self._note(stage, xs[order[0]], equations[order[0]].cost)
                 if turn == plan.scan_steps or frozen.all() or self.course.should_stop():
@@ -226,11 +227,11 @@ class TransmissionFit:
                 rows = self.halves(tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples)
                 if self.course.should_stop():
                     break
-                if few and turn == 0 and _unsure(*rows[0]):
+                if few and turn == 0 and is_unsure(*rows[0]):
                     tiles = self.tiles(4, 2 * plan.race_pixels)
                     rows = self.halves(tiles, np.array(trials), seed=self._seed(3), samples=plan.race_samples)
                 for runner, trial, pair in zip(runners, trials, rows, strict=True):
-                    self._accept(runner, trial, _two_half(*pair))
+                    self._accept(runner, trial, two_half_equations(*pair))
                 runners.sort(key=lambda r: r.equations.cost if r.equations else np.inf)
                 best = runners[0]
                 stage.vector = best.x
@@ -298,22 +299,27 @@ class TransmissionFit:
             if self.course.should_stop():
                 break
             table[..., 1:][..., frozen] = 0.0
-            if moved > FAR:
-                pools.fade(0.25)
+            far = FAR[self.paths.roughness(x) < SECANT_BELOW]
+            pools.fade(1.0 / (1.0 + (moved / far) ** 2))
             pools.add(np.split(table, 2))
             equations, noise, _ = pools.best(self._width)
             self._note(stage, x, equations.cost)
             step = self._step(equations, x, 1e-3, 0.1, frozen, noise)
-            moved = float(np.max(np.abs(step) / self._width))
+            moved = self._moved(step)
             x = x + step
             pools.shifted(step)
             stage.vector = x
             variance = SafeMatrix(equations, self._width).covariance(noise)
             share = pools.expected_error(equations, noise, self._width)
-            settled = settled + 1 if moved <= FAR and share < plan.enough else 0
+            settled = settled + 1 if moved <= far and share < plan.enough else 0
             if settled == SETTLED:
                 break
         return Polished(x, variance, frozen, equations, noise)
+
+    def _moved(self, step: Vector) -> float:
+        """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""
+        parts = [self.table.slice_of(name) for name in GEOMETRIC if name in self.table.names]
+        return max((float(np.max(np.abs(step[part]) / self._width[part])) for part in parts), default=0.0)
 
     def _unseen(self, end: Polished) -> NDArray[np.bool_]:
         """Values that are not determined: the least sure one is taken for known until the rest is sure."""
@@ -385,15 +391,3 @@ class TransmissionFit:
 
     def _note(self, stage: Stage, x: Vector, cost: float) -> None:
         self.course.reached(stage, x, float(np.sqrt(max(2.0 * cost, 0.0))))
-
-
-def _two_half(a: NDArray[np.float32], b: NDArray[np.float32]) -> NormalEquations:
-    """The normal equations of two independent samples of the rows."""
-    product_ = a.astype(np.float64).T @ b.astype(np.float64) / len(a)
-    return cross_equations(0.5 * (product_ + product_.T))
-
-
-def _unsure(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
-    """Whether the mean square of two samples of the rows is not much more than its standard error over tiles."""
-    squares = (a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1)
-    return bool(squares.mean() < 3.0 * squares.std() / np.sqrt(len(squares)))

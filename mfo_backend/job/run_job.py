@@ -26,7 +26,8 @@ from .stop import StopSignal
 
 # Measured on Linux (docs/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are mapped
 # but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
-_STARTUP_BYTES, _MAPPED_BYTES, _BYTES_PER_PIXEL = 150_000_000, 380_000_000, 430
+_STARTUP_BYTES, _MAPPED_BYTES = 150_000_000, 380_000_000
+_BYTES_PER_PIXEL = {"fast": 430, "balanced": 500, "best": 500, "paper": 500}
 _CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
 
 
@@ -71,7 +72,7 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
     folder = JobFolder.open(path)
     request = read_request(folder, trusted=trusted)
     require_memory(
-        _STARTUP_BYTES + request.width * request.height * _BYTES_PER_PIXEL,
+        _STARTUP_BYTES + request.width * request.height * _BYTES_PER_PIXEL[request.fit.preset],
         mapped=_MAPPED_BYTES,
         what=f"A fit of {request.width}x{request.height} pixels",
         cure="lower the resolution, or free some memory or raise its limit",

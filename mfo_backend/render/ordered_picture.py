@@ -65,6 +65,7 @@ def _start(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> C
     )  # fmt: skip
     light = mi.Color3f(light * weight)
     position = mi.Point2f(position)
+    del sampler, ray, weight  # nothing else may become an output of the kernel
     dr.eval(light, position)
     film = sensor.film()
     width, height = (int(n) for n in film.crop_size())

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import drjit as dr
@@ -15,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..material.own_memory import own_memory
+from .pixel_cells import PixelCells
 
-TILE = 4  # pixels; a tile is the smallest residual when the recording itself is noisy
+TILE = 4  # pixels along each side
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,23 @@ class PrimaryRays:
 
 
 def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Flat pixel indices ordered by tile, and the tile number of each; of every `stride`-th tile along both axes."""
+    """Flat pixel indices ordered by tile, and the tile number of each; of every `stride`-th tile along both axes.
+
+    Within a tile they are ordered by its quarters, so that those are runs of pixels, too.
+    """
     row, column = np.divmod(np.arange(width * height), width)
     tile_row, tile_column = row // TILE, column // TILE
     tile = tile_row * -(-width // TILE) + tile_column
     kept = np.flatnonzero((tile_row % stride == stride // 2) & (tile_column % stride == stride // 2))
-    order = kept[np.argsort(tile[kept], kind="stable")]
+    order = kept[np.argsort(4 * tile[kept] + quarter(kept, width), kind="stable")]
     return order, tile[order]
+
+
+def quarter(pixel: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """Which quarter of its tile each pixel lies in, 0 to 3."""
+    row, column = np.divmod(pixel, width)
+    half = TILE // 2
+    return 2 * (row % TILE // half) + column % TILE // half
 
 
 def widened(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
@@ -63,44 +75,48 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
     return sampler
 
 
+# of a cell's centre to the points of Gauss and Legendre, in sides: exact for a cubic change within the cell
+GAUSS = 0.5 / math.sqrt(3.0)
+
+
 def primary_rays(
     sensor: mi.Sensor,
-    grid: NDArray[np.int64],
+    cells: PixelCells,
+    order: NDArray[np.int64],
+    tile: NDArray[np.int64],
     seed: int,
-    stride: int = 1,
-    only: NDArray[np.bool_] | None = None,
+    *,
+    four: bool = False,
 ) -> PrimaryRays:
-    """Camera rays, `grid` (height, width) squared a pixel, 0 for none, in every `stride`-th tile along both axes.
+    """A camera ray through the centre of each cell, or `four` one after the other through its Gauss points.
 
-    With `only` (height, width) the other pixels have none.
+    `order` and `tile` are those of `tile_order`.
     """
     film = sensor.film()
-    width, height = (int(v) for v in film.crop_size())
-    order, tile = tile_order(width, height, stride)
-    if only is not None:
-        kept = only.reshape(-1)[order]
-        order, tile = order[kept], tile[kept]
-    per_axis = grid.reshape(-1)[order]
-    position = own_memory(np.repeat(np.arange(len(order)), per_axis**2), mi.UInt32)
-    first = own_memory(np.concatenate([[0], np.cumsum(per_axis**2)[:-1]]), mi.UInt32)
-    count = dr.width(position)
-    # lanes past the end read 0, and an integer division by 0 kills the process
-    cells = dr.maximum(dr.gather(mi.UInt32, own_memory(per_axis, mi.UInt32), position), 1)
-    cell = dr.arange(mi.UInt32, count) - dr.gather(mi.UInt32, first, position)
+    width = int(film.crop_size()[0])
+    each = 4 if four else 1
+    count = each * len(cells)
+    number = dr.arange(mi.UInt32, count)
+    cell = number // each
+    position = dr.gather(mi.UInt32, own_memory(cells.position, mi.UInt32), cell)
+    side = dr.gather(mi.Float, own_memory(cells.side, mi.Float), cell)
+    corner = mi.Point2f(*(dr.gather(mi.Float, own_memory(a, mi.Float), cell) for a in (cells.x, cells.y)))
     sampler = fresh_sampler(seed, count)
     flat = dr.gather(mi.UInt32, own_memory(order, mi.UInt32), position)
     y = flat // width
     x = flat - y * width
-    cell_y = cell // cells
     # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per
     # cent
-    inside = (mi.Point2f(mi.Float(cell - cell_y * cells), mi.Float(cell_y)) + 0.5) / mi.Float(cells)
-    offset, sign = through_filter(film.rfilter(), inside)
-    weight = 1.0 / mi.Float(cells * cells)
+    point = mi.Point2f(0.5)
+    if four:
+        point += GAUSS * mi.Point2f(2.0 * mi.Float(number & 1) - 1.0, mi.Float(number & 2) - 1.0)
+    offset, sign = through_filter(film.rfilter(), corner + side * point)
+    weight = side * side / each
     if sign is not None:
+        weight *= sign
         total = dr.zeros(mi.Float, len(order))
-        dr.scatter_reduce(dr.ReduceOp.Add, total, sign, position)
-        weight = sign / dr.gather(mi.Float, total, position)
+        dr.scatter_reduce(dr.ReduceOp.Add, total, weight, position)
+        weight /= dr.gather(mi.Float, total, position)
     crop = film.crop_offset()
     size = mi.ScalarVector2f(film.size())
     film_position = mi.Point2f(

@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 from ..material.own_memory import own_memory
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
+from .even_points import even_points
+from .highlight_cells import Highlights, highlight_cells
 from .lamps.met_lamps import DELTA, SceneLamps
-from .primary_rays import PrimaryRays, fresh_sampler, primary_rays
+from .pixel_cells import PixelCells
+from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_order
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
 
@@ -36,7 +39,8 @@ class RecordSettings:
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
     `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
-    are the only ones looked at; where they hold all that see the target, nothing is missed.
+    are the only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more
+    rays start where lights of no extent are mirrored.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -49,6 +53,7 @@ class RecordSettings:
     held: tuple[str, ...] = ()
     light_paths: LightPaths | None = None
     pixels: NDArray[np.bool_] | None = None
+    highlights: Highlights | None = None
     direct_only: bool = False
 
 
@@ -93,8 +98,7 @@ def record_paths(
             settings = replace(settings, light_paths=LightPaths())  # Mitsuba's own integrators do not meet lamps
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
-        grid = np.broadcast_to(settings.grid, (height, width))
-        rays = primary_rays(sensor, grid, settings.seed, settings.stride, settings.pixels)
+        rays = _camera_rays(scene, shape, settings, width, height)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         target = mi.ShapePtr(shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
@@ -112,8 +116,7 @@ def record_paths(
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
-        if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF":
-            si = _face_camera(si)
+        si = _facing(shape, settings, si)
         held = ()
         if settings.held:
             plugin: Any = shape.bsdf()
@@ -156,6 +159,38 @@ def indirect_share(
     return (lit[1] - lit[0]) / max(lit[0], 1e-30)
 
 
+def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:
+    """Camera rays on the settings' grid, and more of them in narrow highlights if the settings say so."""
+    sensor = scene.sensors()[0]
+    order, tile = tile_order(width, height, settings.stride)
+    if settings.pixels is not None:
+        kept = settings.pixels.reshape(-1)[order]
+        order, tile = order[kept], tile[kept]
+    per_axis = np.broadcast_to(settings.grid, (height, width)).reshape(-1)[order]
+    if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
+        return primary_rays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
+
+    target = mi.ShapePtr(shape)
+    dr.make_opaque(target)
+
+    def rays_in(cells: PixelCells) -> PrimaryRays:
+        return primary_rays(sensor, cells, order, tile, settings.seed, four=True)
+
+    def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
+        ray = rays.ray
+        hit = scene.ray_intersect_preliminary(ray, coherent=True)
+        on_target = hit.is_valid() & (hit.shape == target)
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
+        return _facing(shape, settings, si), on_target
+
+    cells = PixelCells.grid((per_axis + 1) // 2)
+    return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
+
+
+def _facing(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    return _face_camera(si) if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF" else si
+
+
 def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     """Turn shading frames towards the camera, as the `twosided` plugin does: (x, y, z) -> (x, y, -z)."""
     back = si.wi.z < 0.0
@@ -189,6 +224,7 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         return []
     count = dr.width(position)
     sampler = fresh_sampler(settings.seed + 0x51ED270, count)
+    number, tile = dr.arange(mi.UInt32, count), position // TILE**2
     proposal = settings.proposal
     front = si.wi.z > 0.0
     # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
@@ -198,9 +234,11 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     if extended:
         table = own_memory(np.array(extended), mi.UInt32)
         turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, 1 + int(dr.max(position)[0])).next_1d() * 65536)
-        pick = (dr.arange(mi.UInt32, count) + dr.gather(mi.UInt32, turns, position)) % len(extended)
+        pick = (number + dr.gather(mi.UInt32, turns, position)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
-        ds, value = emitter.sample_direction(si, sampler.next_2d(), front)
+        # one light's samples follow each other in the sequence
+        u = even_points(2, number // len(extended), tile, settings.seed + 0x51ED270)
+        ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
@@ -208,7 +246,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         mis = light_density / (light_density + proposal.density(si.wi, wo))
         lanes.append(_compress(hits, wo, value * (share * mis / choice), lit))
 
-    wo = proposal.sample(si.wi, sampler.next_1d(), sampler.next_2d())
+    lobe, *u = even_points(3, number, tile, settings.seed + 0x51ED270)
+    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u))
     density = proposal.density(si.wi, wo)
     valid = front & (wo.z > 0.0) & (density > 0.0)
     ray = si.spawn_ray(si.to_world(wo))

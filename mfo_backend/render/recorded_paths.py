@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..material.own_memory import own_memory
 from ..types.image import Pixels
+from .primary_rays import TILE, quarter
 
 ENOUGH_PARTS = 4096  # kernel lanes that keep the vector units of a few cores busy
 BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
@@ -184,9 +185,15 @@ class RecordedPaths:
         member = np.arange(len(self.pixel)) if keep is None else np.flatnonzero(keep)
         return LaneGroups(member, np.arange(len(member) + 1), self.pixel[member], self.first)
 
-    def tile_groups(self, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
-        """One group for each tile with a covered pixel, or for those whose covered pixels are all in `keep`."""
-        begin = np.flatnonzero(np.diff(self.tile, prepend=-1))
-        first = np.append(begin, len(self.tile))
+    def tile_groups(self, keep: NDArray[np.bool_] | None = None, side: int = TILE) -> LaneGroups:
+        """One group for each tile with a covered pixel, or for those whose covered pixels are all in `keep`.
+
+        With a `side` of half a tile's it is one for each of its quarters.
+        """
+        if side not in (TILE, TILE // 2):
+            raise ValueError(f"side is {side}: give {TILE} or {TILE // 2} pixels.")
+        number = self.tile if side == TILE else 4 * self.tile + quarter(self.pixel, self.constant.shape[1])
+        begin = np.flatnonzero(np.diff(number, prepend=-1))
+        first = np.append(begin, len(number))
         groups = LaneGroups(np.arange(len(self.pixel)), first, self.pixel, self.first)
         return groups if keep is None else groups.take(np.flatnonzero(np.logical_and.reduceat(keep, begin)))

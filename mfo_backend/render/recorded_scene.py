@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
 from ..types.parameter import Value
+from .highlight_cells import Highlights
 from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import tile_order, widened
@@ -32,6 +33,8 @@ from .recorded_paths import LaneGroups, RecordedPaths
 # noise of 64 samples a pixel.
 NEGLIGIBLE_INDIRECT = 0.005
 MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
+# How finely highlights are recorded (`Highlights.share`): 0.3 % and 0.1 % of the picture at roughness 0.05
+SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 # Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
 MOST_RAYS = 12_000_000
 BYTES_PER_RAY = 272
@@ -62,6 +65,7 @@ class RecordedScene:
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
         self._covered = covered
+        self._taken = 0  # bytes for the rays of the largest recording so far
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
@@ -91,12 +95,19 @@ class RecordedScene:
         return SceneNeeds(True, depth, ())
 
     def record(
-        self, vector: NDArray[np.float64], *, grid: int | NDArray[np.int64], seed: int, near: bool
+        self,
+        vector: NDArray[np.float64],
+        *,
+        grid: int | NDArray[np.int64],
+        seed: int,
+        near: bool,
+        highlights: Highlights | None = None,
     ) -> RecordedPaths:
         """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
         that of the material `vector`.
 
-        `near` shapes the proposal for that material instead of for any.
+        `near` shapes the proposal for that material instead of for any and resolves highlights more finely, unless
+        `highlights` says how.
         """
         self.renderer.show(vector)
         proposal = DefensiveProposal()
@@ -110,8 +121,9 @@ class RecordedScene:
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
         stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
+        highlights = highlights or Highlights(share=SHARE_NEAR if near else SHARE_FIRST)
         settings = RecordSettings(
-            grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths, pixels
+            grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths, pixels, highlights
         )
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
@@ -132,9 +144,14 @@ class RecordedScene:
             pixels = self._near_target
             while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
                 stride += 1
-        require_memory(
-            count * BYTES_PER_RAY, what="Tracing the light of this picture", cure="use a smaller picture or free some"
-        )
+        needed = count * BYTES_PER_RAY
+        if needed > self._taken:  # Dr.Jit keeps what an earlier recording has freed
+            require_memory(
+                needed - self._taken,
+                what="Tracing the light of this picture",
+                cure="use a smaller picture or free some",
+            )
+            self._taken = needed
         return stride, pixels
 
     @cached_property
@@ -159,6 +176,13 @@ class RecordedScene:
             return table
 
         return at
+
+    def effective_samples(
+        self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
+    ) -> NDArray[np.float64]:
+        """How many equal samples the light of each group is worth at a vector, shape (g,)."""
+        self.renderer.passes += len(groups.pixels) / max(len(paths.pixel), 1)
+        return self.jacobian.effective_samples(vector, paths, groups)
 
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table

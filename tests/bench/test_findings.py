@@ -115,9 +115,10 @@ def test_a_table_is_markdown_html_and_csv():
 
 def test_hard_cases_are_counted_with_their_guards(tmp_path):
     runs = [
-        {"case": "mirror", "seed": 0, "solved": True, "error": 0.01, "finite": True, "passes": 10.0, "guards": []},
+        {"case": "mirror", "seed": 0, "solved": True, "error": 0.01, "finite": True, "passes": 10.0, "guards": [],
+         "wrong": ["specular"]},
         {"case": "mirror", "seed": 1, "solved": False, "error": 0.5, "finite": True, "passes": 30.0,
-         "guards": ["Fireflies are left out: 12 pixels.", "Kept 3 values."]},
+         "guards": ["Fireflies are left out: 12 pixels.", "Kept 3 values."], "wrong": ["roughness"]},
         {"case": "tiny", "seed": 0, "solved": True, "error": 0.0, "finite": False, "passes": 5.0, "guards": []},
     ]  # fmt: skip
     assert hard_section(tmp_path) is None
@@ -126,8 +127,8 @@ def test_hard_cases_are_counted_with_their_guards(tmp_path):
     table = hard_section(tmp_path)
     assert table is not None
     assert table.rows == [
-        ("mirror", "2", "1 (50%)", "0.5", "20", "0", "Fireflies are left out (1); Kept values (1)"),
-        ("tiny", "1", "1 (100%)", "0", "5", "1", "–"),
+        ("mirror", "2", "1 (50%)", "0.5", "20", "0", "1", "Fireflies are left out (1); Kept values (1)"),
+        ("tiny", "1", "1 (100%)", "0", "5", "1", "–", "–"),
     ]
     (tmp_path / "hard.jsonl").write_text('{"case": "tiny"}\n')
     with pytest.raises(BadInputError, match="no hard case"):

@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mfo_backend.bench.hard_cases import HARD_CASES, write_hard_scene
-from mfo_backend.bench.hard_runs import HardRun, hard_table, run_hard_case
+from mfo_backend.bench.hard_runs import HardRun, hard_table, run_hard_case, wrongly_determined
+from mfo_backend.material.mitsuba_parameters import MITSUBA_PRINCIPLED
+from mfo_backend.types.certainty import Certainty, Level
 
 
 def test_every_hard_case_is_there():
@@ -42,8 +46,23 @@ def test_small_hard_cases(name, tmp_path):
 
 def test_the_table_counts_failures_and_names_guards():
     runs = [
-        HardRun("black", 0, True, 0.001, 0.5, True, 40.0, ()),
+        HardRun("black", 0, True, 0.001, 0.5, True, 40.0, (), ("roughness",)),  # solved: the picture does not tell
         HardRun("black", 1, False, np.inf, 0.5, False, 60.0, ("The light was recorded 2 times: it moved.",)),
+        HardRun("black", 2, False, 0.2, 0.5, True, 70.0, (), ("roughness",)),
     ]
     line = hard_table(runs).splitlines()[-1]
-    assert line == "| black | 2 | 50 % | inf | 50 | 1 | The light was recorded times (1) |"
+    assert line == "| black | 3 | 33 % | inf | 60 | 1 | 1 | The light was recorded times (1) |"
+
+
+def test_a_determined_value_is_wrong_beyond_three_deviations_and_what_determined_promises():
+    table = MITSUBA_PRINCIPLED
+    truth = {"base_color": (0.2, 0.5, 0.9), "roughness": 0.3, "metallic": 0.5, "specular": 1.5}
+    found = {"base_color": (0.2, 0.5, 0.84), "roughness": 0.315, "metallic": 0.9, "specular": 0.999}
+    certainty = {
+        "base_color": Certainty((0.001, 0.001, 0.015), Level.DETERMINED),  # one channel by four deviations
+        "roughness": Certainty((0.001,), Level.DETERMINED),  # by fifteen, and less than an eye sees
+        "metallic": Certainty((0.1,), Level.WEAK),
+        "specular": Certainty((0.001,), Level.DETERMINED),  # the truth lies outside the box
+    }
+    result = SimpleNamespace(certainty=certainty, recovered=found)
+    assert wrongly_determined(result, truth, table) == ("base_color",)

@@ -17,6 +17,7 @@ from mfo_backend.cli import machine_checks, optional_checks
 from mfo_backend.cli.machine_checks import check_machine
 from mfo_backend.cli.optional_checks import check_optional
 from mfo_backend.render.llvm import LlvmVerdict
+from mfo_backend.render.memory import MemoryLeft
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -46,7 +47,7 @@ def test_it_says_what_works_here() -> None:
     assert report["works"] == ("problem" not in states.values())
     assert done.returncode == (0 if report["works"] else 3)
     wanted = {"Python", "mitsuba", "drjit", "OpenEXR", "Mitsuba variant", "GPU", "threads", "cache", "kernel cache"}
-    wanted |= {"judges", "LPIPS weights", "Octave or MATLAB", "HDR-VDP-3"}
+    wanted |= {"memory", "judges", "LPIPS weights", "Octave or MATLAB", "HDR-VDP-3"}
     assert wanted <= set(states)
     for check in report["checks"]:
         assert check["found"]
@@ -178,3 +179,22 @@ def test_lists_what_is_missing_without_numpy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60)
     assert "HDR-VDP-3" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("left", "state", "words"),
+    [
+        ([], "ok", "not told by this system"),
+        (
+            [MemoryLeft(8_000_000_000, "on this machine"), MemoryLeft(10**12, "there")],
+            "ok",
+            "8.0 GB left on this machine",
+        ),
+        ([MemoryLeft(500_000_000, "in this container")], "warning", "0.5 GB left in this container"),
+    ],
+)
+def test_memory_that_is_left(monkeypatch: pytest.MonkeyPatch, left: list[MemoryLeft], state: str, words: str) -> None:
+    monkeypatch.setattr(machine_checks, "memory_left", lambda: left)
+    check = machine_checks._memory()
+    assert (check.state, check.found) == (state, words)
+    assert ("raise the limit" in check.cure) == (state == "warning")

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ def main() -> None:
     chosen = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory(prefix="mfo-heavy-") as folder:
-        for row in (*large_pictures(Path(folder), PIXELS), *many_triangles(Path(folder), SEGMENTS)):
+        for row in chain(large_pictures(Path(folder), PIXELS), many_triangles(Path(folder), SEGMENTS)):
             rows.append(row)
             print(json.dumps(row), flush=True)
     chosen.record.parent.mkdir(parents=True, exist_ok=True)
@@ -39,10 +40,11 @@ def main() -> None:
 
 
 def large_pictures(folder: Path, size: int) -> Iterator[dict[str, Any]]:
-    """Fits of a sphere to a reference of `size` x `size` pixels."""
-    for light, text, preset in (("point light", POINT.format(40.0), "fast"), ("sky", SKY.format(1.0), "balanced")):
-        path = job(folder, size, text, preset=preset)
-        yield measured(f"fit, {size}x{size}, {light}, {preset}", "-m", "mfo_backend", "run", path, "--progress", "none")
+    """Fits of a sphere to references of `size` and of half of it squared pixels."""
+    cases = (("point light", POINT.format(40.0), "fast", size), ("sky", SKY.format(1.0), "balanced", size // 2))
+    for light, text, preset, side in cases:
+        path = job(folder, side, text, preset=preset)
+        yield measured(f"fit, {side}x{side}, {light}, {preset}", "-m", "mfo_backend", "run", path, "--progress", "none")
 
 
 def many_triangles(folder: Path, segments: int, size: int = 128) -> Iterator[dict[str, Any]]:

@@ -176,6 +176,7 @@ def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
     renderer = load(tmp_path, size=64)
     from mfo_backend.render.traced_paths import TracedPaths
 
+    monkeypatch.setattr("mfo_backend.fit.course._PREVIEW_SECONDS", np.inf)  # they come by the clock
     launch, launches, passes = TracedPaths._launch, [], []
     monkeypatch.setattr(TracedPaths, "_launch", lambda *given: launches.append(given) or launch(*given))
     for truth in ({}, {"roughness": 0.1, "ior": 1.6}, {"roughness": 0.5, "ior": 1.8, "base_color": (0.4, 0.5, 0.6)}):
@@ -183,7 +184,7 @@ def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
         before = renderer.passes
         result, _ = fit(renderer, reference)
         passes.append(result.passes - before)
-    # 28, 56 and 25, of which verification is 2, in 70 launches when this was written (43, 68, 54 in 85 before samples
-    # were pooled over all sizes of tiles): counts that no machine changes; a quarter more is a change worth a look
-    assert np.sum(passes) < 140.0, passes
-    assert len(launches) < 90
+    # 30, 56 and 36, of which verification is 2, in 85 launches when this was written (43, 68 and 54 before samples were
+    # pooled over all sizes of tiles): counts that no machine changes; a fifth more is a change worth a look
+    assert np.sum(passes) < 146.0, passes
+    assert len(launches) < 102

@@ -94,3 +94,13 @@ def test_weighted_residual_has_its_slope_and_bounds_what_one_outlier_counts():
     firefly_value, firefly_slope = residual(REFERENCE + 1000.0)
     assert (firefly_value * firefly_slope < 5.0 * 0.1).all()
     assert (firefly_value < 20.0).all()
+
+
+def test_the_log_of_a_picture_that_is_black_but_for_a_highlight_does_not_look_into_the_black():
+    reference = np.full((100, 3), 1e-4, np.float32)
+    reference[:5] = 2.0
+    residual = log_residual(reference)
+    brighter = reference.copy()
+    brighter[5:] *= 5.0  # by four thousandths of the mean
+    # on the curve of the median itself it would be log(16 / 4) = 1.4, fifteen times a tenth more of the highlight
+    assert np.abs(residual(brighter)[0]).max() < 0.15

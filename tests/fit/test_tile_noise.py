@@ -26,10 +26,11 @@ def module():
     return SimpleNamespace(tile_noise=tile_noise.tile_noise, tile_order=tile_order)
 
 
-def recording(module):
+def recording(module, side=4):
     """All pixels of a picture as a recording, and its tiles as groups."""
-    pixel, tile = module.tile_order(SIZE, SIZE)
-    first = np.append(np.flatnonzero(np.diff(tile, prepend=-1)), len(tile))
+    pixel, _ = module.tile_order(SIZE, SIZE)
+    row, column = np.divmod(pixel, SIZE)
+    first = np.append(np.flatnonzero(np.diff(row // side * SIZE + column // side, prepend=-1)), len(pixel))
     groups = SimpleNamespace(pixels=pixel, first=first, __len__=lambda: len(first) - 1)
     return SimpleNamespace(pixel=pixel), groups
 
@@ -39,17 +40,19 @@ def smooth_picture() -> np.ndarray:
     return 0.3 + 0.5 * x[..., None] * np.array([1.0, 0.8, 0.6]) + 0.4 * np.exp(-30 * ((x - 0.5) ** 2 + y**2)[..., None])
 
 
+@pytest.mark.parametrize("side", [2, 4])
 @pytest.mark.parametrize("relative", [0.02, 0.4])
-def test_finds_the_deviation_of_tiles_below_a_misfit(module, relative):
-    paths, groups = recording(module)
+def test_finds_the_deviation_of_tiles_below_a_misfit(module, relative, side):
+    paths, groups = recording(module, side)
+    assert len(groups.first) - 1 == (SIZE // side) ** 2
     true = smooth_picture()
     rng = np.random.default_rng(3)
     # three times as noisy in the right half, and a model that is 5 % off everywhere
     noise = relative * true * np.where(np.arange(SIZE) < SIZE // 2, 1.0, 3.0)[None, :, None]
     reference = (true + noise * rng.normal(size=true.shape)).astype(np.float32)
     model = (1.05 * true).reshape(-1, 3)[paths.pixel].astype(np.float32)
-    found = module.tile_noise(reference, model, paths, groups, np.ones(SIZE * SIZE, bool))
-    mean = np.sqrt(np.add.reduceat(np.square(noise).reshape(-1, 3)[paths.pixel], groups.first[:-1])) / 16.0
+    found = module.tile_noise(reference, model, paths, groups, np.ones(SIZE * SIZE, bool), side)
+    mean = np.sqrt(np.add.reduceat(np.square(noise).reshape(-1, 3)[paths.pixel], groups.first[:-1])) / side**2
     column = paths.pixel[groups.first[:-1]] % SIZE
     for half in (column < SIZE // 2 - 12, column > SIZE // 2 + 12):
         # 24 neighbours x 24 pairs leave 6 % a tile; radiance varies within the neighbourhood

@@ -8,7 +8,7 @@ import pytest
 
 from mfo_backend.fit.tile_pools import TilePools
 from mfo_backend.fit.tile_rows import TileRows
-from mfo_backend.solve.noisy_least_squares import cautious_step
+from mfo_backend.solve.noisy_least_squares import SafeMatrix, cautious_step, cross_equations
 
 SIDE, WIDTH = 32, np.ones(2)
 TRUE = np.array([0.2, -0.1])
@@ -66,6 +66,20 @@ def test_the_expected_error_is_that_of_the_solutions():
         stated.append(pools.expected_error(equations, noise, WIDTH))
         found.append(np.mean((columns @ (step - TRUE)) ** 2) / 0.3**2)
     assert 0.4 < np.median(stated) / np.mean(found) < 2.0  # 40 solutions, and the weights are those of noisy tiles
+
+
+def test_the_expected_error_counts_what_tiles_do_not_show():
+    rng = np.random.default_rng(0)
+    picture, smooth = scene(False)
+    checks = np.tile(np.indices((SIDE, SIDE)).sum(axis=0).reshape(-1, 1, 1) % 2 * 4 - 2, (1, 3, 2))
+    columns = smooth + checks * smooth  # four times the square, all of it gone in tiles
+    reference = picture + 0.3 * rng.normal(size=picture.shape)
+    pools = pools_of(reference.reshape(SIDE, SIDE, 3).astype(np.float32))
+    pools.add([sample(rng, picture, columns, 0.3, 3.0) for _ in range(30)])
+    tile = cross_equations(pools.pools[2].gram())
+    noise = pools.pools[2].gradient_noise(3)
+    in_tiles = SafeMatrix(tile, WIDTH).expected_error(noise) / (2.0 * cross_equations(pools.pools[0].gram()).cost)
+    assert pools.expected_error(tile, noise, WIDTH) == pytest.approx(5.0 * in_tiles, rel=0.4)
 
 
 def test_too_few_samples_promise_nothing():

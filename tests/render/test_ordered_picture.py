@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +15,7 @@ import pytest
 
 from mfo_backend.render.renderer import load_renderer
 
-from ..stability.test_extremes import POINT, SCENE, SKY
+from ..stability.test_extremes import POINT, ROOT, SCENE, SKY
 
 SPHERE = '<shape type="sphere" id="target"><ref id="b"/></shape>'
 CROP = (
@@ -55,22 +59,37 @@ def test_a_cropped_film_is_the_cut_out(tmp_path: Path, rfilter: str) -> None:
     np.testing.assert_allclose(image, of_film(renderer, 4, 16), rtol=2e-6, atol=2e-6)
 
 
-@pytest.mark.parametrize("rfilter", ["box", "gaussian"])
-def test_the_bits_do_not_depend_on_the_threads(tmp_path: Path, rfilter: str) -> None:
-    import drjit as dr
+def digests(threads: int, folder: Path) -> list[str]:
+    """Of two pictures with each filter."""
+    from mfo_backend.render.llvm import configure_llvm, needs_llvm
 
-    renderer = load(tmp_path, rfilter)
-    pictures = []
-    before = dr.thread_count()
-    try:
-        for threads in (1, 2, 4, 4, 4):
-            dr.set_thread_count(threads)
-            pictures.append(renderer.image(renderer.start, seed=7, spp=6))
-    finally:
-        dr.set_thread_count(before)
-    for other in pictures[1:]:
-        np.testing.assert_array_equal(pictures[0], other)
-    assert np.ptp(pictures[0]) > 0.1
+    if needs_llvm():
+        configure_llvm()
+    from mfo_backend.render.variant import load_variant, use_threads
+
+    load_variant()
+    use_threads(threads)
+    found = []
+    for rfilter in ("box", "gaussian"):
+        renderer = load(folder, rfilter)
+        pictures = [renderer.image(renderer.start, seed=7, spp=6) for _ in range(2)]
+        assert np.ptp(pictures[0]) > 0.1
+        found += [hashlib.sha256(picture.tobytes()).hexdigest() for picture in pictures]
+    return found
+
+
+def test_the_bits_do_not_depend_on_the_threads(tmp_path: Path) -> None:
+    said = []
+    for threads in (1, 4):  # processes of their own: a pool that changes its size while others use it is another risk
+        words = [sys.executable, "-m", "tests.render.test_ordered_picture", str(threads), str(tmp_path)]
+        done = subprocess.run(
+            words, cwd=ROOT, env=dict(os.environ, PYTHONPATH=str(ROOT)), capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+        said.append(done.stdout.split())
+    box, gaussian = said[0][0], said[0][2]
+    assert said == [[box, box, gaussian, gaussian]] * 2
+    assert box != gaussian
 
 
 def test_parts_have_samples_of_their_own_and_add_up_to_the_picture(
@@ -111,3 +130,8 @@ def test_the_pullback_follows_the_parts(tmp_path: Path, monkeypatch: pytest.Monk
         expected.append(np.sum((high - low) * weight) / 0.02)
     # as in test_mitsuba_renderer.py: the step (h^2) and the rounding of float32
     np.testing.assert_allclose(found, expected, rtol=5e-3, atol=1e-3 * np.abs(expected).max())
+
+
+if __name__ == "__main__":
+    print(*digests(int(sys.argv[1]), Path(sys.argv[2])), flush=True)
+    os._exit(0)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,31 @@ def test_tiles_are_means_of_pixels(recording):
     flat = image.reshape(-1, 3)[pixels.pixels]
     means = np.stack([flat[a:b].mean(axis=0) for a, b in zip(tiles.first[:-1], tiles.first[1:], strict=True)])
     np.testing.assert_allclose(tiles.average(image), means, rtol=1e-5)
+
+
+@pytest.mark.parametrize("side", [2, 4])
+def test_effective_samples_are_those_of_the_lanes(recording, side):
+    from mfo_backend.render.recorded_paths import LaneGroups
+
+    scene, paths = recording
+    x, tiles = middle(scene.renderer.table), paths.tile_groups(side=side)
+    each = np.arange(paths.lanes)
+    lanes = LaneGroups(each, np.arange(paths.lanes + 1), each, np.arange(paths.lanes + 1))
+    light = scene.jacobian(x, paths, lanes)[:, :, 0].mean(axis=1).astype(np.float64)
+    first = paths.first[tiles.first]  # pixels of a tile follow each other
+    expected = [light[a:b].sum() ** 2 / (light[a:b] ** 2).sum() for a, b in pairwise(first)]
+    np.testing.assert_allclose(scene.effective_samples(x, paths, tiles), expected, rtol=1e-3)
+
+
+def test_quarters_of_tiles_are_two_pixels_wide_and_hold_all(recording):
+    _, paths = recording
+    quarters = paths.tile_groups(side=2)
+    for a, b in pairwise(quarters.first):
+        row, column = np.divmod(quarters.pixels[a:b], 20)
+        assert len(set(row // 2)) == len(set(column // 2)) == 1
+    assert len(quarters.pixels) == len(paths.pixel)
+    with pytest.raises(ValueError, match="side is 3"):
+        paths.tile_groups(side=3)
 
 
 def test_chosen_groups_equal_the_rows_of_all(recording):

@@ -89,7 +89,9 @@ def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
 
 def test_delta_lights_take_one_lane_for_each_ray_and_36_bytes(tmp_path):
     renderer, scene = recorded_scene(tmp_path, POINT)
-    paths = scene.record(renderer.start, grid=2, seed=0, near=False)
+    from mfo_backend.render.highlight_cells import Highlights
+
+    paths = scene.record(renderer.start, grid=2, seed=0, near=False, highlights=Highlights(most=0))
     covered = int(renderer.target_mask().sum())
     assert not scene.needs.sampled
     assert paths.lanes <= 4 * covered
@@ -108,22 +110,24 @@ def test_a_large_picture_is_recorded_by_tiles(tmp_path, monkeypatch):
 
 def test_many_rays_beside_a_small_target_are_left_out(tmp_path, monkeypatch):
     renderer, scene = recorded_scene(tmp_path, POINT)
-    everything = scene.record(renderer.start, grid=3, seed=0, near=False)
-    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 9 * int(scene._near_target.sum()))
+    from mfo_backend.render.highlight_cells import Highlights
+
+    uniform = Highlights(most=0)
+    everything = scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform)
+    monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 16 * int(scene._near_target.sum()))
     from mfo_backend.render import record_paths  # needs the variant
 
     taken = []
     original = record_paths.primary_rays
-    monkeypatch.setattr(record_paths, "primary_rays", lambda *words: taken.append(original(*words)) or taken[-1])
-    near = scene.record(renderer.start, grid=3, seed=0, near=False)
-    rays = len(np.array(taken[0].pixel_position))
-    assert rays == 9 * scene._near_target.sum() < 9 * scene._near_target.size
+    monkeypatch.setattr(record_paths, "primary_rays", lambda *a, **b: taken.append(original(*a, **b)) or taken[-1])
+    near = scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform)
+    assert len(np.unique(np.array(taken[0].pixel_position))) == scene._near_target.sum() < scene._near_target.size
     for name in ("wi", "wo", "weight"):
         np.testing.assert_array_equal(np.array(getattr(everything, name)), np.array(getattr(near, name)))
     np.testing.assert_array_equal(everything.pixel, near.pixel)
     np.testing.assert_array_equal(everything.constant, near.constant)
     monkeypatch.setattr("mfo_backend.render.recorded_scene.MOST_RAYS", 1000)
-    assert 0 < scene.record(renderer.start, grid=3, seed=0, near=False).lanes <= 1000
+    assert 0 < scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform).lanes <= 1000
 
 
 def test_a_recording_beyond_the_memory_is_refused_before_it_begins(tmp_path, monkeypatch):
@@ -134,6 +138,12 @@ def test_a_recording_beyond_the_memory_is_refused_before_it_begins(tmp_path, mon
         BadInputError, match=r"needs about \d+ MB of memory and 0 MB are left on this machine: use a sm"
     ):
         scene.record(renderer.start, grid=3, seed=0, near=False)
+    left[0] = MemoryLeft(10**9, "on this machine")
+    scene.record(renderer.start, grid=3, seed=0, near=False)
+    left[0] = MemoryLeft(0, "on this machine")  # the next one takes what the first has given back
+    assert scene.record(renderer.start, grid=3, seed=1, near=False).lanes > 0
+    with pytest.raises(BadInputError, match="use a smaller picture"):
+        scene.record(renderer.start, grid=4, seed=1, near=False)
 
 
 def test_the_same_seed_gives_the_same_recording(tmp_path):
@@ -193,14 +203,10 @@ def test_a_texture_is_refused(tmp_path):
 @pytest.mark.parametrize("rfilter", ["box", "gaussian"])
 def test_rays_far_from_the_target_are_left_out_and_change_nothing(tmp_path, rfilter):
     renderer, scene = recorded_scene(tmp_path, AREA + FLOOR, depth=4, rfilter=rfilter, size=48)
-    from mfo_backend.render.primary_rays import primary_rays
-
     x = renderer.table.pack(VALUES)
     few = scene.record(x, grid=4, seed=3, near=False)
     near = scene._near_target
     assert 0.3 < near.mean() < 0.8
-    sensor = renderer.scene.sensors()[0]
-    assert len(np.array(primary_rays(sensor, np.where(near, 4, 0), 3).pixel_position)) == 16 * near.sum()
     scene._near_target = np.ones_like(near)
     every = scene.record(x, grid=4, seed=3, near=False)
     assert few.lanes == every.lanes

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 if TYPE_CHECKING:
     from .lamp import Lamp  # needs a variant
@@ -23,9 +24,15 @@ class SceneLamps:
 
     def __init__(self, scene: mi.Scene) -> None:
         self.lamps: list[tuple[Lamp, Any]] = []
-        for index, emitter in enumerate(scene.emitters()):
-            if hasattr(emitter, "crossing") and not mi.has_flag(emitter.flags(), DELTA):
-                self.lamps.append((emitter, dr.opaque(mi.Float, float(scene.pdf_emitter(mi.UInt32(index))[0]))))
+        met = [
+            (index, emitter)
+            for index, emitter in enumerate(scene.emitters())
+            if hasattr(emitter, "crossing") and not mi.has_flag(emitter.flags(), DELTA)
+        ]
+        if met:
+            # one number for all where they are equal
+            chances = np.broadcast_to(scene.pdf_emitter(mi.UInt32([index for index, _ in met])).numpy(), len(met))
+            self.lamps = [(lamp, dr.opaque(mi.Float, float(c))) for (_, lamp), c in zip(met, chances, strict=True)]
 
     def __bool__(self) -> bool:
         return bool(self.lamps)

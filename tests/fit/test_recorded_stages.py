@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The guards of a recorded fit's stages, each against a fit without it."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from mfo_backend.render.renderer import load_renderer
+from tests.render.scenes import AREA, SKY, write_scene
+
+NAMES = ["base_color", "roughness", "metallic", "specular"]
+TRUTH = {"base_color": (0.8, 0.5, 0.3), "roughness": 0.12, "metallic": 0.9, "specular": 0.5}
+FAR = {"base_color": (0.3, 0.5, 0.8), "roughness": 0.45, "metallic": 0.2, "specular": 0.5}
+
+
+@pytest.fixture
+def refined(tmp_path, monkeypatch):
+    """Relative error of `refine` from a far start with these settings of its guards, and the number of recordings."""
+    renderer = load_renderer(
+        write_scene(tmp_path, AREA + SKY, size=40), "target", model="mitsuba_principled", parameters=NAMES
+    )
+    from mfo_backend.fit import recorded_stages
+    from mfo_backend.fit.course import Course
+    from mfo_backend.fit.residuals import RelativeResidual, WeightedResidual
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    table, mask = renderer.table, renderer.target_mask()
+    reference, true = (renderer.image(table.pack(TRUTH), seed=seed, spp=256) for seed in (5, 9))
+
+    def run(**guards):
+        for name, value in guards.items():
+            monkeypatch.setattr(recorded_stages, name, value)
+        course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
+        scene = RecordedScene(renderer, int(mask.sum()))
+        fit = recorded_stages.RecordedFit(scene, reference, mask, recorded_stages.RecordedPlan(), 1, course)
+        fit.paths = None  # `refine` makes its own
+        solution, _ = fit.refine(table.pack(FAR), RelativeResidual, WeightedResidual)
+        found = renderer.image(solution.x, seed=9, spp=256)
+        return float(np.sqrt(np.mean((found - true)[mask] ** 2) / np.mean(true[mask] ** 2))), fit.recordings
+
+    return run
+
+
+NEVER = float("inf")
+
+
+def test_a_recording_that_is_too_old_is_made_anew(refined):
+    stale, recordings = refined(MOVED=NEVER, FEWER=NEVER)
+    assert recordings == 1
+    assert stale > 0.05  # a highlight of roughness 0.12, seen by directions for 0.45
+    # either guard alone sees it
+    for guards in ({"MOVED": 0.15, "FEWER": NEVER}, {"MOVED": NEVER, "FEWER": 1.5}):
+        error, recordings = refined(**guards)
+        assert recordings > 1, guards
+        assert error < 0.3 * stale, guards
