@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from .. import __version__
+from ..render.cache_folder import use_kernel_cache
 from ..types.errors import MfoError
 from ..types.status import Status
 
@@ -35,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     # NumPy's own threads would fight with Dr.Jit's; read when NumPy is first imported
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    use_kernel_cache()
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         parsed = _parser(words).parse_args(words)  # loads the command's module and what that needs

@@ -8,6 +8,7 @@ import contextlib
 import os
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 from ..job.fit_scene import Fitter, fit_scene
 from ..job.progress import EventWriter
@@ -41,17 +42,26 @@ def add_trust_option(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the job; the exit code is its status'."""
-    return leave(work(arguments, fit_scene))
+    """Run the job and end the process with its status' exit code.
+
+    Nothing is left to do: Python would take a tenth of a second to take the renderer down, and after a cancel native
+    code may still be at work.
+    """
+    end_process(work(arguments, fit_scene))
 
 
 def leave(status: Status) -> int:
     """The exit code of a job; after a cancel the process ends here, because native code may still be at work."""
     if status is Status.CANCELLED:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status.exit_code)
+        end_process(status)
     return status.exit_code
+
+
+def end_process(status: Status) -> NoReturn:
+    """End this process at once with the status' exit code."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status.exit_code)
 
 
 def work(arguments: argparse.Namespace, fitter: Fitter, *, orphan_grace: float = ORPHAN_GRACE) -> Status:

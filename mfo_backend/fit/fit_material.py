@@ -24,11 +24,15 @@ from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_
 
 @dataclass(frozen=True)
 class FitOutcome:
-    """The result of a fit with the pictures of its start and its end, scene-linear and under one seed."""
+    """The result of a fit with the pictures of its start and its end, scene-linear and under one seed.
+
+    `result_halves` are two pictures of the end whose random numbers have nothing in common, where there are such.
+    """
 
     result: FitResult
     start_image: Pixels = field(repr=False)
     result_image: Pixels = field(repr=False)
+    result_halves: tuple[Pixels, Pixels] | None = field(default=None, repr=False)
 
 
 def fit_material(

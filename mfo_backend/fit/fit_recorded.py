@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -26,8 +27,7 @@ from .picture_judge import NOISY, PictureJudge
 from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
-from .stages import Candidate
-from .verification import VERIFY_STREAM, check_reference, picture_errors
+from .verification import check_reference, picture_errors, verify_later
 from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
@@ -75,7 +75,9 @@ def fit_recorded(
     named = None if settings.losses is None else settings.stage_names(reference.encoding)
     measure = named[-1] if named else "flip-ldr" if ldr else "flip-hdr"
     light = linear_pixels(reference, view)
-    scene = RecordedScene(renderer, int(mask.sum()))
+    scene = RecordedScene(renderer, int(mask.sum()))  # refuses glass, so it comes first
+    # the start's picture is rendered while the kernels of the fit are compiled
+    start = verify_later(renderer, renderer.start, seed=settings.seed, spp=settings.verify_spp)
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
     names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
@@ -120,9 +122,10 @@ def fit_recorded(
         if counts is None:
             counts = _misfit(fit, last, _censored(log_residual, reference, view))
 
-    seed = settings.seed ^ VERIFY_STREAM
-    spp = min(CANCELLED_SPP, settings.verify_spp) if should_stop() else settings.verify_spp
-    pictures = [Candidate(end.x, renderer.image(end.x, seed=seed, spp=spp)) for end in ends]
+    stopped = should_stop()
+    spp = min(CANCELLED_SPP, settings.verify_spp) if stopped else settings.verify_spp
+    verify = partial(verify_later, renderer, seed=settings.seed, spp=spp)
+    pictures = [(verify(renderer.start) if stopped else start)(), *(verify(end.x)() for end in ends[1:])]
     listener(Preview(pictures[-1].image))
     counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
@@ -141,7 +144,7 @@ def fit_recorded(
         notes=notes,
         weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image)
+    return FitOutcome(result, pictures[0].image, pictures[best].image, pictures[best].halves)
 
 
 def best_of(errors: Sequence[float]) -> int:

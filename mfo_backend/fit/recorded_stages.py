@@ -21,6 +21,7 @@ from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
+from .remembered import Remembered
 from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual, normal_equations
 from .tile_noise import TileNoise, tile_noise
 
@@ -131,6 +132,8 @@ class RecordedFit:
         self.scene, self.reference, self.mask = scene, reference, mask
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
+        self._groups: dict[int, LaneGroups] = {}  # tiles of the present recording by side
+        self._tiles: dict[LaneGroups, Remembered] = {}
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
@@ -159,7 +162,20 @@ class RecordedFit:
         residual = make(groups.average(self.calm if calm else self.reference))
         if self.clipped is not None:
             residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
-        return Problem(self.scene.evaluator(self.paths, groups), residual, groups)
+        return Problem(self._evaluator(groups), residual, groups)
+
+    def tiles(self, side: int) -> LaneGroups:
+        """All tiles of this side of the present recording; their evaluations are remembered between problems."""
+        if side not in self._groups:
+            groups = all_groups(self.paths, side)
+            self._groups[side] = groups
+            self._tiles[groups] = Remembered(self.scene.evaluator(self.paths, groups))
+        return self._groups[side]
+
+    def _evaluator(self, groups: LaneGroups) -> ImageAndJacobian:
+        if groups in self._tiles:
+            return self._tiles[groups]
+        return Remembered(self.scene.evaluator(self.paths, groups))
 
     def start_from_nothing(self, make: MakeResidual) -> list[Solution]:
         """Stages `scan` and `start`: solutions from the scan's nodes, the scene's material and a random one.
@@ -297,19 +313,20 @@ class RecordedFit:
 
     def _own_variance(self, x: Vector) -> float:
         """Mean over the tiles of one over their effective number of samples: the recording's own relative variance."""
-        samples = self.scene.effective_samples(x, self.paths, all_groups(self.paths, TILE))
+        samples = self.scene.effective_samples(x, self.paths, self.tiles(TILE))
         return float(np.mean(1.0 / samples[samples > 0.0])) if samples.any() else 0.0
 
     def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
+        self._groups, self._tiles = {}, {}
         self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
         self.recordings = number
 
     def _refine_sampled(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
     ) -> tuple[Solution, Problem]:
-        groups = all_groups(self.paths, self.plan.side_last)
+        groups = self.tiles(self.plan.side_last)
         if weigh is None:
             problem = self.problem(groups, make)
             return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
@@ -323,12 +340,14 @@ class RecordedFit:
         return solve(solve(start)[0].x)
 
     def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
-        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)[:, :, 0]
-        return tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior, side)
+        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)
+        if groups in self._tiles:
+            self._tiles[groups].note(x, groups.mean_of_pixels(pixels))
+        return tile_noise(self.calm, pixels[:, :, 0], self.paths, groups, self.paths.interior, side)
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
-        groups = all_groups(self.paths, TILE)
+        groups = self.tiles(TILE)
         self.noise = self._noise(x, groups, TILE)
         problem = self.problem(groups, self._weighing(self.noise, groups))
         values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
@@ -349,7 +368,7 @@ class RecordedFit:
         """A stage with another residual on the same recording, from each start; None without finite numbers."""
         with self.course.stage(name) as stage:
             residual = make(groups.average(self.reference))
-            problem = Problem(self.scene.evaluator(self.paths, groups), residual, groups)
+            problem = Problem(self._evaluator(groups), residual, groups)
             watched = self.course.watch(stage, problem.equations)
             found = [self._solve(watched, start, 25, self.box) for start in starts]
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x

@@ -18,6 +18,7 @@ from .job_folder import JobFolder
 from .request import Request, request_to_json
 
 if TYPE_CHECKING:
+    from ..fit.fit_material import FitOutcome
     from ..render.renderer import Renderer
 
 _WITHOUT_LIGHT_PATHS = (
@@ -110,7 +111,7 @@ def fit_scene(
     )
     result = outcome.result
     if not should_stop():
-        gap = _model_gap(renderer, result, reference, request.fit, view)
+        gap = _model_gap(renderer, outcome, reference, request.fit, view)
         said = (gap.sentence,) if gap is not None and gap.sentence else ()
         result = replace(result, model_gap=gap, notes=(*result.notes, *said))
     if request.light_paths is not None and result.model == "mitsuba_principled":
@@ -119,13 +120,18 @@ def fit_scene(
 
 
 def _model_gap(
-    renderer: Renderer, result: FitResult, reference: Image, settings: FitSettings, view: View
+    renderer: Renderer, outcome: FitOutcome, reference: Image, settings: FitSettings, view: View
 ) -> ModelGap | None:
-    """The gap of the recovered values, of two renders whose random numbers no stage has seen; None when stopped."""
+    """The gap of the recovered values, of two renders whose random numbers no stage has seen; None when stopped.
+
+    The halves of the verification picture will do: it only chose the result among a few ends.
+    """
     from ..fit.model_gap import model_gap
     from ..render.interruptible import Interrupted
 
-    vector = renderer.table.pack(result.recovered)
+    if outcome.result_halves is not None:
+        return model_gap(reference, outcome.result_halves, renderer.target_mask(), view)
+    vector = renderer.table.pack(outcome.result.recovered)
     spp = max(settings.verify_spp // 2, 1)
     try:
         first, second = (renderer.image(vector, seed=settings.seed ^ GAP_STREAM ^ k, spp=spp) for k in (0, 1))

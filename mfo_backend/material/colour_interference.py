@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clamp import saturate
-from .grid_table import own_memory
+from .own_memory import own_memory
 
 # Linear Rec.709 from CIE XYZ, white D65 (IEC 61966-2-1), and that white
 XYZ_TO_RGB = np.array(

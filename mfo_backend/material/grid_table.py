@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clamp import saturate
+from .own_memory import own_memory
 
 _TABLES: list[GridTable] = []
 MOST_SLICES = 32  # of a table: each is state that a frozen launch carries along
@@ -101,19 +102,6 @@ def _literal(place: Any) -> float | None:
 def loaded_buffers() -> list[Any]:
     """Buffers of all tables read so far: what a frozen launch has to name as its state."""
     return [buffer for table in _TABLES for buffer in table._buffers.values()]
-
-
-def own_memory(values: NDArray[Any], float_type: type) -> Any:
-    """An evaluated copy of `values` in Dr.Jit's own memory.
-
-    An array made from NumPy's keeps its place in memory, where packets can only be read if it happens to be aligned:
-    kernels then differ from one process to the next.
-    """
-    double = dr.type_v(float_type) == dr.VarType.Float64
-    borrowed = float_type(np.ascontiguousarray(values, np.float64 if double else np.float32))
-    copied = borrowed + dr.opaque(float_type, 0)  # a plain copy or gather would share the memory
-    dr.eval(copied)
-    return copied
 
 
 @cache

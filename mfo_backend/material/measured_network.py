@@ -22,6 +22,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .own_memory import own_memory
+
 PLUGIN_NAME = "measured_network"
 
 
@@ -35,8 +37,7 @@ class MeasuredNetwork(mi.BSDF):
             layers = [(tables[f"fc{n}"][index], tables[f"b{n}"][index]) for n in (1, 2, 3)]
         self._shapes = [weight.shape for weight, _ in layers]
         # one buffer instead of literals, so that the next material needs no new kernel
-        self._numbers = mi.Float(np.concatenate([part.ravel() for layer in layers for part in layer]))
-        dr.make_opaque(self._numbers)
+        self._numbers = own_memory(np.concatenate([part.ravel() for layer in layers for part in layer]), mi.Float)
         self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
         self.m_flags = self.m_components[0]
 

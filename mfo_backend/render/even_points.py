@@ -17,6 +17,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..material.own_memory import own_memory
+
 
 def even_points(dimensions: int, number: mi.UInt32, block: mi.UInt32, seed: int) -> list[mi.Float]:
     """Coordinates in [0, 1) of points `number` of the sequence, each `block` of them with a shift of its own."""
@@ -25,7 +27,7 @@ def even_points(dimensions: int, number: mi.UInt32, block: mi.UInt32, seed: int)
     shifts = rng.integers(0, 2**32, (dimensions, blocks), dtype=np.uint32)
     # the multiples wrap modulo 2^32, so that no digit is lost
     words = (
-        number * dr.opaque(mi.UInt32, step) + dr.gather(mi.UInt32, mi.UInt32(shift), block)
+        number * dr.opaque(mi.UInt32, step) + dr.gather(mi.UInt32, own_memory(shift, mi.UInt32), block)
         for step, shift in zip(_steps(dimensions), shifts, strict=True)
     )
     # 24 bits fill a float32 and stay below 1

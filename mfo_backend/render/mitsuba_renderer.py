@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -45,12 +45,36 @@ class MitsubaRenderer:
         self._params = mi.traverse(scene)
         self._keys = _keys_of(list(self._params.keys()), material)
         self._params.keep(list(self._keys.values()))
+        self._mask: NDArray[np.bool_] | None = None
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`. A pixel that Mitsuba leaves non-finite is black."""
+        return self.image_later(vector, seed=seed, spp=spp)()
+
+    def image_later(self, vector: Vector, *, seed: int, spp: int) -> Callable[[], Pixels]:
+        """Start to render `image` and return what waits for it: other kernels can be compiled meanwhile.
+
+        Memory holds one part of a picture at a time, so one of several parts is rendered when it is waited for.
+        """
+        from .ordered_picture import parts_of, start_part
+
+        width, height = (int(n) for n in self._sensor.film().crop_size())
+        parts = list(parts_of(width * height, seed, spp))
         self._update(vector, differentiable=False)
         self.passes += 1.0
-        return self._render(seed, spp)
+        first = start_part(self._integrator, self._scene, self._sensor, parts[0])
+
+        def wait() -> Pixels:
+            total = parts[0].share * first()
+            if len(parts) > 1:
+                self._update(vector, differentiable=False)  # other values may have been shown since
+            for part in parts[1:]:
+                total += part.share * start_part(self._integrator, self._scene, self._sensor, part)()
+            pixels = total.astype(np.float32)
+            pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
+            return pixels
+
+        return wait
 
     @property
     def scene(self) -> Any:
@@ -80,12 +104,13 @@ class MitsubaRenderer:
             import drjit as dr
             import mitsuba as mi
 
+            from ..material.own_memory import own_memory
             from .ordered_picture import opaque, parts_of
 
             total = np.zeros(len(vector))
             for part in parts_of(pixel_gradient[..., 0].size, seed, spp):
                 theta = self._update(vector, differentiable=True)
-                gradient = mi.TensorXf(np.ascontiguousarray(part.share * pixel_gradient, dtype=np.float32))
+                gradient = mi.TensorXf(own_memory(part.share * pixel_gradient, mi.Float), pixel_gradient.shape)
                 self._integrator.render_backward(
                     self._scene, self._params, gradient, self._sensor, opaque(part.seed), part.spp
                 )
@@ -97,6 +122,11 @@ class MitsubaRenderer:
 
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer.target_mask`: a regular grid of rays in every pixel, without the pixel filter's tails."""
+        if self._mask is None:
+            self._mask = self._find_target()
+        return self._mask.copy()
+
+    def _find_target(self) -> NDArray[np.bool_]:
         import drjit as dr
         import mitsuba as mi
 
@@ -107,7 +137,9 @@ class MitsubaRenderer:
         position = mi.Point2f((column + 0.5) / columns, (row + 0.5) / rows)
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
         surface = self._scene.ray_intersect_preliminary(ray)
-        hit = surface.is_valid() & (surface.shape == mi.ShapePtr(self.shape))
+        target = mi.ShapePtr(self.shape)
+        dr.make_opaque(target)  # its number in this process is no part of the kernel
+        hit = surface.is_valid() & (surface.shape == target)
         return np.array(hit).reshape(height, _MASK_RAYS, width, _MASK_RAYS).any(axis=(1, 3))
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:
@@ -115,7 +147,9 @@ class MitsubaRenderer:
         import drjit as dr
         import mitsuba as mi
 
-        theta = mi.Float(np.asarray(vector, dtype=np.float32))
+        from ..material.own_memory import own_memory
+
+        theta = own_memory(vector, mi.Float)
         if differentiable:
             dr.enable_grad(theta)
         for name, key in self._keys.items():
@@ -124,13 +158,6 @@ class MitsubaRenderer:
             self._params[key] = mi.Color3f(*values) if len(values) == 3 else values[0]
         self._params.update()
         return theta
-
-    def _render(self, seed: int, spp: int) -> Pixels:
-        from .ordered_picture import ordered_picture
-
-        pixels = ordered_picture(self._integrator, self._scene, self._sensor, seed=seed, spp=spp)
-        pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
-        return pixels
 
 
 def load_mitsuba_renderer(

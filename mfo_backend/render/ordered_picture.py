@@ -12,15 +12,13 @@ pictures differ by 1e-7 from run to run. Here every pixel collects the samples i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-
-from ..types.image import Pixels
 
 MOST_SAMPLES = 1 << 23  # of one part, 20 bytes each; also far below the 2^32 that Mitsuba takes at once
 _NEXT_SEED = 0x9E3779B9
@@ -43,26 +41,22 @@ def parts_of(pixels: int, seed: int, spp: int) -> Iterator[Part]:
         yield Part((seed + index * _NEXT_SEED) % 2**32, count, count / spp)
 
 
-def ordered_picture(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, *, seed: int, spp: int) -> Pixels:
-    """Scene-linear (height, width, 3) by an integrator in Python (`prb`, `cycles_path`), `spp` samples a pixel.
-
-    The estimate is that of Mitsuba's film: samples weighted by the filter, over the sum of the weights. Pixels without
-    a sample in reach are 0; values that are not finite stay so.
-    """
-    width, height = (int(n) for n in sensor.film().crop_size())
-    total = np.zeros((height, width, 3))
-    with dr.suspend_grad():
-        for part in parts_of(width * height, seed, spp):
-            total += part.share * _picture(integrator, scene, sensor, part)
-    return total.astype(np.float32)
-
-
 def opaque(seed: int) -> mi.UInt32:
     """A number whose value is not baked into the kernel, so that the next one needs no compilation."""
     return dr.opaque(mi.UInt32, seed)
 
 
-def _picture(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> np.ndarray:
+def start_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
+    """Start to render a part by an integrator in Python (`prb`, `cycles_path`); returns what waits for it.
+
+    That gives scene-linear (height, width, 3). The estimate is that of Mitsuba's film: samples weighted by the filter,
+    over the sum of the weights. Pixels without a sample in reach are 0; values that are not finite stay so.
+    """
+    with dr.suspend_grad():
+        return _start(integrator, scene, sensor, part)
+
+
+def _start(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
     sampler, spp = integrator.prepare(sensor, opaque(part.seed), part.spp, [])
     ray, weight, position = integrator.sample_rays(scene, sensor, sampler)
     light, *_ = integrator.sample(
@@ -107,4 +101,4 @@ def _picture(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) ->
     _, color, total = dr.while_loop(state, lambda row, *_: row <= bottom, of_row, label="rows in reach")
     color = dr.select(total == 0.0, 0.0, color / total)
     dr.eval(color)
-    return np.stack([color[k].numpy() for k in range(3)], axis=-1).reshape(height, width, 3)
+    return lambda: np.stack([color[k].numpy() for k in range(3)], axis=-1).reshape(height, width, 3)

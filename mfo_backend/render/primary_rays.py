@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from .pixel_cells import PixelCells
 
 TILE = 4  # pixels along each side
@@ -29,7 +30,7 @@ class PrimaryRays:
     `filter_weight` adds up to 1 within a pixel.
     """
 
-    ray: mi.RayDifferential3f
+    ray: mi.Ray3f
     pixel_position: mi.UInt32
     filter_weight: mi.Float
     pixel: NDArray[np.int64]
@@ -54,6 +55,17 @@ def quarter(pixel: NDArray[np.int64], width: int) -> NDArray[np.int64]:
     row, column = np.divmod(pixel, width)
     half = TILE // 2
     return 2 * (row % TILE // half) + column % TILE // half
+
+
+def widened(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
+    """`mask` (height, width) with every pixel that is at most `pixels` away along each axis.
+
+    As SciPy's `binary_dilation`, whose package takes a tenth of a second to import.
+    """
+    for axis, size in enumerate(mask.shape):
+        padded = np.pad(mask, [(pixels, pixels) if a == axis else (0, 0) for a in (0, 1)])
+        mask = np.logical_or.reduce([padded.take(range(k, k + size), axis) for k in range(2 * pixels + 1)])
+    return mask
 
 
 def fresh_sampler(seed: int, width: int) -> mi.Sampler:
@@ -86,11 +98,11 @@ def primary_rays(
     count = each * len(cells)
     number = dr.arange(mi.UInt32, count)
     cell = number // each
-    position = dr.gather(mi.UInt32, mi.UInt32(cells.position), cell)
-    side = dr.gather(mi.Float, mi.Float(cells.side), cell)
-    corner = mi.Point2f(*(dr.gather(mi.Float, mi.Float(a), cell) for a in (cells.x, cells.y)))
+    position = dr.gather(mi.UInt32, own_memory(cells.position, mi.UInt32), cell)
+    side = dr.gather(mi.Float, own_memory(cells.side, mi.Float), cell)
+    corner = mi.Point2f(*(dr.gather(mi.Float, own_memory(a, mi.Float), cell) for a in (cells.x, cells.y)))
     sampler = fresh_sampler(seed, count)
-    flat = dr.gather(mi.UInt32, mi.UInt32(order.astype(np.uint32)), position)
+    flat = dr.gather(mi.UInt32, own_memory(order, mi.UInt32), position)
     y = flat // width
     x = flat - y * width
     # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per
@@ -110,7 +122,7 @@ def primary_rays(
     film_position = mi.Point2f(
         mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]
     ) / mi.Point2f(size)
-    ray, _ = sensor.sample_ray_differential(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
+    ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
     return PrimaryRays(ray, position, weight, order, tile)
 
 
@@ -119,9 +131,9 @@ def through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.
     if rfilter.is_box_filter():
         return u - 0.5, None
     edges = np.linspace(-rfilter.radius(), rfilter.radius(), 1025, dtype=np.float32)
-    value = np.array(rfilter.eval(mi.Float(0.5 * (edges[1:] + edges[:-1]))))
+    value = np.array(rfilter.eval(own_memory(0.5 * (edges[1:] + edges[:-1]), mi.Float)))
     cumulative = np.concatenate([[0.0], np.cumsum(np.abs(value))])
-    quantiles = mi.Float(np.interp(np.linspace(0, 1, 4097), cumulative / cumulative[-1], edges).astype(np.float32))
+    quantiles = own_memory(np.interp(np.linspace(0, 1, 4097), cumulative / cumulative[-1], edges), mi.Float)
 
     def inverse(t: mi.Float) -> mi.Float:
         cell = dr.minimum(mi.UInt32(t * 4096.0), 4095)

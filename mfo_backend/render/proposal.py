@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -18,11 +19,12 @@ class DefensiveProposal:
     """A mixture of the cosine lobe and GGX lobes of several roughnesses, all with visible normals.
 
     The default covers every opaque material a fit may try. Near a known material `around` narrows it, but keeps the
-    cosine part and two wide lobes, so that no weight can explode.
+    cosine part and two wide lobes, so that no weight can explode. All proposals have equally many lobes, and their
+    numbers are data, so that every one of them uses the same kernels.
     """
 
-    roughness: tuple[float, ...] = (0.1, 0.25, 0.5)
-    share: tuple[float, ...] = (0.25, 0.25, 0.2)
+    roughness: tuple[float, float, float, float] = (0.1, 0.25, 0.5, 1.0)
+    share: tuple[float, float, float, float] = (0.25, 0.25, 0.2, 0.0)
 
     @property
     def cosine_share(self) -> float:
@@ -35,23 +37,33 @@ class DefensiveProposal:
         narrow = min(max(roughness, 0.03), 1.0)
         return DefensiveProposal((narrow, min(2.0 * narrow, 1.0), 0.1, 0.5), (0.45, 0.15, 0.05, 0.1))
 
+    @cached_property
+    def _lobes(self) -> tuple[mi.Float, list[tuple[mi.Float, mi.Float]]]:
+        """The share of the cosine lobe, then alpha and share of each lobe."""
+        alpha_and_share = [(r**2, s) for r, s in zip(self.roughness, self.share, strict=True)]
+        return dr.opaque(mi.Float, self.cosine_share), [
+            (dr.opaque(mi.Float, alpha), dr.opaque(mi.Float, share)) for alpha, share in alpha_and_share
+        ]
+
     def sample(self, wi: mi.Vector3f, lobe: mi.Float, u: mi.Point2f) -> mi.Vector3f:
         """A direction in the shading frame for the random numbers `lobe` and `u` in [0, 1)."""
         wo = mi.warp.square_to_cosine_hemisphere(u)
-        used = mi.Float(self.cosine_share)
+        cosine, lobes = self._lobes
+        used = mi.Float(cosine)
         width = mi.Float(1.0)
-        for roughness, share in zip(self.roughness, self.share, strict=True):
-            width = dr.select((lobe >= used), roughness, width)
+        for alpha, share in lobes:
+            width = dr.select(lobe >= used, alpha, width)
             used += share
-        distribution = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, dr.square(width), True)
+        distribution = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, width, True)
         normal, _ = distribution.sample(wi, u)
-        return dr.select(lobe < self.cosine_share, wo, mi.reflect(wi, normal))
+        return dr.select(lobe < cosine, wo, mi.reflect(wi, normal))
 
     def density(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
         """Probability per solid angle of `sample`; 0 below the surface."""
         half = dr.normalize(wi + wo)
-        result = self.cosine_share * mi.warp.square_to_cosine_hemisphere_pdf(wo)
-        for roughness, share in zip(self.roughness, self.share, strict=True):
-            distribution = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, mi.Float(roughness**2), True)
+        cosine, lobes = self._lobes
+        result = cosine * mi.warp.square_to_cosine_hemisphere_pdf(wo)
+        for alpha, share in lobes:
+            distribution = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, True)
             result += share * distribution.pdf(wi, half) / (4.0 * dr.dot(wo, half))
         return dr.select((wi.z > 0.0) & (wo.z > 0.0), result, 0.0)

@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
 from .even_points import even_points
@@ -32,7 +33,8 @@ class RecordSettings:
 
     `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and
     directional lights take one sample for each of them; the other lights one light sample and one sample of the
-    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
+    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out, and so does
+    `direct_only`, which needs no other kernels than a recording with that light. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
@@ -52,6 +54,7 @@ class RecordSettings:
     light_paths: LightPaths | None = None
     pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
+    direct_only: bool = False
 
 
 @dataclass
@@ -97,14 +100,16 @@ def record_paths(
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
         hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
-        on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+        target = mi.ShapePtr(shape)
+        dr.make_opaque(target)  # its number in this process is no part of the kernel
+        on_target = hit.is_valid() & (hit.shape == target)
         dr.eval(rays, hit, on_target)
         index = dr.compress(on_target)
         if dr.width(index) == 0:
             raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
         position = dr.gather(mi.UInt32, rays.pixel_position, index)
         filter_weight = dr.gather(mi.Float, rays.filter_weight, index)
-        ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
+        ray = dr.gather(mi.Ray3f, rays.ray, index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
@@ -146,8 +151,8 @@ def indirect_share(
     stride: int = 1,
 ) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
-    direct_only = RecordSettings(grid=1, depth=2, stride=stride, two_sided=two_sided)
-    with_others = replace(direct_only, depth=depth, light_paths=light_paths)
+    with_others = RecordSettings(grid=1, depth=depth, stride=stride, two_sided=two_sided, light_paths=light_paths)
+    direct_only = replace(with_others, direct_only=True)
     with dr.suspend_grad():
         direct, everything = (record_paths(scene, shape, s, allow_dark=True) for s in (direct_only, with_others))
         lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
@@ -165,13 +170,16 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
     if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
         return primary_rays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
 
+    target = mi.ShapePtr(shape)
+    dr.make_opaque(target)
+
     def rays_in(cells: PixelCells) -> PrimaryRays:
         return primary_rays(sensor, cells, order, tile, settings.seed, four=True)
 
     def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
-        ray = mi.Ray3f(rays.ray)
+        ray = rays.ray
         hit = scene.ray_intersect_preliminary(ray, coherent=True)
-        on_target = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+        on_target = hit.is_valid() & (hit.shape == target)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
         return _facing(shape, settings, si), on_target
 
@@ -224,7 +232,7 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     choice = 1.0 / max(len(extended), 1)
     lanes = []
     if extended:
-        table = mi.UInt32(np.array(extended, np.uint32))
+        table = own_memory(np.array(extended), mi.UInt32)
         turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, 1 + int(dr.max(position)[0])).next_1d() * 65536)
         pick = (number + dr.gather(mi.UInt32, turns, position)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
@@ -258,8 +266,9 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         if settings.light_paths is not None:
             value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo, valid)
             before = (likely, value / dr.maximum(likely, 1e-12))
-        radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, valid & far.is_valid(), before=before)
-        weight += dr.maximum(radiance - emission, 0.0) / density
+        traced = valid & far.is_valid() & dr.opaque(mi.Bool, not settings.direct_only)
+        radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, traced, before=before)
+        weight += dr.select(traced, dr.maximum(radiance - emission, 0.0) / density, 0.0)
     weight *= share
     lanes.append(_compress(hits, wo, weight, valid & (dr.max(weight) > 0.0)))
     return lanes
@@ -318,11 +327,11 @@ def _background(
     image = np.zeros((width * height, 3), np.float32)
     beside = np.zeros(width * height, bool)
     beside[covered] = True
-    wanted = ~on_target & dr.gather(mi.Bool, mi.Bool(beside), rays.pixel_position)
+    wanted = ~on_target & dr.gather(mi.Bool, own_memory(beside, mi.Bool), rays.pixel_position)
     index = dr.compress(wanted)
     if dr.width(index) > 0:
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
-        ray = dr.gather(mi.Ray3f, mi.Ray3f(rays.ray), index)
+        ray = dr.gather(mi.Ray3f, rays.ray, index)
         depth, hide = max(settings.depth, 2), settings.hide_emitters
         radiance = _traced(scene, sampler, ray, settings, depth, mi.Bool(True), hide=hide)
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
@@ -351,7 +360,7 @@ def _merge(
     for part in lanes:
         end = begin + dr.width(part.position)
         if end > begin:
-            target = mi.UInt32(rank[begin:end])
+            target = own_memory(rank[begin:end], mi.UInt32)
             pairs = ((wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True))
             for merged, value in pairs:
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)

@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from ..material.recorded_models import RecordedModel
 from ..types.parameter import ParameterTable, Value
 from .recorded_paths import LaneGroups, RecordedPaths
@@ -63,7 +64,7 @@ class RecordedJacobian:
         self._held = [model.table[name] for name, value in values.items() if value is None]
         self._fixed_table = [model.table[n] for n, value in values.items() if value is not None and value != 0.0]
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
-        self._constants = mi.Float(np.concatenate([*constants, np.ones(1, np.float32)]))
+        self._constants = own_memory(np.concatenate([*constants, np.ones(1, np.float32)]), mi.Float)
         dr.eval(self._constants)
         self._evaluate = model.bind(values, free.names)
         self._warm_up()
@@ -75,7 +76,7 @@ class RecordedJacobian:
     def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
         """Mean radiance of the groups without the constant part, then its derivatives: (g, 3, 1 + K)."""
         width = self.table.length + 1
-        theta = mi.Float(np.asarray(vector, np.float32))
+        theta = own_memory(vector, mi.Float)
         start, stop, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
         dr.eval(theta, out)
@@ -93,7 +94,7 @@ class RecordedJacobian:
         c is what a recorded lane adds to the group's radiance (L. Kish, "Survey Sampling", 1965). Where a material
         has moved away from the one its directions were chosen for, few lanes carry most of the light. 0 in the dark.
         """
-        theta = mi.Float(np.asarray(vector, np.float32))
+        theta = own_memory(vector, mi.Float)
         start, stop, _ = groups.parts
         out = dr.zeros(mi.Float, dr.width(start) * 2)
         dr.eval(theta, out)
@@ -108,7 +109,8 @@ class RecordedJacobian:
 
         def body(lane, stop, total, squares):
             wi_, wo_, weight_, *held_ = (dr.gather(type(a), a, lane) for a in (wi, wo, mi.Color3f(weight), *held))
-            light = dr.mean(self._evaluate(self._parameters(values, constants, held_), wi_, wo_) * weight_)
+            colour = self._evaluate(self._parameters(values, constants, held_), wi_, wo_) * weight_
+            light = dr.sum(colour) / 3.0  # `dr.mean` would make the number of lanes part of the kernel
             return lane + 1, stop, total + light, squares + dr.square(light)
 
         _, _, *sums = dr.while_loop(
@@ -160,11 +162,11 @@ class RecordedJacobian:
 
     def _warm_up(self) -> None:
         """Let the model load its tables: a frozen launch cannot."""
-        theta = mi.Float(self.table.pack({}).astype(np.float32))
+        theta = own_memory(self.table.pack({}), mi.Float)
         values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         up = mi.Vector3f(0.0, 0.0, 1.0)
         some = [mi.Color3f(0.5) if p.size == 3 else mi.Float(0.5) for p in self._held]
-        dr.eval(self._evaluate(self._parameters(values, self._constants, some), up, up))
+        self._evaluate(self._parameters(values, self._constants, some), up, up)  # traced, never run
 
     def _parameters(self, values: list[mi.Float], constants: mi.Float, held: list[Any]) -> dict[str, Any]:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)

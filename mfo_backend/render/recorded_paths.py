@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.own_memory import own_memory
 from ..types.image import Pixels
 from .primary_rays import TILE, quarter
 
@@ -88,9 +89,9 @@ class LaneGroups:
         bounds = [begin + length * k // parts_of for k in (number, number + 1)]
         scale = np.repeat(1.0 / np.diff(self.first), parts)
         arrays = (
-            mi.UInt32(bounds[0].astype(np.uint32)),
-            mi.UInt32(bounds[1].astype(np.uint32)),
-            mi.Float(scale.astype(np.float32)),
+            own_memory(bounds[0], mi.UInt32),
+            own_memory(bounds[1], mi.UInt32),
+            own_memory(scale, mi.Float),
         )
         dr.eval(arrays)
         return arrays
@@ -113,6 +114,12 @@ class LaneGroups:
         first = np.cumsum(parts) - parts
         longer = [np.flatnonzero(parts > k) for k in range(1, parts.max())]
         return first, [(groups, first[groups] + k) for k, groups in enumerate(longer, 1)]
+
+    def mean_of_pixels(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Means of rows (p, ...), one for each covered pixel of the recording, over each group: (g, ...)."""
+        sums = np.add.reduceat(rows[self.member], self.first[:-1], axis=0, dtype=np.float64)
+        count = np.diff(self.first).reshape(-1, *[1] * (rows.ndim - 1))
+        return (sums / count).astype(np.float32)
 
     def average(self, image: Pixels) -> NDArray[np.float32]:
         """Mean of `image` (height, width, 3) over the pixels of each group, shape (g, 3)."""

@@ -16,7 +16,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
@@ -24,7 +23,7 @@ from ..types.parameter import Value
 from .highlight_cells import Highlights
 from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
-from .primary_rays import tile_order
+from .primary_rays import tile_order, widened
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
 from .recorded_jacobian import RecordedJacobian
@@ -71,7 +70,11 @@ class RecordedScene:
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
-        self.needs = self._probe()
+
+    @cached_property
+    def needs(self) -> SceneNeeds:
+        """What to record, found by tracing a few rays when it is first asked for."""
+        return self._probe()
 
     def _probe(self) -> SceneNeeds:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of 1 ray a pixel."""
@@ -113,6 +116,8 @@ class RecordedScene:
             proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
+        if self._near_target.any():
+            grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
         stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
@@ -153,7 +158,7 @@ class RecordedScene:
     def _near_target(self) -> NDArray[np.bool_]:
         """Pixels that may see the target: those that do and their neighbours in reach of the pixel filter."""
         reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
-        return binary_dilation(self.renderer.target_mask(), np.ones((3, 3), bool), reach)
+        return widened(self.renderer.target_mask(), reach)
 
     def evaluator(
         self, paths: RecordedPaths, groups: LaneGroups

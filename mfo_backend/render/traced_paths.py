@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ..material.blender_principled import evaluate
 from ..material.layers import layer_stack
 from ..material.lobe_sampling import NAMES, lobe_choice, pdf, sample
+from ..material.own_memory import own_memory
 from ..material.principled_plugin import BlenderPrincipled
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable
@@ -150,8 +151,8 @@ class TracedPaths:
         m, p = len(vectors), len(pixels)
         lanes = m * p * samples
         self.lanes += lanes
-        theta = mi.Float(np.ascontiguousarray(vectors, np.float32).ravel())
-        pixel = mi.UInt32(pixels.astype(np.uint32))
+        theta = own_memory(vectors, mi.Float)
+        pixel = own_memory(pixels, mi.UInt32)
         p_opaque, samples_opaque, begin_opaque = (dr.opaque(mi.UInt32, v) for v in (p, samples, begin))
         lane = dr.arange(mi.UInt32, lanes)
         block = lane // samples_opaque

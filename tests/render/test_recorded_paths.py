@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,28 @@ def test_equals_the_path_traced_picture(tmp_path, lights, depth, rfilter, grid, 
     )  # noise averages out, bias would not
 
 
+def test_tiles_are_means_of_their_pixels(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, AREA)
+    x = renderer.table.pack(VALUES)
+    paths = scene.record(x, grid=4, seed=3, near=False)
+    tiles = paths.tile_groups()
+    pixels = scene.evaluator(paths, paths.pixel_groups())(x)
+    # sums of float32 in another order
+    np.testing.assert_allclose(tiles.mean_of_pixels(pixels), scene.evaluator(paths, tiles)(x), rtol=1e-4, atol=1e-5)
+
+
+def test_direct_light_alone_is_the_same_with_and_without_the_kernels_of_other_light(tmp_path):
+    renderer, _ = recorded_scene(tmp_path, AREA + FLOOR, depth=5)
+    from mfo_backend.render.record_paths import RecordSettings, record_paths  # needs the variant
+
+    settings = RecordSettings(grid=3, seed=4, depth=5, direct_only=True)
+    some, without = (record_paths(renderer.scene, renderer.shape, s) for s in (settings, replace(settings, depth=2)))
+    assert some.lanes == without.lanes
+    np.testing.assert_allclose(np.array(some.weight), np.array(without.weight), rtol=1e-5)
+    everything = record_paths(renderer.scene, renderer.shape, replace(settings, direct_only=False))
+    assert np.array(everything.weight).sum() > 1.02 * np.array(some.weight).sum()
+
+
 def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
     renderer, scene = recorded_scene(tmp_path, AREA + SKY)
     x = renderer.table.pack({**VALUES, "roughness": 0.12})
@@ -97,7 +121,7 @@ def test_many_rays_beside_a_small_target_are_left_out(tmp_path, monkeypatch):
     original = record_paths.primary_rays
     monkeypatch.setattr(record_paths, "primary_rays", lambda *a, **b: taken.append(original(*a, **b)) or taken[-1])
     near = scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform)
-    assert len(taken[0].pixel) == scene._near_target.sum() < scene._near_target.size
+    assert len(np.unique(np.array(taken[0].pixel_position))) == scene._near_target.sum() < scene._near_target.size
     for name in ("wi", "wo", "weight"):
         np.testing.assert_array_equal(np.array(getattr(everything, name)), np.array(getattr(near, name)))
     np.testing.assert_array_equal(everything.pixel, near.pixel)
@@ -174,3 +198,29 @@ def test_a_texture_is_refused(tmp_path):
 
     with pytest.raises(BadInputError, match="'clearcoat' is a texture"):
         RecordedScene(renderer, 1)
+
+
+@pytest.mark.parametrize("rfilter", ["box", "gaussian"])
+def test_rays_far_from_the_target_are_left_out_and_change_nothing(tmp_path, rfilter):
+    renderer, scene = recorded_scene(tmp_path, AREA + FLOOR, depth=4, rfilter=rfilter, size=48)
+    x = renderer.table.pack(VALUES)
+    few = scene.record(x, grid=4, seed=3, near=False)
+    near = scene._near_target
+    assert 0.3 < near.mean() < 0.8
+    scene._near_target = np.ones_like(near)
+    every = scene.record(x, grid=4, seed=3, near=False)
+    assert few.lanes == every.lanes
+    for name in ("wi", "wo", "weight"):
+        np.testing.assert_array_equal(np.array(getattr(few, name)), np.array(getattr(every, name)))
+    np.testing.assert_array_equal(few.pixel, every.pixel)
+    np.testing.assert_array_equal(few.constant, every.constant)
+
+
+def test_a_mask_is_widened_as_by_scipy():
+    from scipy.ndimage import binary_dilation
+
+    from mfo_backend.render.primary_rays import widened
+
+    mask = np.random.default_rng(3).random((17, 23)) < 0.03
+    for reach in (1, 3):
+        np.testing.assert_array_equal(widened(mask, reach), binary_dilation(mask, np.ones((3, 3), bool), reach))
