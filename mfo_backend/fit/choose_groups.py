@@ -44,6 +44,7 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
 # the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
 GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
+FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
 
 
 def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -63,4 +64,6 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
     grid = np.full(level.shape, GRID_PLAIN)
     grid[mask & (change > 0.1)] = GRID_DETAIL
     grid[inside & (change > 0.5)] = GRID_EDGE
+    if mask.sum() <= FEW_PIXELS:
+        grid[mask] = GRID_EDGE
     return grid

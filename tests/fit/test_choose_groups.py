@@ -21,5 +21,13 @@ def test_rays_go_where_the_picture_changes_within_a_pixel():
     assert (grid[~mask] == GRID_PLAIN).all()
 
 
+def test_a_target_within_a_pixel_is_not_missed():
+    mask = np.zeros((6, 6), bool)
+    mask[3, 3] = True
+    grid = detail_grid(np.full((6, 6, 3), 0.2, np.float32), mask)
+    assert grid[3, 3] == GRID_EDGE
+    assert (grid[~mask] == GRID_PLAIN).all()
+
+
 def test_a_black_picture_has_no_detail():
     assert (detail_grid(np.zeros((6, 6, 3), np.float32), np.ones((6, 6), bool)) == GRID_PLAIN).all()
