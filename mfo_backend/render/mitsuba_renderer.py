@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import contextlib
+import gc
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -160,6 +162,19 @@ class MitsubaRenderer:
         return theta
 
 
+_LOADED = itertools.count()  # scenes of this process
+
+
+def _forget_scenes_before() -> None:
+    """Let scenes that nobody uses any more give back their memory and the numbers of their objects.
+
+    Those numbers are part of kernels with virtual calls: a scene whose objects got others would compile them anew. A
+    scene ends in reference cycles through plugins written in Python, which only the collector takes apart.
+    """
+    if next(_LOADED):
+        gc.collect()
+
+
 def load_mitsuba_renderer(
     scene_xml: Path,
     shape_id: str,
@@ -181,6 +196,7 @@ def load_mitsuba_renderer(
     # only Blender's model knows how to blur its lobes
     light_paths = light_paths if model == "blender_principled" else None
     load_variant()
+    _forget_scenes_before()
     import mitsuba as mi
 
     from ..material import principled_plugin
