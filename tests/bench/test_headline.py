@@ -56,7 +56,7 @@ def test_the_command_fills_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(["bench", "report", str(tmp_path), "--page", str(tmp_path / "none.md")]) == 2
 
 
-@pytest.mark.parametrize("page", ["README.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/bench/README.md"])
 def test_pages_hold_the_committed_rows(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     assert "<!-- bench -->" in text
