@@ -26,10 +26,10 @@ ROWS = [
 
 def test_the_loop_is_compared_on_common_scenes() -> None:
     table = headline(ROWS)
-    assert list(table.heads)[3] == "`balanced`: CPU s"
+    assert list(table.heads)[4] == "`balanced`: CPU s"
     assert list(table.rows) == [
-        ["`base`", "3 of 3", "0.01", "2", "1 of 2", "0.255", "50", "25"],  # 80 / 2 and 20 / 2
-        ["`noise`", "0 of 1", "0.03", "4", "0 of 1", "–", "–", "–"],
+        ["`base`", "3 of 3", "3", "0.01", "2", "1 of 2", "2", "0.255", "50", "25"],  # 80 / 2 and 20 / 2
+        ["`noise`", "0 of 1", "1", "0.03", "4", "0 of 1", "1", "–", "–", "–"],
     ]
 
 
