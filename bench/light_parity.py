@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .cycles_parity import Difference, compare, render_job
+from .cycles_parity import Difference, compare, render_job, table_row
 from .light_scene import FLOORS, SIZE, Lights, build
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "light_parity.md"
@@ -57,13 +57,6 @@ a size of about a metre hangs between a small bright one and the floor, and does
 | floor | light | level | mean | rms | noise |
 |---|---|---|---|---|---|
 """
-
-
-def table_row(floor: str, name: str, found: Difference) -> str:
-    """One line of the table, in percent."""
-    level = f"{100 * found.level:+.2f} ± {100 * found.level_sd:.2f}"
-    rest = " | ".join(f"{100 * number:.2f}" for number in (found.at_least, found.at_most, found.noise))
-    return f"| {floor} | {name} | {level} | {rest} |"
 
 
 def main() -> None:
