@@ -243,6 +243,7 @@ def phases_of(job: Path) -> dict[str, Any]:
         load_variant()
     dr.set_flag(dr.JitFlag.KernelHistory, True)
     from mfo_backend.fit import fit_recorded, recover_material
+    from mfo_backend.fit.verified_end import Verification
     from mfo_backend.job import fit_scene, run_job
     from mfo_backend.job.progress import EventWriter
     from mfo_backend.job.stop import StopSignal
@@ -260,14 +261,15 @@ def phases_of(job: Path) -> dict[str, Any]:
         stages.wrap(owner, name, "verify")
     stages.wrap(fit_scene, "_model_gap", "verify")
     stages.wrap(run_job, "write_outputs", "write")
-    verify_later = fit_recorded.verify_later
+    stages.wrap(Verification, "pictures", "verify")
+    begin = Verification.begin
 
-    def later(*values: Any, **named: Any) -> Any:
+    def begun(*values: Any, **named: Any) -> Any:
         with stages.within("verify"):
-            end = verify_later(*values, **named)()
+            end = begin(*values, **named)()
         return lambda: end
 
-    fit_recorded.verify_later = later
+    Verification.begin = begun  # type: ignore[method-assign]
     with stages.within("solve"):
         run_job.run_job(job, EventWriter(stream=io.StringIO()), StopSignal())
     result = json.loads((job / "result.json").read_text())

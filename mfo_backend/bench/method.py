@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..fit.recorded_stages import RecordedPlan
+from ..fit.recorded_plan import RecordedPlan
 from ..fit.settings import FitSettings
 from ..metrics.loss import make_loss
 from ..metrics.loss_names import OPTIONAL_LOSS_NAMES
@@ -32,7 +32,7 @@ class Method:
     settings
         What differs from the defaults of a fit.
     plan
-        What differs from the defaults of a recorded fit.
+        That of a recorded fit where it is not its preset's.
     new_seeds
         Random numbers of its own for every picture of the fit instead of common ones.
     compares_with
@@ -40,7 +40,7 @@ class Method:
     """
 
     settings: Mapping[str, Any]
-    plan: RecordedPlan = field(default_factory=RecordedPlan)
+    plan: RecordedPlan | None = None
     new_seeds: bool = False
     compares_with: str = ""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -24,14 +23,15 @@ from .fit_material import FitOutcome
 from .kept_values import box_holding, keep_values
 from .perceptual_stages import perceptual_ends
 from .picture_judge import NOISY, PictureJudge
-from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit, RecordedPlan
+from .recorded_plan import RecordedPlan
+from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
-from .verification import check_reference, picture_errors, verify_later
+from .verification import check_reference, picture_errors
+from .verified_end import Verification
 from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
-CANCELLED_SPP = 4  # a cancelled fit shows its pictures at once
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
 
@@ -44,14 +44,14 @@ def fit_recorded(
     display: View | None = None,
     listener: Listener,
     should_stop: Callable[[], bool],
-    plan: RecordedPlan = RecordedPlan(),  # noqa: B008  frozen
+    plan: RecordedPlan | None = None,
 ) -> FitOutcome:
     """Recover the renderer's parameters from a picture of the same scene, with no use of their start but as one guess.
 
-    Parameters and errors are those of `fit_material`. The result is the best of the scene's own values and the end of
-    every finishing stage, judged on path-traced pictures under random numbers no stage has seen: by the least-squares
-    residual of tiles for `fast` and where the picture's noise is reached, by the last of the losses where the settings
-    name them, else by FLIP (`fit.picture_judge`).
+    Parameters and errors are those of `fit_material`; `plan` is that of the preset, unless it is given. The result is
+    the best of the scene's own values and the end of every finishing stage, judged on path-traced pictures under random
+    numbers no stage has seen: by the least-squares residual of tiles for `fast` and where the picture's noise is
+    reached, by the last of the losses where the settings name them, else by FLIP (`fit.picture_judge`).
 
     Raises
     ------
@@ -77,11 +77,15 @@ def fit_recorded(
     light = linear_pixels(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))  # refuses glass, so it comes first
     # the start's picture is rendered while the kernels of the fit are compiled
-    start = verify_later(renderer, renderer.start, seed=settings.seed, spp=settings.verify_spp)
+    verification = Verification(
+        renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
+    )
+    start = verification.begin(renderer.start)
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
     names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
     listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, names, listener, should_stop, began)
+    plan = plan or RecordedPlan.of(settings.preset)
     fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped_pixels(reference, view))
 
     basins = fit.start_from_nothing(_censored(log_residual, reference, view))
@@ -94,9 +98,9 @@ def fit_recorded(
     else:
         make = RelativeResidual if scene.needs.sampled else log_residual
         first, *others = (basin.x for basin in basins)
-        solution, last = fit.refine(first, _censored(make, reference, view), _weighted(reference, view), others)
+        refined = fit.refine(first, _censored(make, reference, view), _weighted(reference, view), others)
         weighted = scene.needs.sampled and not isinstance(view, BakedView)
-        kept = keep_values(fit, last, solution.x, weighted=weighted)
+        kept = keep_values(fit, refined, weighted=weighted)
         fit.box = box_holding(fit.table, renderer.start, kept.held)
         ends.append(End("refine", kept.x))
         notes += kept.notes
@@ -114,18 +118,15 @@ def fit_recorded(
             judge = PictureJudge(measure, reference, light, mask, settings, view, blurred=blurred)
             counts = judge.value
             tried = others if settings.preset == "best" else []
-            ends += perceptual_ends(fit, last, kept.x, tried, finishing, judge, settings, notes)
+            ends += perceptual_ends(fit, refined.all, kept.x, tried, finishing, judge, settings, notes)
         if fit.fireflies:
             notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
         if fit.recordings > 1:
             notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
         if counts is None:
-            counts = _misfit(fit, last, _censored(log_residual, reference, view))
+            counts = _misfit(fit, refined.all, _censored(log_residual, reference, view))
 
-    stopped = should_stop()
-    spp = min(CANCELLED_SPP, settings.verify_spp) if stopped else settings.verify_spp
-    verify = partial(verify_later, renderer, seed=settings.seed, spp=spp)
-    pictures = [(verify(renderer.start) if stopped else start)(), *(verify(end.x)() for end in ends[1:])]
+    pictures = verification.pictures(start, [end.x for end in ends[1:]])
     listener(Preview(pictures[-1].image))
     counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])

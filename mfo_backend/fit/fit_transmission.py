@@ -22,18 +22,17 @@ from ..types.status import Status
 from .course import Course
 from .final_result import final_result
 from .fit_material import FitOutcome
-from .fit_recorded import CANCELLED_SPP, clipped_pixels, linear_pixels
+from .fit_recorded import clipped_pixels, linear_pixels
 from .settings import FitSettings
-from .stages import Candidate
 from .transmission_stages import Polished, TransmissionFit, TransmissionPlan
 from .uncertainty import WEAK_BELOW, certainties
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
+from .verified_end import Verification
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ..render.traced_paths import TracedPaths
 
 STAGES = ("scan", "race", "polish")
-PATHS_OF_A_PART = 1 << 18  # of a picture, after which a request to stop is heard: as long as a launch of traced paths
 _PREVIEW_PATHS, _PREVIEW_SPP = 1 << 15, 2  # a quarter of a launch, whatever the size of the picture
 Vector = NDArray[np.float64]
 
@@ -89,10 +88,11 @@ def fit_transmission(
         unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
         if chosen == 0 and len(ends) == 2:
             notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
-    seed = settings.seed ^ VERIFY_STREAM
     stopped = should_stop()
-    spp = min(CANCELLED_SPP, settings.verify_spp) if stopped else settings.verify_spp
-    pictures = [Candidate(x, _picture(renderer, x, seed, spp, should_stop)) for x in (renderer.start, found)]
+    verification = Verification(
+        renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
+    )
+    pictures = verification.pictures(verification.begin(renderer.start), [found])
     listener(Preview(pictures[-1].image))
     name = "flip-ldr" if ldr else "flip-hdr"
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
@@ -109,20 +109,7 @@ def fit_transmission(
         certainty=certainty,
         notes=notes,
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image)
-
-
-def _picture(renderer: MitsubaRenderer, x: Vector, seed: int, spp: int, should_stop: Callable[[], bool]) -> Pixels:
-    """A path-traced picture in parts, so that a request to stop need not wait for all."""
-    passes, done, total = renderer.passes, 0, None
-    part = max(1, min(spp, PATHS_OF_A_PART // renderer.target_mask().size))
-    while total is None or (done < spp and not should_stop()):
-        count = min(part, spp - done)
-        image = renderer.image(x, seed=seed + done, spp=count).astype(np.float64) * count
-        total = image if total is None else total + image
-        done += count
-    renderer.passes = passes + 1.0
-    return (total / done).astype(np.float32)
+    return FitOutcome(result, pictures[0].image, pictures[best].image, pictures[best].halves)
 
 
 def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:

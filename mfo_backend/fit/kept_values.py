@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from ..solve.box_quadratic import minimise_in_box
 from ..types.certainty import Certainty, Level
 from ..types.parameter import ParameterTable
-from .recorded_stages import Problem, RecordedFit, Vector
+from .recorded_stages import Problem, RecordedFit, Refined, Vector
 from .residuals import RelativeResidual, residual_rows
 from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
 
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
+HOPELESS = 1.1  # the same, by some of the groups
 # A lobe that the user's material lacks comes in only where the picture asks for it by three standard deviations
 SIGNIFICANT = 9.0
 OFF = 2e-3  # of the box: a value this near its lower bound is switched off
@@ -37,21 +38,22 @@ class Kept:
     notes: tuple[str, ...]
 
 
-def keep_values(fit: RecordedFit, problem: Problem, found: Vector, *, weighted: bool) -> Kept:
-    """`found` with unneeded lobes switched off again and undetermined values given back.
+def keep_values(fit: RecordedFit, refined: Refined, *, weighted: bool) -> Kept:
+    """The refined vector with unneeded lobes switched off again and undetermined values given back.
 
     `weighted` says that the problem's residuals are in standard deviations of the noise.
     """
     table, user = fit.table, fit.scene.renderer.start
+    found, problem = refined.x, refined.all
     judged = _Judged(fit, problem, weighted)
     cost, certainty, spread = judged(found)
     off = unneeded_lobes(problem, found, user, table, 0.0 if weighted else MODEL_ERROR)
     moved = [name for name in off if not np.allclose(found[table.slice_of(name)], user[table.slice_of(name)])]
     if moved:
-        allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / _independent(problem)
-        simpler = _solve_holding(fit, problem, found, off)
-        simpler_cost, surer, narrower = judged(simpler)
-        if simpler_cost <= allowed + 1e-12:
+        allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
+        simpler = _solve_holding(fit, refined, found, off)
+        simpler_cost, surer, narrower = (np.inf, certainty, spread) if simpler is None else judged(simpler)
+        if simpler is not None and simpler_cost <= allowed + 1e-12:
             found, cost = simpler, simpler_cost
             certainty, spread = surer, narrower
         else:
@@ -61,8 +63,8 @@ def keep_values(fit: RecordedFit, problem: Problem, found: Vector, *, weighted: 
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
     if unseen and len(unseen) < len(table):
         held = [*unseen, *(name for name in off if name not in unseen)]
-        kept = _solve_holding(fit, problem, found, held)
-        if judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8:
+        kept = _solve_holding(fit, refined, found, held)
+        if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8:
             found, off = kept, held
             notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
@@ -96,7 +98,7 @@ def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: Paramet
     now = change([])
     while candidates:
         rise, cheapest = min((change([*off, name]) - now, name) for name in candidates)
-        if 2.0 * rise * _independent(problem) > SIGNIFICANT * noise:
+        if 2.0 * rise * problem.independent > SIGNIFICANT * noise:
             break
         off.append(cheapest)
         candidates.remove(cheapest)
@@ -126,11 +128,6 @@ class _Judged:
         return cost if self._weighted else max(cost, MODEL_ERROR**2)
 
 
-def _independent(problem: Problem) -> float:
-    """Number of independent residuals: the channels of a group share most of their noise."""
-    return 1.5 * len(problem.groups)
-
-
 def box_holding(table: ParameterTable, user: Vector, names: Iterable[str]) -> tuple[Vector, Vector]:
     """The bounds of `table` with these names held at the user's values."""
     lower, upper = table.lower, table.upper
@@ -140,7 +137,14 @@ def box_holding(table: ParameterTable, user: Vector, names: Iterable[str]) -> tu
     return lower, upper
 
 
-def _solve_holding(fit: RecordedFit, problem: Problem, found: Vector, names: list[str]) -> Vector:
+def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: list[str]) -> Vector | None:
+    """The best vector with these names at the user's values; None where it is hopeless by some of the groups alone."""
     lower, upper = box_holding(fit.table, fit.scene.renderer.start, names)
     start = np.clip(found, lower, upper)
-    return start if np.all(lower >= upper) else fit.solve_within(problem, start, lower, upper)
+    if np.all(lower >= upper):
+        return start
+    if refined.few is not refined.all:
+        start = fit.solve_within(refined.few, start, lower, upper)
+        if refined.few.equations(start).cost > HOPELESS * refined.few.equations(found).cost:
+            return None
+    return fit.solve_within(refined.all, start, lower, upper)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
+from .recorded_plan import RecordedPlan
 from .remembered import Remembered
 from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual, normal_equations
 from .tile_noise import TileNoise, tile_noise
@@ -44,51 +45,10 @@ MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recordi
 # samples; the second finds a lobe that became narrow in few tiles.
 MOVED = 0.15
 FEWER = 1.5
-
-
-@dataclass(frozen=True)
-class RecordedPlan:
-    """How much a recorded fit does.
-
-    Attributes
-    ----------
-    scan
-        Whether to look for starts; without it only the scene's own material and a random one are tried.
-    grid_first, grid_last
-        Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
-    side_last
-        Pixels along each side of the tiles of the last stage where light is sampled. Quarters of the tiles of the
-        stages before see twice the detail and lose fewer pixels to the silhouette; single pixels see too much of the
-        recording's own noise.
-    scan_lanes, start_lanes
-        Recorded lanes the scan and the fits from its nodes look at where light is sampled.
-    exact_scan_lanes, exact_start_lanes, refine_lanes
-        Those that they and the last stage look at where every light is exact: without noise more say nothing new.
-    starts
-        Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
-    trial_evaluations
-        After as many only starts within `keep_factor` of the best cost go on.
-    solved_rms
-        Root mean square of the log residual at which no other start is tried: half a per cent cannot be seen.
-    basins, basin_factor
-        Solutions the preset `best` keeps alive to the end, and how much more than the best one they may cost.
-    """
-
-    scan: bool = True
-    grid_first: int = 4
-    grid_last: int = 8
-    side_last: int = 2
-    scan_lanes: int = 20_000
-    start_lanes: int = 80_000
-    exact_scan_lanes: int = 8_000
-    exact_start_lanes: int = 20_000
-    refine_lanes: int = 80_000
-    starts: int = 3
-    trial_evaluations: int = 10
-    keep_factor: float = 10.0
-    solved_rms: float = 5e-3
-    basins: int = 3
-    basin_factor: float = 1.5
+COST_CHANGE = 1e-5  # relative, of a step that ends a solve
+# The same where there is noise, as a part of what one value explains of pure noise (chi squared)
+NOT_SEEN = 0.3
+COST_FLOOR = 1e-11  # a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
 
 
 @dataclass(frozen=True)
@@ -103,6 +63,20 @@ class Problem:
     def equations(self) -> Callable[[Vector], NormalEquations]:
         """The normal equations as a function of the vector."""
         return normal_equations(self.evaluate, self.residual)
+
+    @property
+    def independent(self) -> float:
+        """Number of independent residuals: the channels of a group share most of their noise."""
+        return 1.5 * len(self.groups)
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials."""
+
+    x: Vector
+    all: Problem
+    few: Problem
 
 
 @dataclass(frozen=True)
@@ -198,22 +172,21 @@ class RecordedFit:
         with self.course.stage("start") as stage:
             lanes = plan.start_lanes if sampled else plan.exact_start_lanes
             more = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
-            watched = self.course.watch(stage, more.equations)
             starts = [node.x for node in different_nodes(nodes, plan.starts)]
             metals = [node for node in nodes if node.metal]
             starts += [node.x for node in metals[:2] if not any(node.x is x for x in starts)]
             starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
-            basins = self._race(watched, starts)
+            basins = self._race(stage, more, starts)
             if not np.isfinite(basins[0].equations.cost):
                 raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
             stage.vector = basins[0].x
         return basins
 
-    def _race(self, residuals: Callable[[Vector], NormalEquations], starts: list[Vector]) -> list[Solution]:
+    def _race(self, stage: Stage, problem: Problem, starts: list[Vector]) -> list[Solution]:
         """Bounded fits from all starts; those that fall behind are given up, and all others once one has solved it."""
         plan, found = self.plan, []
         for start in starts:
-            first = self._solve(residuals, start, plan.trial_evaluations)
+            first = self._solve(problem, start, plan.trial_evaluations, stage=stage)
             found.append(first)
             if self._solved(first) or self.course.should_stop():
                 break
@@ -223,7 +196,7 @@ class RecordedFit:
             behind = candidate.equations.cost > plan.keep_factor * leader.equations.cost
             if candidate.converged or behind or self._solved(leader) or self.course.should_stop():
                 continue
-            longer = self._solve(residuals, candidate.x, 40)
+            longer = self._solve(problem, candidate.x, 40, stage=stage)
             found[place] = longer
             if longer.equations.cost < leader.equations.cost:
                 leader = longer
@@ -245,71 +218,99 @@ class RecordedFit:
 
     def _solve(
         self,
-        residuals: Callable[[Vector], NormalEquations],
+        problem: Problem,
         start: Vector,
         evaluations: int,
+        *,
+        stage: Stage | None = None,
         box: tuple[Vector, Vector] | None = None,
     ) -> Solution:
-        # a cost of 1e-11 is a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
-        limits = SolveLimits(evaluations=evaluations, cost_change=1e-5, cost_floor=1e-11)
+        """A bounded solve whose evaluations are noted in `stage`; any other solution is better than one not finite."""
+        limits = SolveLimits(evaluations=evaluations, cost_change=self._cost_change(problem), cost_floor=COST_FLOOR)
         lower, upper = box or (self.table.lower, self.table.upper)
+        equations = problem.equations if stage is None else self.course.watch(stage, problem.equations)
         try:
-            return solve_bounded(residuals, start, lower, upper, limits, self.course.should_stop)
-        except ValueError:  # a start without finite numbers: every other one is better
+            return solve_bounded(equations, start, lower, upper, limits, self.course.should_stop)
+        except ValueError:
             nothing = np.zeros(len(start))
             return Solution(start, NormalEquations(np.inf, nothing, np.diag(nothing)), (np.inf,), True)
 
     def solve_within(self, problem: Problem, start: Vector, lower: Vector, upper: Vector) -> Vector:
-        """A few steps with other bounds."""
-        limits = SolveLimits(evaluations=8, cost_change=1e-5, cost_floor=1e-11)
+        """A few steps with other bounds from another solution."""
+        limits = SolveLimits(evaluations=8, cost_change=self._cost_change(problem), cost_floor=COST_FLOOR)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
-    def _rival(self, problem: Problem, solution: Solution, others: Sequence[Vector]) -> Vector | None:
+    def _cost_change(self, problem: Problem) -> float:
+        """The relative change of the cost at which a solve ends: where there is noise, what it explains by itself."""
+        return max(COST_CHANGE, NOT_SEEN / problem.independent) if self.scene.needs.sampled else COST_CHANGE
+
+    def _rival(self, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
         """The best of the other basins on the same problem, if it is clearly better."""
-        found = [self._solve(problem.equations, x, self.plan.trial_evaluations) for x in others]
-        best = min(found, key=lambda rival: rival.equations.cost, default=solution)
+        if not others:
+            return None
+        solution, *rivals = (self._solve(problem, x, self.plan.trial_evaluations) for x in (found, *others))
+        best = min(rivals, key=lambda rival: rival.equations.cost)
         return best.x if best.equations.cost < CLEARLY_LOWER * solution.equations.cost else None
 
     def refine(
         self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None, others: Sequence[Vector] = ()
-    ) -> tuple[Solution, Problem]:
+    ) -> Refined:
         """Stage `refine`: all residuals, on a new and finer recording near the solution where the light is sampled.
 
         There, residuals count in standard deviations of the reference's noise by `weigh` if given, and solutions in
         other basins (`others`) are tried: they may have cost more by the noise of the first recording alone.
         """
         with self.course.stage("refine") as stage:
-            if not self.scene.needs.sampled:
-                grid = np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
-                grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
-                if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
-                    self._record(start, grid, 1)
-                groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
-                problem = self.problem(groups, make)
-                solution = self._solve(self.course.watch(stage, problem.equations), start, 15)
-                stage.vector = solution.x
-                return solution, problem
-            solution = problem = None
-            for number in range(1, MOST_RECORDINGS + 1):
-                problem = None  # and with it the recording before
-                self._record(start, self.plan.grid_last, number)
-                fresh = self._own_variance(start)
-                solution, problem = self._refine_sampled(stage, start, make, weigh)
-                stage.vector = solution.x
-                fewer = self._own_variance(solution.x) > FEWER * fresh
-                moved = self._moved(problem, start, solution.x) > MOVED
-                if not (fewer or moved) or self.course.should_stop():
-                    break
-                start = solution.x
-            assert solution is not None
-            assert problem is not None
-            rival = self._rival(problem, solution, others)
-            if rival is not None:
-                problem = None
-                self._record(rival, self.plan.grid_last, self.recordings + 1)
-                solution, problem = self._refine_sampled(stage, rival, make, weigh)
-                stage.vector = solution.x
-        return solution, problem
+            if self.scene.needs.sampled:
+                refined = self._refine_sampled(stage, start, make, weigh, others)
+            else:
+                refined = self._refine_exact(stage, start, make)
+            stage.vector = refined.x
+        return refined
+
+    def _refine_exact(self, stage: Stage, start: Vector, make: MakeResidual) -> Refined:
+        grid = np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
+        grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
+        if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
+            self._record(start, grid, 1)
+        groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
+        problem = self.problem(groups, make)
+        return Refined(self._solve(problem, start, 15, stage=stage).x, problem, problem)
+
+    def _refine_sampled(
+        self,
+        stage: Stage,
+        start: Vector,
+        make: MakeResidual,
+        weigh: MakeWeighted | None,
+        others: Sequence[Vector],
+    ) -> Refined:
+        x = stage.vector = self._recorded_near(stage, start, make, weigh)
+        # the first weights came from a model that was still off
+        refined = self._problems(x, make, weigh)
+        rival = self._rival(refined.few, x, others)
+        if rival is not None:
+            del refined  # and with it the recording
+            self._record(rival, self.plan.grid_last, self.recordings + 1)
+            refined = self._problems(rival, make, weigh)
+            x = self._solve(refined.few, rival, 12, stage=stage).x
+            refined = self._problems(x, make, weigh)
+        return replace(refined, x=self._solve(refined.all, x, 12, stage=stage).x)
+
+    def _recorded_near(self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Vector:
+        """The solution on some tiles of a recording, made anew until it is near the material that was recorded."""
+        number = 1
+        while True:
+            self._record(start, self.plan.grid_last, number)
+            fresh = self._own_variance(start)
+            few = self._problems(start, make, weigh).few
+            x = self._solve(few, start, 12, stage=stage).x
+            fewer = self._own_variance(x) > FEWER * fresh
+            moved = self._moved(few, start, x) > MOVED
+            if not (fewer or moved) or number == MOST_RECORDINGS or self.course.should_stop():
+                return x
+            del few  # and with it the recording
+            start, number = x, number + 1
 
     def _own_variance(self, x: Vector) -> float:
         """Mean over the tiles of one over their effective number of samples: the recording's own relative variance."""
@@ -323,21 +324,15 @@ class RecordedFit:
         self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
         self.recordings = number
 
-    def _refine_sampled(
-        self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
-    ) -> tuple[Solution, Problem]:
+    def _problems(self, x: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Refined:
+        """All tiles of the last stage and some of them; `weigh` weighs by the noise that the model `x` leaves."""
         groups = self.tiles(self.plan.side_last)
-        if weigh is None:
-            problem = self.problem(groups, make)
-            return self._solve(self.course.watch(stage, problem.equations), start, 15), problem
-
-        def solve(x: Vector) -> tuple[Solution, Problem]:
+        some = np.arange(0, len(groups), max(len(groups) // self.plan.first_tiles, 1))
+        weighing = [make, make]
+        if weigh is not None:
             self.noise = self._noise(x, groups, self.plan.side_last)
-            problem = self.problem(groups, self._weighing(self.noise, groups, weigh))
-            return self._solve(self.course.watch(stage, problem.equations), x, 12), problem
-
-        # the first weights come from a model that is still off
-        return solve(solve(start)[0].x)
+            weighing = [self._weighing(noise, groups, weigh) for noise in (self.noise, self.noise.take(some))]
+        return Refined(x, self.problem(groups, weighing[0]), self.problem(groups.take(some), weighing[1]))
 
     def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)
@@ -369,8 +364,7 @@ class RecordedFit:
         with self.course.stage(name) as stage:
             residual = make(groups.average(self.reference))
             problem = Problem(self._evaluator(groups), residual, groups)
-            watched = self.course.watch(stage, problem.equations)
-            found = [self._solve(watched, start, 25, self.box) for start in starts]
+            found = [self._solve(problem, start, 25, stage=stage, box=self.box) for start in starts]
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x
         finite = [solution.x for solution in found if np.isfinite(solution.equations.cost)]
         return finite or None

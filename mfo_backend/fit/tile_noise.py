@@ -31,6 +31,10 @@ class TileNoise:
     deviation: NDArray[np.float64]
     level: float
 
+    def take(self, chosen: NDArray[np.int64]) -> TileNoise:
+        """That of the groups of these numbers."""
+        return TileNoise(self.deviation[chosen], self.level)
+
 
 def tile_noise(
     reference: Pixels,

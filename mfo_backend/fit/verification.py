@@ -3,47 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.loss import Loss, make_loss
 from ..metrics.tone_mapping import DisplayView, View
-from ..render.mitsuba_renderer import MitsubaRenderer
-from ..render.renderer import Vector
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
 from .region import MaskedLoss, fill_outside
 from .settings import FitSettings
-from .stages import Candidate
 
 VERIFY_STREAM = 0x5EED0000  # far from the seeds users choose, so that no iteration saw these random numbers
-
-_SECOND_HALF = 0x00A50000
-
-
-@dataclass(frozen=True)
-class VerifiedEnd(Candidate):
-    """A vector with its picture, scene-linear, whose two halves have no random numbers in common."""
-
-    halves: tuple[Pixels, Pixels] = field(repr=False)
-
-
-def verify_later(renderer: MitsubaRenderer, vector: Vector, *, seed: int, spp: int) -> Callable[[], VerifiedEnd]:
-    """Start a picture of `vector` of about `spp` samples a pixel; returns what waits for it.
-
-    No iteration of a fit of seed `seed` saw its random numbers, which are the same for all ends.
-    """
-    seeds = (seed ^ VERIFY_STREAM, seed ^ VERIFY_STREAM ^ _SECOND_HALF)
-    halves = [renderer.image_later(vector, seed=s, spp=max(spp // 2, 1)) for s in seeds]
-
-    def wait() -> VerifiedEnd:
-        first, second = (half() for half in halves)
-        return VerifiedEnd(vector, 0.5 * (first + second), (first, second))
-
-    return wait
 
 
 def check_reference(reference: Image, mask: NDArray[np.bool_]) -> None:

@@ -38,6 +38,7 @@ SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 # Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
 MOST_RAYS = 12_000_000
 BYTES_PER_RAY = 272
+PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
 DEEPEST = 16  # path length of a scene without a limit
 
 
@@ -77,7 +78,7 @@ class RecordedScene:
         return self._probe()
 
     def _probe(self) -> SceneNeeds:
-        """Named rules on what to trace: light kinds, and light over other surfaces by a probe of 1 ray a pixel."""
+        """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
         scene = self.renderer.scene
         sampled = any(not mi.has_flag(e.flags(), DELTA) for e in scene.emitters())
         limit = int(getattr(self._integrator, "max_depth", 2))
@@ -85,7 +86,7 @@ class RecordedScene:
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
         width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
-        stride = max(1, math.ceil(math.sqrt(width * height / MOST_RAYS)))
+        stride = max(1, math.ceil(math.sqrt(width * height / PROBE_RAYS)))
         share = indirect_share(
             scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths, stride=stride
         )

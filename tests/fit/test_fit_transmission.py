@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit import fit_transmission
+from mfo_backend.fit import fit_transmission, verified_end
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.render.renderer import load_renderer
@@ -138,7 +138,7 @@ def test_no_launch_is_longer_than_a_request_to_stop_may_wait(tmp_path, monkeypat
     from mfo_backend.render import traced_paths
 
     launches, parts = [], []
-    launch, image = traced_paths.TracedPaths._launch, renderer.image
+    launch, image = traced_paths.TracedPaths._launch, renderer.image_later
 
     def launched(self, vectors, pixels, begin, seed, samples, jacobian):
         launches.append(len(vectors) * len(pixels) * samples)
@@ -149,11 +149,11 @@ def test_no_launch_is_longer_than_a_request_to_stop_may_wait(tmp_path, monkeypat
         return image(x, seed=seed, spp=spp)
 
     monkeypatch.setattr(traced_paths.TracedPaths, "_launch", launched)
-    monkeypatch.setattr(renderer, "image", part)
+    monkeypatch.setattr(renderer, "image_later", part)
     fit(renderer, reference)
     assert max(launches) <= traced_paths.MOST_LANES == 1 << 17
-    assert len(parts) > 2
-    assert max(parts) <= fit_transmission.PATHS_OF_A_PART == 1 << 18
+    assert len(parts) > 4
+    assert max(parts) <= verified_end.PATHS_OF_A_PART == 1 << 18
 
 
 def test_losses_of_the_users_choice_are_no_stages_of_glass(tmp_path):

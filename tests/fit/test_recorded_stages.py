@@ -24,6 +24,7 @@ def refined(tmp_path, monkeypatch):
     )
     from mfo_backend.fit import recorded_stages
     from mfo_backend.fit.course import Course
+    from mfo_backend.fit.recorded_plan import RecordedPlan
     from mfo_backend.fit.residuals import RelativeResidual, WeightedResidual
     from mfo_backend.render.recorded_scene import RecordedScene
 
@@ -35,10 +36,10 @@ def refined(tmp_path, monkeypatch):
             monkeypatch.setattr(recorded_stages, name, value)
         course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
         scene = RecordedScene(renderer, int(mask.sum()))
-        fit = recorded_stages.RecordedFit(scene, reference, mask, recorded_stages.RecordedPlan(), 1, course)
+        fit = recorded_stages.RecordedFit(scene, reference, mask, RecordedPlan(), 1, course)
         fit.paths = None  # `refine` makes its own
-        solution, _ = fit.refine(table.pack(FAR), RelativeResidual, WeightedResidual)
-        found = renderer.image(solution.x, seed=9, spp=256)
+        refined = fit.refine(table.pack(FAR), RelativeResidual, WeightedResidual)
+        found = renderer.image(refined.x, seed=9, spp=256)
         return float(np.sqrt(np.mean((found - true)[mask] ** 2) / np.mean(true[mask] ** 2))), fit.recordings
 
     return run

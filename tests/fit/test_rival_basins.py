@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.recorded_stages import RecordedFit, RecordedPlan
-from mfo_backend.solve.bounded_least_squares import NormalEquations, Solution
+from mfo_backend.fit.recorded_plan import RecordedPlan
+from mfo_backend.fit.recorded_stages import RecordedFit
+from mfo_backend.solve.bounded_least_squares import NormalEquations
 
 
 def two_valleys(x):
@@ -29,9 +30,10 @@ def test_the_better_valley_is_gone_on_with(others, expected):
     fit.plan = RecordedPlan()
     fit.table = SimpleNamespace(lower=np.array([-3.0]), upper=np.array([3.0]))
     fit.course = SimpleNamespace(should_stop=lambda: False)
-    problem = SimpleNamespace(equations=two_valleys)
-    left = Solution(np.array([-0.995]), two_valleys(np.array([-0.995])), (), True)
-    assert left.equations.cost > 0.019
+    fit.scene = SimpleNamespace(needs=SimpleNamespace(sampled=True))
+    problem = SimpleNamespace(equations=two_valleys, independent=1e6)
+    left = np.array([-0.995])
+    assert two_valleys(left).cost > 0.019
     rival = fit._rival(problem, left, [np.array([x]) for x in others])
     assert (rival is None) == (expected is None)
     if rival is not None:
