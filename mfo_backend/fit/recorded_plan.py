@@ -56,5 +56,9 @@ class RecordedPlan:
 
     @staticmethod
     def of(preset: str) -> RecordedPlan:
-        """The plan of a preset; `fast` looks with fewer rays, which costs 10 to 20 % in error under light probes."""
+        """The plan of a preset.
+
+        `fast` takes 25 camera rays a pixel at the solution instead of 64: under light probes a fit takes 35 to 60 % of
+        the processor time, and its error is the same to 15 % under a reference of 4 samples, twice under one of 64.
+        """
         return RecordedPlan(grid_last=5) if preset == "fast" else RecordedPlan()
