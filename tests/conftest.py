@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import os
 
+# as the `mfo` command does, before NumPy reads it: its threads wait for each other where a machine is busy
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from hypothesis import HealthCheck, settings
 
 # a machine under load is slow, so no example has a deadline; the database would write into the working folder

@@ -47,7 +47,8 @@ class FitSettings:
         Random numbers and samples per pixel of an iteration; every iteration of a fit uses the same seed, so that
         its losses can be compared.
     verify_spp
-        Samples per pixel of the final pictures, which have a seed of their own.
+        Samples per pixel of the final pictures, which have a seed of their own; the presets other than `paper` take
+        fewer where more would say nothing (`fit.verified_end`).
     max_iterations, patience
         Of each stage; `patience` is the ten of the paper's rules.
     learning_rate, schedule

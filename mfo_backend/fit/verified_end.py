@@ -29,13 +29,31 @@ _NEXT_SAMPLE = 0x9E3779B9  # as between the parts of one picture, so that none r
 
 @dataclass(frozen=True)
 class VerifiedEnd(Candidate):
-    """A vector with its picture, scene-linear, whose two halves have no random numbers in common.
-
-    `samples` is the number of samples a pixel in each half.
-    """
+    """A vector with its picture, scene-linear, whose two halves have no random numbers in common."""
 
     halves: tuple[Pixels, Pixels] = field(repr=False)
+
+
+@dataclass
+class GrowingPicture:
+    """Two halves of a picture of a vector, and the samples a pixel that each of them has."""
+
+    vector: Vector
+    halves: list[Pixels]
     samples: int
+
+    def add(self, halves: Sequence[Pixels], samples: int) -> None:
+        """Take in further halves of as many samples."""
+        share = np.float32(samples / (self.samples + samples))
+        for half, more in zip(self.halves, halves, strict=True):
+            half *= 1 - share
+            half += share * more
+        self.samples += samples
+
+    def end(self) -> VerifiedEnd:
+        """The picture as it is now."""
+        first, second = self.halves
+        return VerifiedEnd(self.vector, 0.5 * (first + second), (first, second))
 
 
 class Verification:
@@ -66,53 +84,54 @@ class Verification:
         self._seed, self._most = seed ^ VERIFY_STREAM, max(most // 2, 1)
         linear = reference.encoding is Encoding.LINEAR
         self._reference = view.display(np.maximum(reference.pixels, 0.0)) if linear else reference.pixels
-        self._part = max(PATHS_OF_A_PART // mask.size, 1)
+        # a power of two: any other number of samples is another kernel
+        self._part = 1 << max(PATHS_OF_A_PART // mask.size, 1).bit_length() - 1
 
-    def begin(self, vector: Vector) -> Callable[[], VerifiedEnd]:
+    def begin(self, vector: Vector) -> Callable[[], GrowingPicture]:
         """Start the first samples of a picture; returns what waits for it."""
         samples = min(FIRST_SAMPLES // 2, self._most, self._part)
         halves = self._halves_later(vector, 0, samples)
+        return lambda: GrowingPicture(vector, [half() for half in halves], samples)
 
-        def wait() -> VerifiedEnd:
-            first, second = (half() for half in halves)
-            return VerifiedEnd(vector, 0.5 * (first + second), (first, second), samples)
-
-        return wait
-
-    def pictures(self, start: Callable[[], VerifiedEnd], ends: Sequence[Vector]) -> list[VerifiedEnd]:
+    def pictures(self, start: Callable[[], GrowingPicture], ends: Sequence[Vector]) -> list[VerifiedEnd]:
         """The pictures of the start, which has begun, and of the fit's ends.
 
         The ends are near each other, so all of them have as many samples as the one that needs most.
         """
-        found = [self.begin(end) for end in ends]
-        return [*self._enough([start()]), *self._enough([end() for end in found])]
+        begun = [self.begin(end) for end in ends]
+        groups = [[start()], [end() for end in begun]]
+        for group in groups:
+            self._grow(group)
+        return [picture.end() for group in groups for picture in group]
 
-    def _enough(self, ends: list[VerifiedEnd]) -> list[VerifiedEnd]:
-        while ends and ends[0].samples < self._most and not self._should_stop():
-            if ends[0].samples >= FIRST_SAMPLES // 2 and not any(self.is_noisy(end) for end in ends):
-                break
-            ends = [self._grown(end) for end in ends]
-        return ends
+    def _grow(self, pictures: list[GrowingPicture]) -> None:
+        """Double the samples of all pictures until they say enough."""
+        wanted = FIRST_SAMPLES // 2
+        while pictures:
+            while pictures[0].samples < min(wanted, self._most):
+                if self._should_stop():
+                    return
+                for picture in pictures:
+                    self._add_part(picture, min(wanted, self._most) - picture.samples)
+            if wanted >= self._most or not any(self.is_noisy(*picture.halves) for picture in pictures):
+                return
+            wanted *= 2
 
-    def is_noisy(self, end: VerifiedEnd) -> bool:
-        """Whether noise is more than `NOISE_SHARE` of what the picture and the reference differ by in the mask.
+    def is_noisy(self, first: Pixels, second: Pixels) -> bool:
+        """Whether noise is more than `NOISE_SHARE` of what the mean of two halves and the reference differ by.
 
-        Noise that most pixels do not show is none: under lights without extent only the silhouette has some.
+        Noise that most pixels of the mask do not show is none: under lights of no extent only the silhouette has some.
         """
-        first, second = (self._view.display(np.maximum(half[self._mask], 0.0)) for half in end.halves)
+        first, second = (self._view.display(np.maximum(half[self._mask], 0.0)) for half in (first, second))
         noise = np.square(first - second) / 4.0  # of their mean
         if np.median(noise) < UNSEEN**2:
             return False
         difference = np.square(0.5 * (first + second) - self._reference[self._mask])
         return bool(noise.mean() > NOISE_SHARE * difference.mean())
 
-    def _grown(self, end: VerifiedEnd) -> VerifiedEnd:
-        """The picture with twice the samples, or one part more where they are many."""
-        more = min(end.samples, self._most - end.samples, self._part)
-        share = more / (end.samples + more)
-        added = [half() for half in self._halves_later(end.vector, end.samples, more)]
-        first, second = ((1.0 - share) * old + share * new for old, new in zip(end.halves, added, strict=True))
-        return VerifiedEnd(end.vector, 0.5 * (first + second), (first, second), end.samples + more)
+    def _add_part(self, picture: GrowingPicture, most: int) -> None:
+        samples = min(most, self._part)
+        picture.add([half() for half in self._halves_later(picture.vector, picture.samples, samples)], samples)
 
     def _halves_later(self, vector: Vector, after: int, samples: int) -> list[Callable[[], Pixels]]:
         """Start `samples` more samples a pixel of both halves; a whole picture counts as one pass."""

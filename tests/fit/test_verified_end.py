@@ -97,16 +97,20 @@ def test_no_more_samples_than_asked_for(most):
     assert samples_of(renderer, 0.4) == 2 * max(most // 2, 1)
 
 
-def test_a_request_to_stop_ends_it_between_parts():
+def test_a_request_to_stop_ends_it():
     renderer = Renderer()
     start, end = found(renderer, 0.4, 0.4, [0.4001], should_stop=lambda: True)
     assert samples_of(renderer, 0.4) == samples_of(renderer, 0.4001) == FIRST_SAMPLES
     assert start.image.shape == end.image.shape == SHAPE
 
 
-def test_large_pictures_come_in_parts():
+def test_large_pictures_come_in_parts_that_a_stop_is_heard_between():
     side = 1 << 9
-    renderer = Renderer(shape=(side, side, 3))
-    found(renderer, 0.4, 0.9, [], shape=(side, side, 3))
+    shape = (side, side, 3)
+    renderer = Renderer(shape=shape)
+    found(renderer, 0.4, 0.9, [], shape=shape)
     assert max(side * side * spp for _, _, spp in renderer.taken) <= PATHS_OF_A_PART
     assert samples_of(renderer, 0.9) == FIRST_SAMPLES
+    renderer = Renderer(shape=shape)
+    found(renderer, 0.4, 0.9, [0.4], shape=shape, should_stop=lambda: len(renderer.taken) > 6)
+    assert len(renderer.taken) == 8  # two parts of each half of each picture
