@@ -6,20 +6,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..material.mitsuba_parameters import MITSUBA_PRINCIPLED
 from ..scene.exr_file import write_exr
 from ..types.parameter import Value
 from .assets import generated_probe
 from .bumpy_sphere import bumpy_sphere, write_ply
-from .scene import SHAPE
-from .scene_text import on_sphere, point_light, principled, probe_light, scene_text
+from .scene import SHAPE, TABLES, materials_of, shown_bsdf
+from .scene_text import on_sphere, point_light, probe_light, scene_text
 
 REDUCED = ("base_color", "roughness", "metallic", "specular")
 OPAQUE = (*REDUCED, "anisotropic", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss")
-GLASS = ("base_color", "roughness", "eta", "spec_trans")
+GLASS = ("base_color", "roughness", "ior", "transmission_weight")
 _NEAR, _FAR = 3.6, 26.0  # of the camera: the object fills nine tenths of the frame, or 8 of 64 pixels
 _EDGE = 1e-3
 
@@ -32,6 +32,8 @@ class HardCase:
     ----------
     light
         ``"point"``, ``"probe"`` (with small bright lamps) or ``"soft"`` (an environment of low frequency).
+    model
+        Material model of truth and fit: Blender's for glass, which the presets fit in that model only.
     truth
         Values that are not drawn at random.
     fitted
@@ -54,6 +56,7 @@ class HardCase:
 
     name: str
     light: str = "point"
+    model: str = "mitsuba_principled"
     truth: Mapping[str, Value] = field(default_factory=dict)
     fitted: tuple[str, ...] = OPAQUE
     spp: int = 1024
@@ -66,12 +69,17 @@ class HardCase:
     @property
     def noisy(self) -> bool:
         """Whether the reference's own noise is what limits the result."""
-        return self.light != "point" or "spec_trans" in self.truth
+        return self.light != "point" or self.is_glass
+
+    @property
+    def is_glass(self) -> bool:
+        """Whether light passes through the material."""
+        return self.model == "blender_principled"
 
 
 def _glass(roughness: float) -> HardCase:
-    truth = {"spec_trans": 1.0 - _EDGE, "metallic": 0.0, "roughness": roughness}
-    return HardCase(f"glass-{roughness:g}", "probe", truth, GLASS, spp=32, limit=0.02)
+    truth = {"transmission_weight": 1.0 - _EDGE, "roughness": roughness}
+    return HardCase(f"glass-{roughness:g}", "probe", "blender_principled", truth, GLASS, spp=32, limit=0.02)
 
 
 HARD_CASES = {
@@ -103,7 +111,10 @@ HARD_CASES = {
 
 @dataclass(frozen=True)
 class HardScene:
-    """`file` shows the start's material, `true_file` what the reference is rendered from."""
+    """`file` shows the start's material, `true_file` what the reference is rendered from.
+
+    `materials` are the sockets of the start, where the case's model has them.
+    """
 
     case: HardCase
     seed: int
@@ -111,6 +122,7 @@ class HardScene:
     true_file: Path
     truth: Mapping[str, Value]
     start: Mapping[str, Value]
+    materials: Mapping[str, Any]
 
 
 def write_hard_scene(case: HardCase, seed: int, size: int, folder: Path) -> HardScene:
@@ -118,9 +130,9 @@ def write_hard_scene(case: HardCase, seed: int, size: int, folder: Path) -> Hard
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng([seed, *case.name.encode()])
     drawn = case.fitted or REDUCED
-    truth = _material(rng, drawn) | dict(case.truth)
+    truth = _material(case.model, rng, drawn) | dict(case.truth)
     # what is not sought is the same in both
-    start = truth | {name: value for name, value in _material(rng, drawn).items() if name in case.fitted}
+    start = truth | {name: value for name, value in _material(case.model, rng, drawn).items() if name in case.fitted}
     meshes = [folder / "object.ply", folder / "other.ply"]
     for number, mesh in enumerate(meshes):
         write_ply(mesh, *bumpy_sphere(int(rng.integers(2**31)) + number))
@@ -129,22 +141,21 @@ def write_hard_scene(case: HardCase, seed: int, size: int, folder: Path) -> Hard
     light = _light(case, azimuth, rng, folder)
 
     def write(name: str, values: Mapping[str, Value], mesh: Path) -> Path:
-        bsdf = principled("target_bsdf", values, two_sided="spec_trans" not in values)
-        depth = 8 if "spec_trans" in values else 2
-        path = folder / name
-        path.write_text(scene_text(SHAPE, mesh, bsdf, [light], camera, size, depth), "utf-8")
+        path, depth = folder / name, 8 if case.is_glass else 2
+        path.write_text(scene_text(SHAPE, mesh, shown_bsdf(case.model, values), [light], camera, size, depth), "utf-8")
         return path
 
     true_file = write("true.xml", truth, meshes[1 if case.other_object else 0])
-    return HardScene(case, seed, write("scene.xml", start, meshes[0]), true_file, truth, start)
+    file = write("scene.xml", start, meshes[0])
+    return HardScene(case, seed, file, true_file, truth, start, materials_of(case.model, start))
 
 
-def _material(rng: np.random.Generator, names: tuple[str, ...]) -> dict[str, Value]:
+def _material(model: str, rng: np.random.Generator, names: tuple[str, ...]) -> dict[str, Value]:
     values: dict[str, Value] = {}
     for name in names:
-        parameter = MITSUBA_PRINCIPLED[name]
+        parameter = TABLES[model][name]
         low = 0.1 if name == "roughness" else parameter.lower
-        high = {"eta": 1.8, "anisotropic": 0.9}.get(name, parameter.upper)
+        high = {"ior": 1.8, "anisotropic": 0.9}.get(name, parameter.upper)
         drawn = rng.uniform(low, high, parameter.size)
         values[name] = float(drawn[0]) if parameter.size == 1 else tuple(float(v) for v in drawn)
     return values

@@ -62,13 +62,13 @@ def run_hard_case(case: HardCase, seed: int, size: int, folder: Path, preset: st
     """Fit one scene of a case and judge it in pictures that the fit has not seen."""
     scene = write_hard_scene(case, seed, size, folder)
     try:
-        renderer = load_renderer(scene.file, SHAPE, model="mitsuba_principled", parameters=case.fitted)
+        renderer = _load(scene, scene.file)
     except MfoError as error:  # a refusal in words is the right end where all is locked
         return HardRun(case.name, seed, not case.fitted, 0.0, 0.0, True, 0.0, (str(error),))
-    true = load_renderer(scene.true_file, SHAPE, model="mitsuba_principled", parameters=case.fitted)
+    true = _load(scene, scene.true_file)
     exact = None if case.noisy else ExactPicture(true, true.table.pack(scene.truth))
     reference, view = _reference(case, scene, true, exact)
-    settings = FitSettings(model="mitsuba_principled", preset=preset, seed=seed, max_iterations=60)
+    settings = FitSettings(model=case.model, preset=preset, seed=seed, max_iterations=60)
     result = recover_material(
         renderer, reference, settings, display=view, listener=lambda event: None, should_stop=lambda: False
     ).result
@@ -91,6 +91,11 @@ def run_hard_case(case: HardCase, seed: int, size: int, folder: Path, preset: st
     known = np.isfinite(case.limit)  # elsewhere no value is right
     wrong = wrongly_determined(result, scene.truth, true.table) if known else ()
     return HardRun(case.name, seed, solved, error, start_error, finite, result.passes, guards, wrong)
+
+
+def _load(scene: HardScene, file: Path) -> Renderer:
+    case = scene.case
+    return load_renderer(file, SHAPE, model=case.model, parameters=case.fitted, materials=scene.materials)
 
 
 def wrongly_determined(result: FitResult, truth: Mapping[str, Value], table: ParameterTable) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ class BenchScene:
     @property
     def materials(self) -> dict[str, Any]:
         """Sockets of the start, where the scenario's model has them."""
-        return materials_of(self.scenario, self.start) if self.sockets is None else dict(self.sockets)
+        return materials_of(self.scenario.model, self.start) if self.sockets is None else dict(self.sockets)
 
 
 def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, folder: Path) -> BenchScene:
@@ -83,7 +83,7 @@ def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, fold
         (folder / file).write_text(text, "utf-8")
         return folder / file
 
-    shown = shown_bsdf(scenario, start)
+    shown = shown_bsdf(scenario.model, start)
     files = [write("scene.xml", shown, emitters[0])]
     files += [write(f"relit_{n}.xml", shown, emitter) for n, emitter in enumerate(emitters[1:])]
     true_files = [write(f"true_{n}.xml", true_bsdf, emitter) for n, emitter in enumerate(emitters) if true_bsdf]
@@ -93,15 +93,15 @@ def write_scene(scenario: Scenario, number: int, size: int, assets: Assets, fold
     )  # fmt: skip
 
 
-def shown_bsdf(scenario: Scenario, values: Mapping[str, Value]) -> str:
+def shown_bsdf(model: str, values: Mapping[str, Value]) -> str:
     """The target's BSDF; Blender's takes the place of this one when its sockets are given with the scene."""
-    mitsuba = scenario.model == "mitsuba_principled"
+    mitsuba = model == "mitsuba_principled"
     return principled("target_bsdf", values if mitsuba else {}, two_sided=mitsuba)
 
 
-def materials_of(scenario: Scenario, values: Mapping[str, Value]) -> dict[str, Any]:
+def materials_of(model: str, values: Mapping[str, Value]) -> dict[str, Any]:
     """What a renderer is told beside the scene: the sockets of Blender's model, nothing for Mitsuba's."""
-    if scenario.model == "mitsuba_principled":
+    if model == "mitsuba_principled":
         return {}
     sockets = {SOCKET_OF_PARAMETER[name]: {"value": value, "linked": False} for name, value in values.items()}
     return {"target_bsdf": {"sockets": sockets}}

@@ -71,11 +71,11 @@ def measure_surface(
     judge = Judge(scene)
     start = {**judge.true_values(), **{name: scene.start.get(name, 0.0) for name in names}}
     file = folder / "surface.xml"
-    text = scene.file.read_text("utf-8").replace(shown_bsdf(chosen, scene.start), shown_bsdf(chosen, start))
+    text = scene.file.read_text("utf-8").replace(shown_bsdf(chosen.model, scene.start), shown_bsdf(chosen.model, start))
     file.write_text(text, "utf-8")
     settings = method_settings(method, chosen, number)
     renderer = load_mitsuba_renderer(
-        file, SHAPE, model=settings.model, parameters=names, materials=materials_of(chosen, start)
+        file, SHAPE, model=settings.model, parameters=names, materials=materials_of(chosen.model, start)
     )
     if (renderer.table.names != names and renderer.table.names != names[::-1]) or renderer.table.length != 2:
         raise BadInputError(f"A loss surface needs two scalar parameters, not {names[0]!r} and {names[1]!r}.")

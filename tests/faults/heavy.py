@@ -40,11 +40,11 @@ def main() -> None:
 
 
 def large_pictures(folder: Path, size: int) -> Iterator[dict[str, Any]]:
-    """Fits of a sphere to references of `size` and of half of it squared pixels."""
-    cases = (("point light", POINT.format(40.0), "fast", size), ("sky", SKY.format(1.0), "balanced", size // 2))
-    for light, text, preset, side in cases:
-        path = job(folder, side, text, preset=preset)
-        yield measured(f"fit, {side}x{side}, {light}, {preset}", "-m", "mfo_backend", "run", path, "--progress", "none")
+    """Fits of a sphere to references of `size` squared pixels."""
+    cases = (("point light", POINT.format(40.0), "fast"), ("sky", SKY.format(1.0), "balanced"))
+    for light, text, preset in cases:
+        path = job(folder, size, text, preset=preset)
+        yield measured(f"fit, {size}x{size}, {light}, {preset}", "-m", "mfo_backend", "run", path, "--progress", "none")
 
 
 def many_triangles(folder: Path, segments: int, size: int = 128) -> Iterator[dict[str, Any]]:
