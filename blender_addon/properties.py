@@ -63,7 +63,7 @@ REDUCED = {"base_color", "roughness", "metallic", "specular"}
 PRESET_ITEMS = (
     ("balanced", "Balanced", "Least squares on recorded light paths, then on perceptual differences; no start needed"),
     ("best", "Best", "As Balanced, then FLIP itself is lowered from the best few solutions; a second or two longer"),
-    ("fast", "Fast", "Least squares on recorded light paths only"),
+    ("fast", "Fast", "Least squares only, on fewer recorded light paths; the quickest"),
     ("paper", "Paper", "Adam on the mean squared error until it stops improving, then a new optimisation on FLIP"),
 )
 

@@ -64,7 +64,7 @@ _GERMAN = {
     "Job Folders": "Auftragsordner",
     "LDR": "LDR",
     "As Balanced, then FLIP itself is lowered from the best few solutions; a second or two longer": "Wie Ausgewogen, danach wird FLIP selbst von den besten Lösungen aus gesenkt; ein bis zwei Sekunden länger",
-    "Least squares on recorded light paths only": "Nur kleinste Quadrate auf aufgezeichneten Lichtwegen",
+    "Least squares only, on fewer recorded light paths; the quickest": "Nur kleinste Quadrate auf weniger aufgezeichneten Lichtwegen; am schnellsten",
     "Least squares on recorded light paths, then on perceptual differences; no start needed": "Kleinste Quadrate auf aufgezeichneten Lichtwegen, dann auf wahrgenommenen Unterschieden; braucht keinen Startwert",
     "Least": "Mindestens",
     "List what will be left out and what stops a fit, with everything an export would say": "Auflisten, was weggelassen wird und was eine Anpassung verhindert, mit allem, was ein Export meldet",
