@@ -38,7 +38,7 @@ SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 # Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
 MOST_RAYS = 12_000_000
 BYTES_PER_RAY = 272
-# Further bytes that are mapped and never touched: Dr.Jit rounds sizes up to powers of two and keeps what is freed by size
+# Bytes that are mapped beyond those: Dr.Jit rounds sizes up to powers of two and keeps what is freed by its size
 MAPPED_PER_RAY = 340
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
 DEEPEST = 16  # path length of a scene without a limit
