@@ -328,11 +328,13 @@ class RecordedFit:
         """All tiles of the last stage and some of them; `weigh` weighs by the noise that the model `x` leaves."""
         groups = self.tiles(self.plan.side_last)
         some = np.arange(0, len(groups), max(len(groups) // self.plan.first_tiles, 1))
-        weighing = [make, make]
+        weighing = fewer = make
         if weigh is not None:
-            self.noise = self._noise(x, groups, self.plan.side_last)
-            weighing = [self._weighing(noise, groups, weigh) for noise in (self.noise, self.noise.take(some))]
-        return Refined(x, self.problem(groups, weighing[0]), self.problem(groups.take(some), weighing[1]))
+            noise = self.noise = self._noise(x, groups, self.plan.side_last)
+            weighing, fewer = (self._weighing(n, groups, weigh) for n in (noise, noise.take(some)))
+        problem = self.problem(groups, weighing)
+        few = problem if len(some) == len(groups) else self.problem(groups.take(some), fewer)
+        return Refined(x, problem, few)
 
     def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)
