@@ -32,13 +32,17 @@ class Highlights:
     """How finely highlights are resolved.
 
     `narrowest` is the smallest width alpha of a lobe to resolve, `share` the half diagonal of a cell in slopes over the
-    scale on which the lobe changes there. At most `most` cells are split.
+    scale on which the lobe changes there. At most `most` cells are split. `narrow` is the width of an anisotropic lobe
+    along its bitangent relative to that along its tangent, and `turn` how far, in full turns, the lobe's axes are
+    turned from the surface's.
     """
 
     narrowest: float = 1e-3  # Mitsuba's coat of gloss 1; roughness 0.05 has 2.5e-3
     share: float = 0.5
     most: int = 60_000
     levels: int = 9  # 1 / 512 of the first cell
+    narrow: float = 1.0
+    turn: float = 0.0
 
 
 def highlight_cells(
@@ -59,7 +63,7 @@ def highlight_cells(
         si, on_target = first_hits(rays_in(new))
         size = np.zeros(len(new))
         for light in lights:
-            size = np.maximum(size, _sizes(*_slopes(light, si, on_target), settings.narrowest))
+            size = np.maximum(size, _sizes(*_slopes(light, si, on_target, settings.turn), settings))
         split = size > settings.share
         if split.sum() > left:  # the coarsest first
             split &= size > np.partition(size, -left - 1)[-left - 1]
@@ -72,24 +76,48 @@ def highlight_cells(
 
 
 def _slopes(
-    light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Slopes (3, cells, 4) of the half vector against the normal, in the world's frame, and where there is light."""
+    light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool, turn: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """Slopes (3, cells, 4) of the half vector against the normal, the lobe's axes there, and where there is light.
+
+    All are in the world's frame: that of a surface may turn from one ray to the next. The axes (2, 3, cells, 4) are the
+    lobe's tangent and bitangent.
+    """
     ds, value = light.sample_direction(si, mi.Point2f(0.5))
     wo = si.to_local(ds.d)
     lit = on_target & (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
     half = si.wi + wo
-    # a frame's tangents may turn from one ray to the next, the world's axes do not
-    slope = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0))
-    dr.eval(slope, lit)
-    return np.stack([slope[axis].numpy() for axis in range(3)]).reshape(3, -1, 4), np.array(lit).reshape(-1, 4)
+    sine, cosine = dr.sincos(dr.opaque(mi.Float, 2.0 * np.pi * turn))
+    local = (
+        mi.Vector3f(half.x / half.z, half.y / half.z, 0.0),
+        mi.Vector3f(cosine, sine, 0),
+        mi.Vector3f(-sine, cosine, 0),
+    )
+    slope, *axes = (si.to_world(vector) for vector in local)
+    dr.eval(slope, axes, lit)
+
+    def of_cells(vector: mi.Vector3f) -> NDArray[np.float32]:
+        return np.stack([vector[axis].numpy() for axis in range(3)]).reshape(3, -1, 4)
+
+    return of_cells(slope), np.stack([of_cells(axis) for axis in axes]), np.array(lit).reshape(-1, 4)
 
 
-def _sizes(slope: NDArray[np.float32], lit: NDArray[np.bool_], narrowest: float) -> NDArray[np.float64]:
-    """Half diagonals of cells in slopes, relative to the scale on which a lobe changes there; 0 in the dark."""
+def _sizes(
+    slope: NDArray[np.float32], axes: NDArray[np.float32], lit: NDArray[np.bool_], settings: Highlights
+) -> NDArray[np.float64]:
+    """Half diagonals of cells in slopes, relative to the scale on which a lobe changes there; 0 in the dark.
+
+    A lobe of widths ax and ay = r ax, r < 1, changes along its bitangent over sqrt(ay^2 + ty^2 + (r tx)^2).
+    """
     count = np.maximum(lit.sum(-1), 1)
     slope = np.where(lit, slope, 0.0)
     middle = slope.sum(-1) / count
-    away = np.linalg.norm(slope - middle[..., None], axis=0) * lit
-    radius = away.max(-1) / (2.0 * GAUSS)  # corners lie further out than the points
-    return np.where(count > 1, radius / (narrowest + np.linalg.norm(middle, axis=0)), 0.0)
+    away = (slope - middle[..., None]) * lit
+    reach = 1.0 / (2.0 * GAUSS)  # corners lie further out than the points
+    size = reach * np.linalg.norm(away, axis=0).max(-1) / (settings.narrowest + np.linalg.norm(middle, axis=0))
+    if settings.narrow < 1.0:
+        tangent, bitangent = axes[..., 0]  # one frame for a cell: where it turns within one, smaller cells are no help
+        tx, ty = (np.sum(axis * middle, axis=0) for axis in (tangent, bitangent))
+        across = reach * np.abs(np.sum(bitangent[..., None] * away, axis=0)).max(-1)
+        size = np.maximum(size, across / np.sqrt(settings.narrowest**2 + ty**2 + (settings.narrow * tx) ** 2))
+    return np.where(count > 1, size, 0.0)

@@ -124,12 +124,18 @@ class RecordedScene:
         stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
         stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
-        highlights = highlights or Highlights(share=SHARE_NEAR if near else SHARE_FIRST)
+        highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
         settings = RecordSettings(
             grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths, pixels, highlights
         )
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def _highlights(self, vector: NDArray[np.float64]) -> Highlights:
+        """How finely highlights of the material `vector` are recorded: an anisotropic lobe is narrow along one axis."""
+        anisotropy, turn = (self._value(vector, name) for name in ("anisotropic", "anisotropic_rotation"))
+        narrow = 1.0 - 0.9 * anisotropy if isinstance(anisotropy, float) else 1.0  # of both models
+        return Highlights(share=SHARE_NEAR, narrow=narrow, turn=turn if isinstance(turn, float) else 0.0)
 
     def _affordable(self, grid: int | NDArray[np.int64], stride: int) -> tuple[int, NDArray[np.bool_] | None]:
         """The stride with which a recording does not take too many camera rays, and the pixels it should look at.
@@ -190,7 +196,7 @@ class RecordedScene:
 
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
-        return table.unpack(vector)[name] if name in table.names else self._fixed[name]
+        return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
 
 
 def _rays(squares: NDArray[np.int64], stride: int) -> int:

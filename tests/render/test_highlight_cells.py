@@ -9,10 +9,10 @@ import pytest
 from mfo_backend.render.renderer import load_renderer
 from tests.render.scenes import POINT, SKY, SUN_AND_SPOT, write_scene
 
-MIRROR = {"roughness": 0.05, "metallic": 0.9, "specular": 0.5, "base_color": (0.8, 0.5, 0.2)}
+MIRROR = {"roughness": 0.05, "metallic": 0.9, "specular": 0.5, "base_color": (0.8, 0.5, 0.2), "anisotropic": 0.001}
 
 
-def recorded(folder, lights, rfilter="box", roughness=0.05):
+def recorded(folder, lights, rfilter="box", roughness=0.05, anisotropic=0.001):
     path = write_scene(folder, lights, size=24, rfilter=rfilter)
     renderer = load_renderer(path, "target", model="mitsuba_principled", parameters=list(MIRROR))
     from mfo_backend.render.highlight_cells import Highlights
@@ -20,7 +20,7 @@ def recorded(folder, lights, rfilter="box", roughness=0.05):
     from mfo_backend.render.recorded_scene import RecordedScene
 
     scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
-    x = renderer.table.pack({**MIRROR, "roughness": roughness})
+    x = renderer.table.pack({**MIRROR, "roughness": roughness, "anisotropic": anisotropic})
 
     def picture(grid, share=None, **bounds):
         highlights = None if share is None else Highlights(share=share, **bounds)
@@ -53,6 +53,17 @@ def test_a_highlight_narrower_than_a_pixel_is_integrated(tmp_path, lights, rfilt
     assert error(found, expected) < 0.004
     assert error(found, expected) < 0.1 * error(coarse, expected)
     assert paths.lanes < 0.1 * uniform.lanes
+
+
+def test_an_anisotropic_highlight_is_narrow_along_one_axis(tmp_path):
+    _, picture = recorded(tmp_path, POINT, roughness=0.14, anisotropic=0.9)
+    expected, _ = picture(60, share=0.1, narrow=0.19)
+    found, paths = picture(2, share=0.35, narrow=0.19)
+    round_one, fewer = picture(2, share=0.35)
+    across, _ = picture(2, share=0.35, narrow=0.19, turn=0.25)  # the wrong axis is no help
+    assert error(found, expected) < 0.4 * error(round_one, expected)
+    assert error(across, expected) > 0.8 * error(round_one, expected)
+    assert paths.lanes < 2.0 * fewer.lanes  # cells as small along both axes would be up to 28 times as many
 
 
 def test_weights_still_add_up_and_the_dark_takes_no_more_rays(tmp_path):
