@@ -100,7 +100,8 @@ def fit_recorded(
         first, *others = (basin.x for basin in basins)
         refined = fit.refine(first, _censored(make, reference, view), _weighted(reference, view), others)
         weighted = scene.needs.sampled and not isinstance(view, BakedView)
-        kept = keep_values(fit, refined, weighted=weighted)
+        seen = None if weighted else PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
+        kept = keep_values(fit, refined, weighted=weighted, seen=seen)
         fit.box = box_holding(fit.table, renderer.start, kept.held)
         ends.append(End("refine", kept.x))
         notes += kept.notes

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..solve.box_quadratic import minimise_in_box
 from ..types.certainty import Certainty, Level
+from ..types.image import Pixels
 from ..types.parameter import ParameterTable
 from .recorded_stages import Problem, RecordedFit, Refined, Vector
 from .residuals import RelativeResidual, residual_rows
@@ -21,6 +23,7 @@ KEEP_TOLERANCE = 1.01
 HOPELESS = 1.1  # the same, by some of the groups
 # A lobe that the user's material lacks comes in only where the picture asks for it by three standard deviations
 SIGNIFICANT = 9.0
+VISIBLE = 0.002  # mean FLIP; values that the picture does not show change it by less than half of this
 OFF = 2e-3  # of the box: a value this near its lower bound is switched off
 
 
@@ -38,14 +41,17 @@ class Kept:
     notes: tuple[str, ...]
 
 
-def keep_values(fit: RecordedFit, refined: Refined, *, weighted: bool) -> Kept:
+def keep_values(
+    fit: RecordedFit, refined: Refined, *, weighted: bool, seen: Callable[[Pixels], float] | None = None
+) -> Kept:
     """The refined vector with unneeded lobes switched off again and undetermined values given back.
 
-    `weighted` says that the problem's residuals are in standard deviations of the noise.
+    `weighted` says that the problem's residuals are in standard deviations of the noise. Others have a floor, below
+    which a change may be seen all the same: `seen`, the mean error of a picture to the eye, must not grow either.
     """
     table, user = fit.table, fit.scene.renderer.start
     found, problem = refined.x, refined.all
-    judged = _Judged(fit, problem, weighted)
+    judged, unseen_change = _Judged(fit, problem, weighted), _UnseenChange(fit, refined.x, seen)
     cost, certainty, spread = judged(found)
     off = unneeded_lobes(problem, found, user, table, 0.0 if weighted else MODEL_ERROR)
     moved = [name for name in off if not np.allclose(found[table.slice_of(name)], user[table.slice_of(name)])]
@@ -53,7 +59,7 @@ def keep_values(fit: RecordedFit, refined: Refined, *, weighted: bool) -> Kept:
         allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
         simpler = _solve_holding(fit, refined, found, off)
         simpler_cost, surer, narrower = (np.inf, certainty, spread) if simpler is None else judged(simpler)
-        if simpler is not None and simpler_cost <= allowed + 1e-12:
+        if simpler is not None and simpler_cost <= allowed + 1e-12 and unseen_change(simpler):
             found, cost = simpler, simpler_cost
             certainty, spread = surer, narrower
         else:
@@ -64,7 +70,7 @@ def keep_values(fit: RecordedFit, refined: Refined, *, weighted: bool) -> Kept:
     if unseen and len(unseen) < len(table):
         held = [*unseen, *(name for name in off if name not in unseen)]
         kept = _solve_holding(fit, refined, found, held)
-        if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8:
+        if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
             found, off = kept, held
             notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
@@ -126,6 +132,21 @@ class _Judged:
     def noise(self, cost: float) -> float:
         """Mean square of a residual that is noise."""
         return cost if self._weighted else max(cost, MODEL_ERROR**2)
+
+
+class _UnseenChange:
+    """Whether the recorded picture of a vector is no worse to the eye than that of another."""
+
+    def __init__(self, fit: RecordedFit, found: Vector, seen: Callable[[Pixels], float] | None) -> None:
+        self._fit, self._found, self._seen = fit, found, seen
+
+    def __call__(self, x: Vector) -> bool:
+        return self._seen is None or self._seen(self._fit.picture(x)) <= self._error + VISIBLE
+
+    @cached_property
+    def _error(self) -> float:
+        assert self._seen is not None
+        return self._seen(self._fit.picture(self._found))
 
 
 def box_holding(table: ParameterTable, user: Vector, names: Iterable[str]) -> tuple[Vector, Vector]:

@@ -31,8 +31,9 @@ class RecordedPlan:
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     trial_evaluations
         After as many only starts within `keep_factor` of the best cost go on.
-    solved_rms
-        Root mean square of the log residual at which no other start is tried: half a per cent cannot be seen.
+    seen_rms, solved_rms
+        Root mean squares of the log residual: below the first nothing can be seen, and other starts get their trial
+        only, because a wrong basin may come as near; below the second, about a recording's own, none is tried.
     basins, basin_factor
         Solutions the preset `best` keeps alive to the end, and how much more than the best one they may cost.
     """
@@ -50,7 +51,8 @@ class RecordedPlan:
     starts: int = 3
     trial_evaluations: int = 10
     keep_factor: float = 10.0
-    solved_rms: float = 5e-3
+    seen_rms: float = 5e-3
+    solved_rms: float = 2e-3
     basins: int = 3
     basin_factor: float = 1.5
 

@@ -193,7 +193,8 @@ class RecordedFit:
         found.sort(key=lambda solution: solution.equations.cost)
         leader = found[0]
         for place, candidate in enumerate(list(found)):
-            behind = candidate.equations.cost > plan.keep_factor * leader.equations.cost
+            near = self._within(leader, plan.seen_rms)
+            behind = candidate.equations.cost > (1.0 if near else plan.keep_factor) * leader.equations.cost
             if candidate.converged or behind or self._solved(leader) or self.course.should_stop():
                 continue
             longer = self._solve(problem, candidate.x, 40, stage=stage)
@@ -214,7 +215,11 @@ class RecordedFit:
         return chosen[: self.plan.basins]
 
     def _solved(self, solution: Solution) -> bool:
-        return np.sqrt(2.0 * solution.equations.cost) < self.plan.solved_rms
+        return self._within(solution, self.plan.solved_rms)
+
+    @staticmethod
+    def _within(solution: Solution, rms: float) -> bool:
+        return np.sqrt(2.0 * solution.equations.cost) < rms
 
     def _solve(
         self,

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the picture does not show goes back to the user's values, unless an eye would see the change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit import kept_values
+from mfo_backend.fit.recover_material import recover_material
+from mfo_backend.fit.settings import FitSettings
+from mfo_backend.render.renderer import load_renderer
+from mfo_backend.types.image import Encoding, Image
+from tests.render.scenes import POINT, write_scene
+
+NAMES = ["base_color", "roughness", "sheen", "sheen_tint"]
+TRUTH = {"base_color": (0.7, 0.2, 0.1), "roughness": 0.35, "sheen": 0.001, "sheen_tint": 0.001}
+USER = {"base_color": (0.5, 0.5, 0.5), "roughness": 0.6, "sheen": 0.001, "sheen_tint": 0.4}
+
+
+@pytest.mark.parametrize(
+    ("visible", "given_back"), [(kept_values.VISIBLE, True), (-1.0, False)], ids=["unseen", "seen"]
+)
+def test_undetermined_values_go_back_where_nothing_is_seen_of_it(tmp_path, monkeypatch, visible, given_back):
+    # below zero, every change counts as seen
+    monkeypatch.setattr(kept_values, "VISIBLE", visible)
+    renderer = load_renderer(
+        write_scene(tmp_path, POINT, size=32), "target", model="mitsuba_principled", parameters=NAMES
+    )
+    renderer.start = renderer.table.pack(USER)
+    reference = renderer.image(renderer.table.pack(TRUTH), seed=5, spp=512)
+    result = recover_material(
+        renderer,
+        Image(reference, Encoding.LINEAR),
+        FitSettings(preset="fast", verify_spp=16),
+        listener=lambda event: None,
+        should_stop=lambda: False,
+    ).result
+    assert any("The picture does not determine" in note for note in result.notes) == given_back
+    assert (result.recovered["sheen_tint"] == pytest.approx(USER["sheen_tint"])) == given_back
+    assert result.recovered["roughness"] == pytest.approx(TRUTH["roughness"], abs=0.01)
+
+
+def test_the_error_to_the_eye_may_grow_by_a_trace_only():
+    pictures = {0.0: np.zeros((2, 2, 3)), 1.0: np.full((2, 2, 3), 0.001), 2.0: np.full((2, 2, 3), 0.01)}
+
+    class Fit:
+        def picture(self, x):
+            return pictures[float(x[0])]
+
+    unseen = kept_values._UnseenChange(Fit(), np.array([0.0]), lambda picture: float(picture.mean()))
+    assert unseen(np.array([1.0]))
+    assert not unseen(np.array([2.0]))
+    assert kept_values._UnseenChange(Fit(), np.array([0.0]), None)(np.array([2.0]))
