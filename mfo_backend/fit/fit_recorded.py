@@ -23,8 +23,9 @@ from .fit_material import FitOutcome
 from .kept_values import box_holding, keep_values
 from .perceptual_stages import perceptual_ends
 from .picture_judge import NOISY, PictureJudge
+from .problem import Problem
 from .recorded_plan import RecordedPlan
-from .recorded_stages import End, MakeResidual, MakeWeighted, Problem, RecordedFit
+from .recorded_stages import End, MakeResidual, MakeWeighted, RecordedFit
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .verification import check_reference, picture_errors

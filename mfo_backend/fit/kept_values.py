@@ -14,7 +14,8 @@ from ..solve.box_quadratic import minimise_in_box
 from ..types.certainty import Certainty, Level
 from ..types.image import Pixels
 from ..types.parameter import ParameterTable
-from .recorded_stages import Problem, RecordedFit, Refined, Vector
+from .problem import Problem, Refined
+from .recorded_stages import RecordedFit, Vector
 from .residuals import RelativeResidual, residual_rows
 from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
 

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .picture_judge import PictureJudge
-from .recorded_stages import End, MakeResidual, Problem, RecordedFit, Vector
+from .problem import Problem
+from .recorded_stages import End, MakeResidual, RecordedFit, Vector
 from .settings import FitSettings
 
 BASIN = 0.1  # of the box: solutions nearer than this in every value are one

@@ -21,9 +21,10 @@ from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
+from .problem import Problem, Refined
 from .recorded_plan import RecordedPlan
 from .remembered import Remembered
-from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual, normal_equations
+from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual
 from .tile_noise import TileNoise, tile_noise
 
 Vector = NDArray[np.float64]
@@ -49,34 +50,6 @@ COST_CHANGE = 1e-5  # relative, of a step that ends a solve
 # The same where there is noise, as a part of what one value explains of pure noise (chi squared)
 NOT_SEEN = 0.3
 COST_FLOOR = 1e-11  # a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One least-squares problem: what to average, against what."""
-
-    evaluate: ImageAndJacobian
-    residual: Residual
-    groups: LaneGroups
-
-    @property
-    def equations(self) -> Callable[[Vector], NormalEquations]:
-        """The normal equations as a function of the vector."""
-        return normal_equations(self.evaluate, self.residual)
-
-    @property
-    def independent(self) -> float:
-        """Number of independent residuals: the channels of a group share most of their noise."""
-        return 1.5 * len(self.groups)
-
-
-@dataclass(frozen=True)
-class Refined:
-    """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials."""
-
-    x: Vector
-    all: Problem
-    few: Problem
 
 
 @dataclass(frozen=True)
