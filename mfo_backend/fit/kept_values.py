@@ -59,10 +59,8 @@ def keep_values(
     if moved:
         allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
         simpler = _solve_holding(fit, refined, found, off)
-        simpler_cost, surer, narrower = (np.inf, certainty, spread) if simpler is None else judged(simpler)
-        if simpler is not None and simpler_cost <= allowed + 1e-12 and unseen_change(simpler):
-            found, cost = simpler, simpler_cost
-            certainty, spread = surer, narrower
+        if simpler is not None and (again := judged(simpler))[0] <= allowed + 1e-12 and unseen_change(simpler):
+            found, (cost, certainty, spread) = simpler, again
         else:
             off = [name for name in off if name not in moved]
 

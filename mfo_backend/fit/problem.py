@@ -6,14 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..render.recorded_paths import LaneGroups
+from ..render.renderer import Vector
 from ..solve.bounded_least_squares import NormalEquations
 from .residuals import ImageAndJacobian, Residual, normal_equations
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ class RecordedPlan:
     def of(preset: str) -> RecordedPlan:
         """The plan of a preset.
 
-        `fast` takes 25 camera rays a pixel at the solution instead of 64: under light probes a fit takes 35 to 60 % of
-        the processor time, and its error is the same to 15 % under a reference of 4 samples, twice under one of 64.
+        `fast` takes 25 camera rays a pixel at the solution instead of 64, where light is sampled: less time, and more
+        error where the reference has little noise (docs/recorded_paths.md has both).
         """
         return RecordedPlan(grid_last=5) if preset == "fast" else RecordedPlan()

@@ -113,11 +113,11 @@ class Verification:
                     return
                 for picture in pictures:
                     self._add_part(picture, min(wanted, self._most) - picture.samples)
-            if wanted >= self._most or not any(self.is_noisy(*picture.halves) for picture in pictures):
+            if wanted >= self._most or not any(self._is_noisy(*picture.halves) for picture in pictures):
                 return
             wanted *= 2
 
-    def is_noisy(self, first: Pixels, second: Pixels) -> bool:
+    def _is_noisy(self, first: Pixels, second: Pixels) -> bool:
         """Whether noise is more than `NOISE_SHARE` of what the mean of two halves and the reference differ by.
 
         Noise that most pixels of the mask do not show is none: under lights of no extent only the silhouette has some.

@@ -78,28 +78,27 @@ def highlight_cells(
 def _slopes(
     light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool, turn: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
-    """Slopes (3, cells, 4) of the half vector against the normal, the lobe's axes there, and where there is light.
+    """Slopes (3, cells, 4) of the half vector against the normal, the lobe's axes, and where there is light (cells, 4).
 
-    All are in the world's frame: that of a surface may turn from one ray to the next. The axes (2, 3, cells, 4) are the
-    lobe's tangent and bitangent.
+    All are in the world's frame: that of a surface may turn from one ray to the next. The axes (2, 3, cells) are the
+    lobe's tangent and bitangent at a cell's first ray.
     """
     ds, value = light.sample_direction(si, mi.Point2f(0.5))
     wo = si.to_local(ds.d)
     lit = on_target & (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
     half = si.wi + wo
     sine, cosine = dr.sincos(dr.opaque(mi.Float, 2.0 * np.pi * turn))
-    local = (
-        mi.Vector3f(half.x / half.z, half.y / half.z, 0.0),
-        mi.Vector3f(cosine, sine, 0),
-        mi.Vector3f(-sine, cosine, 0),
-    )
-    slope, *axes = (si.to_world(vector) for vector in local)
+    slope = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0))
+    first = dr.arange(mi.UInt32, dr.width(slope) // 4) * 4
+    frame = dr.gather(mi.Frame3f, si.sh_frame, first)
+    axes = (cosine * frame.s + sine * frame.t, cosine * frame.t - sine * frame.s)
     dr.eval(slope, axes, lit)
 
-    def of_cells(vector: mi.Vector3f) -> NDArray[np.float32]:
-        return np.stack([vector[axis].numpy() for axis in range(3)]).reshape(3, -1, 4)
+    def of_world(vector: mi.Vector3f) -> NDArray[np.float32]:
+        return np.stack([vector[axis].numpy() for axis in range(3)])
 
-    return of_cells(slope), np.stack([of_cells(axis) for axis in axes]), np.array(lit).reshape(-1, 4)
+    cells = of_world(slope).reshape(3, -1, 4)
+    return cells, np.stack([of_world(axis) for axis in axes]), np.array(lit).reshape(-1, 4)
 
 
 def _sizes(
@@ -116,7 +115,7 @@ def _sizes(
     reach = 1.0 / (2.0 * GAUSS)  # corners lie further out than the points
     size = reach * np.linalg.norm(away, axis=0).max(-1) / (settings.narrowest + np.linalg.norm(middle, axis=0))
     if settings.narrow < 1.0:
-        tangent, bitangent = axes[..., 0]  # one frame for a cell: where it turns within one, smaller cells are no help
+        tangent, bitangent = axes  # one frame for a cell: where it turns within one, smaller cells are no help
         tx, ty = (np.sum(axis * middle, axis=0) for axis in (tangent, bitangent))
         across = reach * np.abs(np.sum(bitangent[..., None] * away, axis=0)).max(-1)
         size = np.maximum(size, across / np.sqrt(settings.narrowest**2 + ty**2 + (settings.narrow * tx) ** 2))
