@@ -87,18 +87,16 @@ def _slopes(
     wo = si.to_local(ds.d)
     lit = on_target & (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
     half = si.wi + wo
-    sine, cosine = dr.sincos(dr.opaque(mi.Float, 2.0 * np.pi * turn))
-    slope = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0))
-    first = dr.arange(mi.UInt32, dr.width(slope) // 4) * 4
-    frame = dr.gather(mi.Frame3f, si.sh_frame, first)
-    axes = (cosine * frame.s + sine * frame.t, cosine * frame.t - sine * frame.s)
-    dr.eval(slope, axes, lit)
+    slope, frame = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0)), si.sh_frame
+    dr.eval(slope, frame.s, frame.t, lit)
 
     def of_world(vector: mi.Vector3f) -> NDArray[np.float32]:
-        return np.stack([vector[axis].numpy() for axis in range(3)])
+        return np.stack([vector[axis].numpy() for axis in range(3)]).reshape(3, -1, 4)
 
-    cells = of_world(slope).reshape(3, -1, 4)
-    return cells, np.stack([of_world(axis) for axis in axes]), np.array(lit).reshape(-1, 4)
+    angle = np.float32(2.0 * np.pi * turn)
+    s, t = of_world(frame.s)[..., 0], of_world(frame.t)[..., 0]
+    axes = np.stack([np.cos(angle) * s + np.sin(angle) * t, np.cos(angle) * t - np.sin(angle) * s])
+    return of_world(slope), axes, np.array(lit).reshape(-1, 4)
 
 
 def _sizes(
