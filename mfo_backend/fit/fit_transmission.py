@@ -23,8 +23,10 @@ from .course import Course
 from .final_result import final_result
 from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
+from .kept_values import VISIBLE
 from .settings import FitSettings
-from .transmission_stages import Polished, TransmissionFit, TransmissionPlan
+from .transmission_plan import TransmissionPlan
+from .transmission_stages import Polished, TransmissionFit
 from .uncertainty import WEAK_BELOW, certainties
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 from .verified_end import Verification
@@ -76,27 +78,29 @@ def fit_transmission(
     fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
 
     certainty: dict[str, Certainty] = {}
-    notes: list[str] = []
     nodes = fit.scan()
-    found = fit.race(nodes) if not should_stop() else nodes[0][1]
+    found = [fit.race(nodes) if not should_stop() else nodes[0][1]]
     if not should_stop():
-        ends = fit.polish(found)
-        candidates = [end.x for end in reversed(ends)] + [found]
+        ends = fit.polish(found[0])
+        candidates = [end.x for end in reversed(ends)] + found
         chosen = fit.choose(candidates)
-        found = candidates[chosen]
+        # values may go back to the user's by the noisy squares and not by the eye
+        found = candidates[:2] if chosen == 0 and len(ends) == 2 else [candidates[chosen]]
         certainty = _certainty(ends, renderer.table)
-        unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
-        if chosen == 0 and len(ends) == 2:
-            notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
     )
-    pictures = verification.pictures(verification.begin(renderer.start), [found])
-    listener(Preview(pictures[-1].image))
+    pictures = verification.pictures(verification.begin(renderer.start), found)
     name = "flip-ldr" if ldr else "flip-hdr"
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
-    best = int(np.argmin([loss.value(picture.image) for picture in pictures]))
+    seen = [loss.value(picture.image) for picture in pictures]
+    kept = len(found) == 2 and seen[1] <= seen[2] + VISIBLE
+    best = 1 if kept else len(found)
+    listener(Preview(pictures[best].image))
+    best = best if seen[best] < seen[0] else 0
+    unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
+    notes = [f"The picture does not determine {', '.join(unseen)}: kept as in the scene."] if kept and best else []
     status = Status.CANCELLED if stopped or should_stop() else Status.CONVERGED
     result = final_result(
         renderer,

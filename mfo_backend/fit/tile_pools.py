@@ -41,11 +41,11 @@ class TilePools:
         """Flat indices of the pixels every sample has to hold, in this order."""
         return self.tiles[0].pixels
 
-    def add(self, samples: Sequence[NDArray[np.float32]]) -> None:
-        """Take independent pictures with derivatives (p, 3, columns)."""
+    def add(self, samples: Sequence[NDArray[np.float32]], weight: float = 1.0) -> None:
+        """Take independent pictures with derivatives (p, 3, columns), each worth `weight` of others."""
         for tiles, pool, order in zip(self.tiles, self.pools, self.order, strict=True):
             for sample in samples:
-                pool.add(tiles.rows(sample[order]))
+                pool.add(tiles.rows(sample[order]), weight)
 
     def fade(self, factor: float) -> None:
         """Multiply the weight of all samples so far."""
@@ -72,16 +72,20 @@ class TilePools:
         assert chosen is not None
         return chosen[1:]
 
-    def expected_error(self, equations: NormalEquations, noise: Vector, width: Vector) -> float:
-        """Mean square that `noise` in the gradient of `equations` leaves in single pixels, in parts of what is there.
+    def own_noise(self, noise: Vector, size: int) -> Vector:
+        """The part of the covariance `noise` of size `size` that more samples would take away."""
+        share = np.sqrt(self.pools[size].own_share())
+        return noise * np.outer(share, share)
 
-        What is there is the reference's noise once the fit is near: a product of different samples holds none of their
-        own. Infinite while there are too few samples to tell.
+    def expected_error(self, equations: NormalEquations, noise: Vector, width: Vector) -> tuple[float, float]:
+        """Mean square that `noise` in the gradient of `equations` leaves in single pixels, and what is there of it.
+
+        Both are of weighted, so relative, differences. What is there is the reference's noise once the fit is near: a
+        product of different samples holds none of their own. The error is infinite while there are too few to tell.
         """
         single = cross_equations(self.pools[0].gram())
         safe = SafeMatrix(equations, width)
         left = safe.solution_covariance(noise)
-        if single.cost <= 0.0 or np.any(np.diag(single.hessian) < 0.0):
-            return np.inf
-        error = max(float(np.sum(single.hessian * left)), safe.expected_error(noise))
-        return error / (2.0 * single.cost)
+        if single.cost <= 0.0 or min(np.diag(single.hessian).min(), np.diag(equations.hessian).min()) < 0.0:
+            return np.inf, 0.0
+        return max(float(np.sum(single.hessian * left)), safe.expected_error(noise)), 2.0 * single.cost

@@ -17,6 +17,7 @@ from ..types.image import Pixels
 from .course import Course, Stage
 from .tile_pools import TilePools
 from .tile_rows import TileRows
+from .transmission_plan import TransmissionPlan
 from .two_halves import is_unsure, two_half_equations
 from .uncertainty import WEAK_BELOW
 
@@ -36,32 +37,12 @@ TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
+MOST_SAMPLES = 16  # of a pixel in a step of the polish
+GROWTH = 4  # of a step's samples, at most
+OWN = 0.25  # of the expected error: below, more samples help little
+FEW_STEPS = 4  # before, the error is that of few samples everywhere
 FAR = {True: 0.015, False: 0.06}  # of the range, of sharp materials and others: samples from so far away count half
 TRUST = 0.25  # of the range: the longest step
-
-
-@dataclass(frozen=True)
-class TransmissionPlan:
-    """How much a fit on traced paths does.
-
-    `*_pixels` bounds the pixels a stage looks at, `*_samples` are paths a pixel in each of the two halves and
-    `polish_paths` those of all pixels; `race_steps` and `polish_steps` bound the iterations, `starts` the nodes that
-    race, besides the scene's own material. The polish ends when the error that is left is expected to be below the
-    share `enough` of the reference's noise (squares; 0.02 is one per cent of the root).
-    """
-
-    scan_pixels: int = 500
-    scan_samples: int = 4
-    scan_steps: int = 2
-    starts: int = 2
-    race_pixels: int = 1500
-    race_samples: int = 8
-    race_steps: int = 7
-    polish_pixels: int = 16_000
-    polish_paths: int = 20_000
-    polish_steps: int = 32
-    guard_samples: int = 4
-    enough: float = 0.005
 
 
 @dataclass
@@ -292,7 +273,8 @@ class TransmissionFit:
         equations, noise = None, variance
         pools = TilePools.of((self.tiles(size, plan.polish_pixels) for size in TILE_SIZES), 1 + self.table.length)
         # few pixels need more paths each: products of two noisy numbers average slowly
-        samples = int(np.clip(plan.polish_paths // len(pools.pixels), 2, 16))
+        samples = int(np.clip(plan.polish_paths // len(pools.pixels), 2, MOST_SAMPLES))
+        most = min(GROWTH * samples, MOST_SAMPLES)
         moved, settled = 0.0, 0
         for turn in range(plan.polish_steps):
             (table,) = self._tables(pools.pixels, x[None], self._seed(stream + turn), samples)
@@ -301,8 +283,8 @@ class TransmissionFit:
             table[..., 1:][..., frozen] = 0.0
             far = FAR[self.paths.roughness(x) < SECANT_BELOW]
             pools.fade(1.0 / (1.0 + (moved / far) ** 2))
-            pools.add(np.split(table, 2))
-            equations, noise, _ = pools.best(self._width)
+            pools.add(np.split(table, 2), samples)
+            equations, noise, size = pools.best(self._width)
             self._note(stage, x, equations.cost)
             step = self._step(equations, x, 1e-3, 0.1, frozen, noise)
             moved = self._moved(step)
@@ -310,8 +292,15 @@ class TransmissionFit:
             pools.shifted(step)
             stage.vector = x
             variance = SafeMatrix(equations, self._width).covariance(noise)
-            share = pools.expected_error(equations, noise, self._width)
-            settled = settled + 1 if moved <= far and share < plan.enough else 0
+            error, there = pools.expected_error(equations, noise, self._width)
+            near = moved <= far and error < plan.enough * there
+            if error > plan.unseen**2:
+                own, _ = pools.expected_error(equations, pools.own_noise(noise, size), self._width)
+                is_ours = not own <= OWN * error < np.inf
+                near = near and not is_ours
+                if is_ours and turn >= FEW_STEPS:
+                    samples = min(2 * samples, most)
+            settled = settled + 1 if near else 0
             if settled == SETTLED:
                 break
         return Polished(x, variance, frozen, equations, noise)

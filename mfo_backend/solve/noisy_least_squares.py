@@ -31,13 +31,13 @@ class CrossProducts:
         self._weight = 0.0
         self._weight_squares = 0.0
 
-    def add(self, sample: Array) -> None:
-        """Take one more sample."""
+    def add(self, sample: Array, weight: float = 1.0) -> None:
+        """Take one more sample; `weight` is best proportional to 1 over its variance."""
         sample = sample.astype(np.float64)
-        self.total += sample
-        self._own += sample.T @ sample
-        self._weight += 1.0
-        self._weight_squares += 1.0
+        self.total += weight * sample
+        self._own += weight**2 * (sample.T @ sample)
+        self._weight += weight
+        self._weight_squares += weight**2
 
     def fade(self, factor: float) -> None:
         """Multiply the weight of all samples so far."""
@@ -67,6 +67,18 @@ class CrossProducts:
         groups = groups - groups.mean(axis=0)
         count = len(groups)
         return groups.T @ groups * (count / max(count - 1, 1)) / len(mean) ** 2
+
+    def own_share(self) -> Vector:
+        """Which part (k,) of the variances in `gradient_noise` is the samples' own, so that more of them take it away.
+
+        Of the mean residual's square a part r is own noise, of the mean derivative's a part d. Both are independent, so
+        1 - (1 - r) (1 - d) of their product's is.
+        """
+        single = np.diag(self._own) / max(self._weight_squares, 1e-30)
+        shared = np.maximum(np.diag(self.gram()) * len(self.total), 0.0)
+        own = np.maximum(single - shared, 0.0) * self._weight_squares / max(self._weight**2, 1e-30)
+        left = shared / np.maximum(shared + own, 1e-300)
+        return 1.0 - left[0] * left[1:]
 
     def shifted(self, step: Vector) -> None:
         """Count the residuals from a point `step` further on, by the samples' own derivatives."""

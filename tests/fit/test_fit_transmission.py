@@ -9,6 +9,8 @@ import pytest
 from mfo_backend.fit import fit_transmission, verified_end
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.fit.tile_pools import TilePools
+from mfo_backend.fit.transmission_stages import MOST_SAMPLES, Polished, TransmissionFit
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.event import Preview, Progress, StageEnd, Started
@@ -21,10 +23,15 @@ NAMES = ["base_color", "roughness", "ior", "transmission_weight"]
 TRUTH = {"base_color": (0.9, 0.6, 0.3), "roughness": 0.35, "ior": 1.4, "transmission_weight": 0.9}
 
 
-def load(folder, names=NAMES, sockets=None, **options):
+# seen through glass by one path in a thousand
+SMALL_LAMP = """<shape type="sphere"><point name="center" x="1" y="-2" z="3"/><float name="radius" value="0.1"/>
+<emitter type="area"><rgb name="radiance" value="3000, 2800, 2400"/></emitter></shape>"""
+
+
+def load(folder, names=NAMES, sockets=None, lights=SKY + AREA + FLOOR, **options):
     sockets = {"Transmission Weight": {"value": 0.5, "linked": False}} if sockets is None else sockets
     materials = {"target_bsdf": {"name": "Glass", "distribution": "MULTI_GGX", "sockets": sockets}}
-    path = write_scene(folder, SKY + AREA + FLOOR, depth=8, **options)
+    path = write_scene(folder, lights, depth=8, **options)
     return load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
 
 
@@ -74,6 +81,43 @@ def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     assert result.recovered["sheen_tint"] == pytest.approx((0.3, 0.3, 0.3))
     assert "sheen_tint" in result.notes[0]
     assert result.recovered["sheen_weight"] == pytest.approx(0.0, abs=0.03)
+
+
+@pytest.mark.parametrize("visible", [False, True])
+def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeypatch, visible):
+    renderer = load(tmp_path, size=32)
+    good = renderer.table.pack(TRUTH)
+    kept = renderer.table.pack({**TRUTH, "roughness": 0.7 if visible else 0.352})
+    variance = np.diag((renderer.table.upper - renderer.table.lower) ** 2)
+    unseen = np.zeros(len(good), bool)
+    unseen[renderer.table.slice_of("roughness")] = True
+    ends = [Polished(good, 1e-6 * variance + np.diag(unseen) * variance, ~unseen & unseen, None, variance),
+            Polished(kept, 1e-6 * variance, unseen, None, variance)]  # fmt: skip
+    monkeypatch.setattr(TransmissionFit, "polish", lambda self, start: ends)
+    monkeypatch.setattr(TransmissionFit, "choose", lambda self, candidates: 0)  # squares under fireflies cannot tell
+    result, _ = fit(renderer, renderer.image(good, seed=5, spp=64))
+    assert result.certainty["roughness"].level is Level.NOT_VISIBLE
+    assert result.recovered["roughness"] == pytest.approx(0.35 if visible else 0.352)
+    assert any("roughness: kept as in the scene" in note for note in result.notes) is not visible
+
+
+@pytest.mark.parametrize(
+    ("lights", "grows"), [(SKY + FLOOR, False), (SKY + FLOOR + SMALL_LAMP, True)], ids=["sky", "fireflies"]
+)
+def test_a_polish_takes_more_samples_where_an_eye_would_see_their_noise(tmp_path, monkeypatch, lights, grows):
+    renderer = load(tmp_path, size=56, lights=lights)
+    reference = renderer.image(renderer.table.pack(TRUTH), seed=5, spp=32)
+    weights, add = [], TilePools.add
+
+    def added(self, samples, weight):
+        weights.append(weight)
+        add(self, samples, weight)
+
+    monkeypatch.setattr(TilePools, "add", added)
+    fit(renderer, reference)
+    assert weights[0] < MOST_SAMPLES
+    assert (max(weights) > weights[0]) is grows
+    assert max(weights) <= MOST_SAMPLES
 
 
 def test_the_start_is_kept_where_nothing_is_better(tmp_path):

@@ -55,6 +55,16 @@ def test_a_faded_sample_counts_less(problem):
     np.testing.assert_allclose(pool.mean, new[0], rtol=1e-4)
 
 
+def test_a_weight_stands_for_as_many_samples(problem):
+    rng, jacobian = problem
+    parts = samples(rng, jacobian, 3, 0.0)
+    pool = pooled(parts[:1])
+    pool.add(2.0 * parts[1], 3.0)
+    np.testing.assert_allclose(pool.mean, 1.75 * parts[0])
+    exact = parts[0].T @ parts[0] / len(jacobian)
+    np.testing.assert_allclose(pool.gram(), 2.0 * exact, rtol=1e-12)  # the only pair of different samples
+
+
 def test_moving_the_samples_is_taking_them_elsewhere(problem):
     rng, jacobian = problem
     parts = samples(rng, jacobian, 3, 0.0)
@@ -120,3 +130,19 @@ def test_the_expected_error_is_that_of_the_solutions(problem):
         errors.append(np.mean((jacobian @ off) ** 2))
         stated.append(SafeMatrix(equations, WIDTH).expected_error(pool.gradient_noise(3)))
     assert 0.5 < np.mean(stated) / np.mean(errors) < 2.0  # as the variances above
+
+
+@pytest.mark.parametrize(("noise", "reference_noise"), [(2.0, 0.5), (0.5, 2.0), (1.0, 1.0)])
+def test_own_share_is_what_a_new_draw_of_the_samples_changes(noise, reference_noise):
+    rng = np.random.default_rng(4)
+    jacobian, count = rng.normal(size=(400, 3)), 3
+    own, both, stated = [], [], []
+    kept = reference_noise * rng.normal(size=400)
+    for _ in range(400):
+        drawn = reference_noise * rng.normal(size=400)
+        for found, there in ((own, kept), (both, drawn)):
+            parts = samples(rng, jacobian, count, noise, there + jacobian @ TRUE)  # at the solution
+            found.append(cross_equations(pooled(parts).gram()).gradient)
+        stated.append(pooled(parts).own_share())
+    expected = np.var(own, axis=0) / np.var(both, axis=0)
+    np.testing.assert_allclose(np.median(stated, axis=0), expected, atol=0.12)  # two variances of 400, each to 7 %
