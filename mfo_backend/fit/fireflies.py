@@ -26,14 +26,3 @@ def without_fireflies(image: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, i
     floor = 0.1 * float(level[mask].mean()) if mask.any() else 0.0
     found = mask & (level > FACTOR * np.maximum(near, floor))
     return np.where(found[..., None], around.mean(0), image).astype(np.float32), int(found.sum())
-
-
-def dim_fireflies(tables: NDArray[np.float32], limit: float) -> None:
-    """Scale the pixels of pictures with derivatives (..., 3, 1 + k) down, in place, to `limit`.
-
-    A path so rare that the reference has none like it says nothing about it, but the mean of our own samples carries it
-    on for hundreds of others.
-    """
-    brightest = tables[..., 0].max(axis=-1)
-    found = brightest > limit
-    tables[found] *= (limit / brightest[found])[:, None, None]

@@ -15,7 +15,6 @@ from ..solve.bounded_least_squares import NormalEquations
 from ..solve.noisy_least_squares import SafeMatrix, cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
-from .fireflies import dim_fireflies
 from .tile_pools import TilePools
 from .tile_rows import TileRows
 from .transmission_plan import TransmissionPlan
@@ -34,7 +33,6 @@ ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
 SECANTS = {"roughness": 0.12, "ior": 0.06}
-FIREFLY = 2.0  # times the brightest pixel of the reference
 TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
@@ -87,7 +85,6 @@ class TransmissionFit:
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.table = paths.table
         self._width = self.table.upper - self.table.lower
-        self._brightest = FIREFLY * float(reference[mask].max())
         # values besides those of the glass stay as in the scene until the polish; without glass none does
         self._extras = np.ones(self.table.length, bool)
         for name in CORE:
@@ -130,11 +127,9 @@ class TransmissionFit:
         pixels = np.concatenate([pixels, pixels])  # the second time with other random numbers
 
         def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
-            seen = self.paths.images(
+            return self.paths.images(
                 vectors, pixels, seed=seed, samples=samples, jacobian=derivatives, should_stop=self.course.should_stop
             )
-            dim_fireflies(seen, self._brightest)
-            return seen
 
         tables = trace(xs, jacobian)
         if jacobian and moving:
