@@ -296,7 +296,7 @@ class TransmissionFit:
             near = moved <= far and error < plan.enough * there
             if error > plan.unseen**2:
                 own, _ = pools.expected_error(equations, pools.own_noise(noise, size), self._width)
-                is_ours = not own <= OWN * error < np.inf
+                is_ours = error == np.inf or own > OWN * error
                 near = near and not is_ours
                 if is_ours and turn >= FEW_STEPS:
                     samples = min(2 * samples, most)
