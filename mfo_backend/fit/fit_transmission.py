@@ -23,7 +23,7 @@ from .course import Course
 from .final_result import final_result
 from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
-from .kept_values import VISIBLE
+from .kept_values import VISIBLE, kept_note
 from .settings import FitSettings
 from .transmission_plan import TransmissionPlan
 from .transmission_stages import Polished, TransmissionFit
@@ -100,7 +100,7 @@ def fit_transmission(
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
-    notes = [f"The picture does not determine {', '.join(unseen)}: kept as in the scene."] if kept and best else []
+    notes = [kept_note(unseen)] if kept and best else []
     status = Status.CANCELLED if stopped or should_stop() else Status.CONVERGED
     result = final_result(
         renderer,

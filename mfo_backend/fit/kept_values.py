@@ -71,8 +71,13 @@ def keep_values(
         kept = _solve_holding(fit, refined, found, held)
         if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
             found, off = kept, held
-            notes.append(f"The picture does not determine {', '.join(unseen)}: kept as in the scene.")
+            notes.append(kept_note(unseen))
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
+
+
+def kept_note(names: Iterable[str]) -> str:
+    """The sentence on values that went back to the user's."""
+    return f"The picture does not determine {', '.join(names)}: kept as in the scene."
 
 
 def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: ParameterTable, least: float) -> list[str]:

@@ -22,6 +22,24 @@ CHANNELS = 3  # of a tile share their noise
 
 
 @dataclass(frozen=True)
+class ExpectedError:
+    """Mean squares of weighted, so relative, differences in single pixels.
+
+    Attributes
+    ----------
+    total, own
+        What noise leaves at the solution, and the part of it that more samples would take away; infinite while there
+        are too few samples to tell.
+    there
+        What is there: the reference's noise once the fit is near, as products of different samples hold none of theirs.
+    """
+
+    total: float
+    own: float
+    there: float
+
+
+@dataclass(frozen=True)
 class TilePools:
     """Samples of the same pixels in tiles of growing size; the first are single pixels."""
 
@@ -72,20 +90,14 @@ class TilePools:
         assert chosen is not None
         return chosen[1:]
 
-    def own_noise(self, noise: Vector, size: int) -> Vector:
-        """The part of the covariance `noise` of size `size` that more samples would take away."""
-        share = np.sqrt(self.pools[size].own_share())
-        return noise * np.outer(share, share)
-
-    def expected_error(self, equations: NormalEquations, noise: Vector, width: Vector) -> tuple[float, float]:
-        """Mean square that `noise` in the gradient of `equations` leaves in single pixels, and what is there of it.
-
-        Both are of weighted, so relative, differences. What is there is the reference's noise once the fit is near: a
-        product of different samples holds none of their own. The error is infinite while there are too few to tell.
-        """
+    def expected_error(self, equations: NormalEquations, noise: Vector, size: int, width: Vector) -> ExpectedError:
+        """What `noise` in the gradient of `equations`, those of size `size`, leaves at their solution."""
         single = cross_equations(self.pools[0].gram())
-        safe = SafeMatrix(equations, width)
-        left = safe.solution_covariance(noise)
         if single.cost <= 0.0 or min(np.diag(single.hessian).min(), np.diag(equations.hessian).min()) < 0.0:
-            return np.inf, 0.0
-        return max(float(np.sum(single.hessian * left)), safe.expected_error(noise)), 2.0 * single.cost
+            return ExpectedError(np.inf, np.inf, 0.0)
+        safe, share = SafeMatrix(equations, width), np.sqrt(self.pools[size].own_share())
+        total, own = (
+            max(float(np.sum(single.hessian * safe.solution_covariance(part))), safe.expected_error(part))
+            for part in (noise, noise * np.outer(share, share))
+        )
+        return ExpectedError(total, own, 2.0 * single.cost)

@@ -292,13 +292,11 @@ class TransmissionFit:
             pools.shifted(step)
             stage.vector = x
             variance = SafeMatrix(equations, self._width).covariance(noise)
-            error, there = pools.expected_error(equations, noise, self._width)
-            near = moved <= far and error < plan.enough * there
-            if error > plan.unseen**2:
-                own, _ = pools.expected_error(equations, pools.own_noise(noise, size), self._width)
-                is_ours = error == np.inf or own > OWN * error
-                near = near and not is_ours
-                if is_ours and turn >= FEW_STEPS:
+            error = pools.expected_error(equations, noise, size, self._width)
+            near = moved <= far and error.total < plan.enough * error.there
+            if error.total > plan.unseen**2 and error.own >= OWN * error.total:
+                near = False
+                if turn >= FEW_STEPS:
                     samples = min(2 * samples, most)
             settled = settled + 1 if near else 0
             if settled == SETTLED:

@@ -60,11 +60,11 @@ def test_the_expected_error_is_that_of_the_solutions():
     stated, found = [], []
     for seed in range(40):
         pools = filled(False, seed=seed)
-        equations, noise, _ = pools.best(WIDTH)
+        equations, noise, size = pools.best(WIDTH)
         step = cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0)
         pools.shifted(step)
-        error, there = pools.expected_error(equations, noise, WIDTH)
-        stated.append(error / there)
+        error = pools.expected_error(equations, noise, size, WIDTH)
+        stated.append(error.total / error.there)
         found.append(np.mean((columns @ (step - TRUE)) ** 2) / 0.3**2)
     assert 0.4 < np.median(stated) / np.mean(found) < 2.0  # 40 solutions, and the weights are those of noisy tiles
 
@@ -79,9 +79,9 @@ def test_the_expected_error_counts_what_tiles_do_not_show():
     pools.add([sample(rng, picture, columns, 0.3, 3.0) for _ in range(30)])
     tile = cross_equations(pools.pools[2].gram())
     noise = pools.pools[2].gradient_noise(3)
-    error, there = pools.expected_error(tile, noise, WIDTH)
-    assert error == pytest.approx(5.0 * SafeMatrix(tile, WIDTH).expected_error(noise), rel=0.4)
-    assert there == pytest.approx(2.0 * cross_equations(pools.pools[0].gram()).cost)
+    error = pools.expected_error(tile, noise, 2, WIDTH)
+    assert error.total == pytest.approx(5.0 * SafeMatrix(tile, WIDTH).expected_error(noise), rel=0.4)
+    assert error.there == pytest.approx(2.0 * cross_equations(pools.pools[0].gram()).cost)
 
 
 def test_too_few_samples_promise_nothing():
@@ -89,18 +89,16 @@ def test_too_few_samples_promise_nothing():
     pools = pools_of(np.full((SIDE, SIDE, 3), 2.0, np.float32))
     picture, columns = scene(True)
     pools.add([sample(rng, picture, 0.0 * columns, 0.0, 50.0) for _ in range(2)])
-    equations, noise, _ = pools.best(WIDTH)
-    assert pools.expected_error(equations, noise, WIDTH)[0] == np.inf
+    error = pools.expected_error(*pools.best(WIDTH), WIDTH)
+    assert error.total == error.own == np.inf
 
 
-@pytest.mark.parametrize(("noise", "reference_noise", "expected"), [(0.0, 0.3, 0.0), (1.0, 0.0, 1.0)])
+@pytest.mark.parametrize(("noise", "reference_noise", "expected"), [(0.0, 0.3, 0.0), (2.0, 0.3, 0.88)])
 def test_own_noise_is_told_from_the_references(noise, reference_noise, expected):
     pools = filled(True, noise, 0.0, reference_noise)
-    equations, covariance, size = pools.best(WIDTH)
-    pools.shifted(cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0))  # where no misfit is left
-    equations, covariance, size = pools.best(WIDTH)
-    own = np.diag(pools.own_noise(covariance, size)) / np.diag(covariance)
-    np.testing.assert_allclose(own, expected, atol=0.12)  # known to the root of 2 over 3 x 1024 rows, times 6 samples
+    pools.shifted(cautious_step(pools.best(WIDTH)[0], -WIDTH, WIDTH, WIDTH, 0.0))  # where no misfit is left
+    error = pools.expected_error(*pools.best(WIDTH), WIDTH)
+    assert error.own / error.total == pytest.approx(expected, abs=0.12)  # 4 / 6 of 4 / 6 + 0.09; squares of 3072 rows
 
 
 def test_faded_samples_count_less():
