@@ -14,9 +14,10 @@ from ..solve.box_quadratic import minimise_in_box
 from ..types.certainty import Certainty, Level
 from ..types.image import Pixels
 from ..types.parameter import ParameterTable
+from .own_noise import rows_of_samples
 from .problem import Problem, Refined
 from .recorded_stages import RecordedFit, Vector
-from .residuals import RelativeResidual, residual_rows
+from .residuals import RelativeResidual
 from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
 
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
@@ -124,14 +125,12 @@ class _Judged:
 
     def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
         problem, table = self._problem, self._fit.table
-        image = problem.evaluate(x)
-        rows = residual_rows(image, problem.residual)
-        if self._weighted:
-            spread = covariance(rows[:, :, 1:], rows[:, :, 0], table, model_error=0.0)
-        else:
-            relative = residual_rows(image, RelativeResidual(problem.groups.average(self._fit.reference)))
-            spread = covariance(relative[:, :, 1:], relative[:, :, 0], table)
-        return float(np.mean(rows[:, :, 0] ** 2)), certainties(standard_deviations(spread, table), table), spread
+        residual = problem.residual
+        if not self._weighted:
+            residual = RelativeResidual(problem.groups.average(self._fit.reference))
+        rows, own = rows_of_samples(problem.evaluate.samples(x), residual)
+        spread = covariance(rows, own, table, model_error=0.0 if self._weighted else MODEL_ERROR)
+        return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table), spread
 
     def noise(self, cost: float) -> float:
         """Mean square of a residual that is noise."""

@@ -5,25 +5,49 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
+import numpy as np
+
+from ..render.recorded_image import RecordedImage
 from ..render.recorded_paths import LaneGroups
 from ..render.renderer import Vector
 from ..solve.bounded_least_squares import NormalEquations
-from .residuals import ImageAndJacobian, Residual, normal_equations
+from .own_noise import unbiased_equations
+from .residuals import Residual, normal_equations
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One least-squares problem: what to average, against what."""
+    """One least-squares problem: what to average, against what.
 
-    evaluate: ImageAndJacobian
+    Where the recording has two samples of the light, the cost holds its own noise as it is at `near` and nowhere else.
+    """
+
+    evaluate: RecordedImage
     residual: Residual
     groups: LaneGroups
+    near: Vector | None = None
 
-    @property
+    @cached_property
     def equations(self) -> Callable[[Vector], NormalEquations]:
         """The normal equations as a function of the vector."""
-        return normal_equations(self.evaluate, self.residual)
+        if self.near is None:
+            return normal_equations(self.evaluate, self.residual)
+        return unbiased_equations(self.evaluate.samples, self.residual, self.near)
+
+    def own_noise(self, x: Vector) -> float:
+        """Root mean square noise of the recording in a group at `x`, relative to the radiance and a tenth of its mean.
+
+        0 for a recording with one sample of the light.
+        """
+        two = self.evaluate.samples(x)
+        if two.half_difference is None:
+            return 0.0
+        radiance = np.abs(two.mean[:, :, 0])
+        return float(
+            np.sqrt(np.mean(np.square(two.half_difference[:, :, 0] / (radiance + 0.1 * radiance.mean() + 1e-12))))
+        )
 
     @property
     def independent(self) -> float:

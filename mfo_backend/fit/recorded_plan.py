@@ -16,6 +16,11 @@ class RecordedPlan:
         Whether to look for starts; without it only the scene's own material and a random one are tried.
     grid_first, grid_last
         Squared: camera rays a pixel of the first recording and of the one at the solution, where light is sampled.
+        Each of the latter meets the light twice.
+    too_noisy, low_noise, grid_finest
+        Where the noise of the recording at the solution is above the first of these shares of a tile's radiance, as
+        that of mirrors under small lights is, it is made anew with as many rays as make it the second, but no more
+        than the square of the third.
     side_last
         Pixels along each side of the tiles of the last stage where light is sampled. Quarters of the tiles of the
         stages before see twice the detail and lose fewer pixels to the silhouette; single pixels see too much of the
@@ -40,7 +45,10 @@ class RecordedPlan:
 
     scan: bool = True
     grid_first: int = 4
-    grid_last: int = 8
+    grid_last: int = 4
+    too_noisy: float = 0.07
+    low_noise: float = 0.05
+    grid_finest: int = 16
     side_last: int = 2
     first_tiles: int = 1000
     scan_lanes: int = 20_000
@@ -60,7 +68,9 @@ class RecordedPlan:
     def of(preset: str) -> RecordedPlan:
         """The plan of a preset.
 
-        `fast` takes 25 camera rays a pixel at the solution instead of 64, where light is sampled: less time, and more
-        error where the reference has little noise (docs/recorded_paths.md has both).
+        `fast` takes fewer camera rays at the solution where light is sampled, and is content with more noise: less
+        time, and more error (docs/recorded_paths.md has both).
         """
-        return RecordedPlan(grid_last=5) if preset == "fast" else RecordedPlan()
+        if preset == "fast":
+            return RecordedPlan(grid_last=3, too_noisy=0.1, low_noise=0.08, grid_finest=8)
+        return RecordedPlan()

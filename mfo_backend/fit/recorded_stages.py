@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..render.primary_rays import TILE
+from ..render.recorded_image import RECALLED, RecordedImage
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
@@ -23,8 +25,7 @@ from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
 from .problem import Problem, Refined
 from .recorded_plan import RecordedPlan
-from .remembered import Remembered
-from .residuals import ImageAndJacobian, OneSidedResidual, Residual, WeightedResidual
+from .residuals import OneSidedResidual, Residual, WeightedResidual
 from .tile_noise import TileNoise, tile_noise
 
 Vector = NDArray[np.float64]
@@ -41,11 +42,12 @@ MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
-# After a solve its recording is too old if the tiles changed by this share, or if one over the effective number of
-# samples grew by this factor. The first is what mends fits that began far away, though most of those keep their
-# samples; the second finds a lobe that became narrow in few tiles.
+# After a solve its recording is too old if the tiles changed by this share, or if its own noise grew by this factor.
+# The first is what mends fits that began far away, though most of those keep their samples; the second finds a lobe
+# that became narrow in few tiles.
 MOVED = 0.15
-FEWER = 1.5
+NOISIER = 1.25
+SAMPLES = 2  # of the light in a recording at the solution: their difference shows the recording's own noise
 COST_CHANGE = 1e-5  # relative, of a step that ends a solve
 # The same where there is noise, as a part of what one value explains of pure noise (chi squared)
 NOT_SEEN = 0.3
@@ -80,7 +82,7 @@ class RecordedFit:
         self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
         self.paths: RecordedPaths
         self._groups: dict[int, LaneGroups] = {}  # tiles of the present recording by side
-        self._tiles: dict[LaneGroups, Remembered] = {}
+        self._tiles: dict[LaneGroups, RecordedImage] = {}
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
@@ -104,25 +106,25 @@ class RecordedFit:
         image.reshape(-1, 3)[self.paths.pixel] = table[:, :, 0]
         return image
 
-    def problem(self, groups: LaneGroups, make: MakeResidual, *, calm: bool = False) -> Problem:
+    def problem(
+        self, groups: LaneGroups, make: MakeResidual, *, calm: bool = False, near: Vector | None = None
+    ) -> Problem:
         """The residuals of these groups of the present recording, to the reference or to it without fireflies."""
         residual = make(groups.average(self.calm if calm else self.reference))
         if self.clipped is not None:
             residual = OneSidedResidual(residual, groups.average(self.clipped) > 0)
-        return Problem(self._evaluator(groups), residual, groups)
+        return Problem(self._evaluator(groups), residual, groups, near)
 
     def tiles(self, side: int) -> LaneGroups:
         """All tiles of this side of the present recording; their evaluations are remembered between problems."""
         if side not in self._groups:
             groups = all_groups(self.paths, side)
             self._groups[side] = groups
-            self._tiles[groups] = Remembered(self.scene.evaluator(self.paths, groups))
+            self._tiles[groups] = self.scene.evaluator(self.paths, groups, RECALLED)
         return self._groups[side]
 
-    def _evaluator(self, groups: LaneGroups) -> ImageAndJacobian:
-        if groups in self._tiles:
-            return self._tiles[groups]
-        return Remembered(self.scene.evaluator(self.paths, groups))
+    def _evaluator(self, groups: LaneGroups) -> RecordedImage:
+        return self._tiles[groups] if groups in self._tiles else self.scene.evaluator(self.paths, groups, RECALLED)
 
     def start_from_nothing(self, make: MakeResidual) -> list[Solution]:
         """Stages `scan` and `start`: solutions from the scan's nodes, the scene's material and a random one.
@@ -277,29 +279,31 @@ class RecordedFit:
 
     def _recorded_near(self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Vector:
         """The solution on some tiles of a recording, made anew until it is near the material that was recorded."""
-        number = 1
+        number, grid = 1, self.plan.grid_last
         while True:
-            self._record(start, self.plan.grid_last, number)
-            fresh = self._own_variance(start)
+            self._record(start, grid, number)
             few = self._problems(start, make, weigh).few
             x = self._solve(few, start, 12, stage=stage).x
-            fewer = self._own_variance(x) > FEWER * fresh
-            moved = self._moved(few, start, x) > MOVED
-            if not (fewer or moved) or number == MOST_RECORDINGS or self.course.should_stop():
+            before, after = few.own_noise(start), few.own_noise(x)
+            moved = self._moved(few, start, x) > MOVED or after > NOISIER * before
+            finer = self._finer(grid, after)
+            if not (moved or finer > grid) or number == MOST_RECORDINGS or self.course.should_stop():
                 return x
             del few  # and with it the recording
-            start, number = x, number + 1
+            start, number, grid = x, number + 1, finer
 
-    def _own_variance(self, x: Vector) -> float:
-        """Mean over the tiles of one over their effective number of samples: the recording's own relative variance."""
-        samples = self.scene.effective_samples(x, self.paths, self.tiles(TILE))
-        return float(np.mean(1.0 / samples[samples > 0.0])) if samples.any() else 0.0
+    def _finer(self, grid: int, noise: float) -> int:
+        """The grid with which the recording's own noise, `noise` with this one, is low enough."""
+        if noise < self.plan.too_noisy:
+            return grid
+        wanted = math.ceil(grid * noise / self.plan.low_noise)
+        return max(min(wanted, self.plan.grid_finest, self.scene.finest_grid(SAMPLES)), grid)
 
     def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
         self._groups, self._tiles = {}, {}
-        self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True)
+        self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True, samples=SAMPLES)
         self.recordings = number
 
     def _problems(self, x: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Refined:
@@ -310,15 +314,15 @@ class RecordedFit:
         if weigh is not None:
             noise = self.noise = self._noise(x, groups, self.plan.side_last)
             weighing, fewer = (self._weighing(n, groups, weigh) for n in (noise, noise.take(some)))
-        problem = self.problem(groups, weighing)
-        few = problem if len(some) == len(groups) else self.problem(groups.take(some), fewer)
+        problem = self.problem(groups, weighing, near=x)
+        few = problem if len(some) == len(groups) else self.problem(groups.take(some), fewer, near=x)
         return Refined(x, problem, few)
 
     def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
-        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups())(x)
+        pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups()).samples(x)
         if groups in self._tiles:
-            self._tiles[groups].note(x, groups.mean_of_pixels(pixels))
-        return tile_noise(self.calm, pixels[:, :, 0], self.paths, groups, self.paths.interior, side)
+            self._tiles[groups].note(x, pixels.averaged(groups.mean_of_pixels))
+        return tile_noise(self.calm, pixels.mean[:, :, 0], self.paths, groups, self.paths.interior, side)
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
@@ -342,8 +346,7 @@ class RecordedFit:
     def polish(self, name: str, groups: LaneGroups, make: MakeResidual, starts: list[Vector]) -> list[Vector] | None:
         """A stage with another residual on the same recording, from each start; None without finite numbers."""
         with self.course.stage(name) as stage:
-            residual = make(groups.average(self.reference))
-            problem = Problem(self._evaluator(groups), residual, groups)
+            problem = Problem(self._evaluator(groups), make(groups.average(self.reference)), groups, near=starts[0])
             found = [self._solve(problem, start, 25, stage=stage, box=self.box) for start in starts]
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x
         finite = [solution.x for solution in found if np.isfinite(solution.equations.cost)]

@@ -134,21 +134,29 @@ class OneSidedResidual:
 def residual_rows(table: Rows, residual: Residual) -> NDArray[np.float64]:
     """Values and derivatives (g, 3, 1 + k) of the residual from those of the image."""
     values, slope = residual(table[:, :, 0])
-    if slope.ndim == 2:
-        rows = np.multiply(table, slope[..., None], dtype=np.float64)
-    else:
-        rows = np.matmul(slope, table).astype(np.float64)
+    rows = sloped(table, slope)
     rows[:, :, 0] = values
     return rows
+
+
+def sloped(table: Rows, slope: Rows) -> NDArray[np.float64]:
+    """Rows of image and derivatives (g, 3, 1 + k) times the derivative of a residual by the image."""
+    if slope.ndim == 2:
+        return np.multiply(table, slope[..., None], dtype=np.float64)
+    return np.matmul(slope, table).astype(np.float64)
 
 
 def normal_equations(evaluate: ImageAndJacobian, residual: Residual) -> Callable[[Vector], NormalEquations]:
     """The least-squares problem of `residual` over the images of `evaluate`, per residual; sums in float64."""
 
     def at(x: Vector) -> NormalEquations:
-        rows = residual_rows(evaluate(x), residual)
-        rows = rows.reshape(-1, rows.shape[-1])
-        gram = (rows.T @ rows) / len(rows)
+        gram = gram_of(residual_rows(evaluate(x), residual))
         return NormalEquations(0.5 * float(gram[0, 0]), gram[1:, 0], gram[1:, 1:])
 
     return at
+
+
+def gram_of(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean products (1 + k, 1 + k) of the columns of rows (g, 3, 1 + k)."""
+    rows = rows.reshape(-1, rows.shape[-1])
+    return (rows.T @ rows) / len(rows)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..types.certainty import Certainty, Level
 from ..types.parameter import ParameterTable
+from .own_noise import without_own_noise
 
 Vector = NDArray[np.float64]
 
@@ -24,17 +25,24 @@ INFLATION = 1.2  # own noise in the Jacobian is not counted
 PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite
 
 
-def covariance(jacobian: Vector, residual: Vector, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:
-    """Covariance (k, k) in widths of the box from weighted derivatives (g, 3, k) and weighted residuals (g, 3).
+def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:
+    """Covariance (k, k) in widths of the box from weighted residuals and their derivatives (g, 3, 1 + k).
 
-    `model_error` is the least error of a residual; the default is for relative ones.
+    `own` is the recording's noise in them, half the difference of two samples (None for none): squares of derivatives
+    hold it, too, and would make every value look better determined. `model_error` is the least error of a residual;
+    the default is for relative ones.
     """
-    g, _, k = jacobian.shape
-    scaled = jacobian.astype(np.float64) * (table.upper - table.lower)
+    g, _, columns = rows.shape
+    k = columns - 1
+    width = table.upper - table.lower
+    scaled, residual = rows[:, :, 1:] * width, rows[:, :, 0]
+    noise = np.maximum(np.abs(residual), model_error)
+    q = np.einsum("gck,gc->gk", scaled, np.where(residual < 0.0, -noise, noise), optimize=True)
     gram = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)
-    noise = np.maximum(np.abs(residual.astype(np.float64)), model_error)
-    signed = np.where(residual < 0.0, -noise, noise)
-    q = np.einsum("gck,gc->gk", scaled, signed, optimize=True)
+    if own is not None:
+        scaled = own[:, :, 1:] * width
+        q -= np.einsum("gck,gc->gk", scaled, own[:, :, 0], optimize=True)
+        gram = without_own_noise(gram, np.einsum("gck,gcl->kl", scaled, scaled, optimize=True))
     # a prior as wide as the box, in units of the mean noise
     prior = float(np.mean(noise**2)) / PRIOR_SD**2
     inverse = np.linalg.inv(gram + prior * np.eye(k))

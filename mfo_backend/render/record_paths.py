@@ -26,6 +26,8 @@ from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_o
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
 
+NEXT_SAMPLE = 0x0C2B2AE3  # of a seed
+
 
 @dataclass(frozen=True)
 class RecordSettings:
@@ -40,7 +42,8 @@ class RecordSettings:
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
     `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
     are the only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more
-    rays start where lights of no extent are mirrored.
+    rays start where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many
+    independent `samples`.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -55,6 +58,7 @@ class RecordSettings:
     pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
     direct_only: bool = False
+    samples: int = 1
 
 
 @dataclass
@@ -124,8 +128,9 @@ def record_paths(
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
         dr.eval(si, position, filter_weight, held)
         hits = _Hits(si, position, filter_weight, held)
-        lanes = _delta_lights(scene, hits)
-        lanes += _sampled_lights(scene, hits, settings, lamps)
+        exact = _delta_lights(scene, hits)
+        seeds = (settings.seed + sample * NEXT_SAMPLE for sample in range(settings.samples))
+        samples = [exact + _sampled_lights(scene, hits, replace(settings, seed=seed), lamps) for seed in seeds]
 
         covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
@@ -135,7 +140,7 @@ def record_paths(
             dr.eval(glow)
             for channel in range(3):
                 flat[:, channel] += np.bincount(pixel, glow[channel].numpy(), len(flat))
-        merged = _merge(lanes, rays, covered, coverage, constant, settings.held)
+        merged = _merge(samples, rays, covered, coverage, constant, settings.held)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged
@@ -343,15 +348,18 @@ def _background(
 
 
 def _merge(
-    lanes: list[_Lanes],
+    samples: list[list[_Lanes]],
     rays: PrimaryRays,
     covered: NDArray[np.int64],
     coverage: NDArray[np.float32],
     constant: NDArray[np.float32],
     names: tuple[str, ...],
 ) -> RecordedPaths:
-    """One lane array, ordered by tile and pixel."""
-    position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
+    """One lane array, ordered by sample, tile and pixel."""
+    lanes = [part for sample in samples for part in sample]
+    pixels = len(rays.pixel)
+    position = [np.array(part.position) + s * pixels for s, sample in enumerate(samples) for part in sample]
+    position = np.concatenate(position or [np.zeros(0, np.uint32)])
     rank = np.empty(len(position), np.uint32)
     rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
     wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
@@ -366,7 +374,8 @@ def _merge(
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
         begin = end
     dr.eval(wi, wo, weight, held)
-    count = np.bincount(position, minlength=len(rays.pixel))[covered]
-    first = np.concatenate([[0], np.cumsum(count)])
+    count = np.bincount(position, minlength=len(samples) * pixels).reshape(-1, pixels)[:, covered]
+    first = np.concatenate([np.zeros((len(samples), 1), int), np.cumsum(count, axis=1)], axis=1)
+    first[1:] += np.cumsum(first[:-1, -1])[:, None]
     values = dict(zip(names, held, strict=False))
     return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant, values)

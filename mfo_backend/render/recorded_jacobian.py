@@ -71,10 +71,10 @@ class RecordedJacobian:
         self.evaluations = 0
         # a recording is made anew when the relation of the array sizes changes; that is rare and no cause for a warning
         frozen = dr.freeze(auto_opaque=False, warn_after=1000, state_fn=lambda *_: model.buffers())
-        self._launch, self._launch_squares = frozen(self._kernel), frozen(self._square_kernel)
+        self._launch = frozen(self._kernel)
 
     def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
-        """Mean radiance of the groups without the constant part, then its derivatives: (g, 3, 1 + K)."""
+        """Mean radiance of the groups without the constant part, then its derivatives: (samples, g, 3, 1 + K)."""
         width = self.table.length + 1
         theta = own_memory(vector, mi.Float)
         start, stop, scale = groups.parts
@@ -85,43 +85,6 @@ class RecordedJacobian:
             self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, held, start, stop, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
-
-    def effective_samples(
-        self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
-    ) -> NDArray[np.float64]:
-        """How many equal samples would be as noisy as those that light each group: (sum c)^2 / sum c^2, shape (g,).
-
-        c is what a recorded lane adds to the group's radiance (L. Kish, "Survey Sampling", 1965). Where a material
-        has moved away from the one its directions were chosen for, few lanes carry most of the light. 0 in the dark.
-        """
-        theta = own_memory(vector, mi.Float)
-        start, stop, _ = groups.parts
-        out = dr.zeros(mi.Float, dr.width(start) * 2)
-        dr.eval(theta, out)
-        held = [paths.held[p.name] for p in self._held]
-        with _no_garbage_collection():
-            self._launch_squares(theta, self._constants, paths.wi, paths.wo, paths.weight, held, start, stop, out)
-        total, squares = groups.add_parts(out.numpy().reshape(-1, 2)).T.astype(np.float64)
-        return np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0.0)
-
-    def _square_kernel(self, theta, constants, wi, wo, weight, held, start, stop, out):
-        values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
-
-        def body(lane, stop, total, squares):
-            wi_, wo_, weight_, *held_ = (dr.gather(type(a), a, lane) for a in (wi, wo, mi.Color3f(weight), *held))
-            colour = self._evaluate(self._parameters(values, constants, held_), wi_, wo_) * weight_
-            light = dr.sum(colour) / 3.0  # `dr.mean` would make the number of lanes part of the kernel
-            return lane + 1, stop, total + light, squares + dr.square(light)
-
-        _, _, *sums = dr.while_loop(
-            (mi.UInt32(start), mi.UInt32(stop), mi.Float(0.0), mi.Float(0.0)),
-            lambda lane, stop, total, squares: lane < stop,
-            body,
-            label="effective samples",
-        )
-        row = dr.arange(mi.UInt32, dr.width(start)) * 2
-        for column, total in enumerate(sums):
-            dr.scatter(out, total, row + column, mode=dr.ReduceMode.Permute)
 
     def _kernel(self, theta, constants, wi, wo, weight, held, start, stop, scale, out):
         width = self.table.length + 1

@@ -35,7 +35,7 @@ class LaneGroups:
     """Covered pixels that are averaged into one residual each: single pixels or tiles of pixels.
 
     `member` lists the positions of all groups' pixels in the recording, `first` (g + 1) where each group's begin;
-    `pixels` are their flat indices in the image, `first_lane` the recording's.
+    `pixels` are their flat indices in the image, `first_lane` (samples, p + 1) the recording's.
     """
 
     member: NDArray[np.int64]
@@ -55,7 +55,12 @@ class LaneGroups:
     def lanes_of_groups(self) -> NDArray[np.int64]:
         """Recorded lanes in each group."""
         start, stop = self._lane_ranges
-        return stop - start
+        return (stop - start).reshape(self.samples, -1).sum(axis=0)
+
+    @property
+    def samples(self) -> int:
+        """Independent samples of the light in the recording."""
+        return len(self.first_lane)
 
     def take(self, chosen: NDArray[np.int64]) -> LaneGroups:
         """Only the groups of these numbers."""
@@ -66,8 +71,12 @@ class LaneGroups:
 
     @cached_property
     def _lane_ranges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """First and last + 1 recorded lane of each group; a group's pixels follow each other in the recording."""
-        return self.first_lane[self.member[self.first[:-1]]], self.first_lane[self.member[self.first[1:] - 1] + 1]
+        """First and last + 1 recorded lane of each group in each sample, (samples g,) each.
+
+        A group's pixels follow each other in the recording.
+        """
+        start, stop = self.member[self.first[:-1]], self.member[self.first[1:] - 1] + 1
+        return self.first_lane[:, start].ravel(), self.first_lane[:, stop].ravel()
 
     @cached_property
     def _parts_per_group(self) -> NDArray[np.int64]:
@@ -79,15 +88,15 @@ class LaneGroups:
     def parts(self) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
         """First lane, last lane + 1 and one over the number of pixels, for each lane of the kernel.
 
-        A kernel lane is a group or, where groups are long or few, a part of one: all cores stay busy and neighbours in
-        a vector register take about as many turns.
+        A kernel lane is a group in one sample or, where groups are long or few, a part of that: all cores stay busy and
+        neighbours in a vector register take about as many turns.
         """
         start, stop = self._lane_ranges
         parts = self._parts_per_group
         number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
         begin, length, parts_of = (np.repeat(a, parts) for a in (start, stop - start, parts))
         bounds = [begin + length * k // parts_of for k in (number, number + 1)]
-        scale = np.repeat(1.0 / np.diff(self.first), parts)
+        scale = np.repeat(np.tile(1.0 / np.diff(self.first), self.samples), parts)
         arrays = (
             own_memory(bounds[0], mi.UInt32),
             own_memory(bounds[1], mi.UInt32),
@@ -97,15 +106,16 @@ class LaneGroups:
         return arrays
 
     def add_parts(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Sums over the kernel lanes of each group, along the first axis."""
-        if len(values) == len(self):
-            return values
+        """Sums over the kernel lanes of each group in each sample, along the first axis: (samples, g, ...)."""
+        shape = (self.samples, len(self), *values.shape[1:])
+        if len(values) == self.samples * len(self):
+            return values.reshape(shape)
         first, longer = self._parts_to_add
         sums = values[first]
         # few groups have several parts: adding those is four times as fast as `np.add.reduceat` over all
         for groups, parts in longer:
             sums[groups] += values[parts]
-        return sums
+        return sums.reshape(shape)
 
     @cached_property
     def _parts_to_add(self) -> tuple[NDArray[np.int64], list[tuple[NDArray[np.int64], NDArray[np.int64]]]]:
@@ -144,7 +154,8 @@ class RecordedPaths:
     pixel, tile
         Flat index of each covered pixel (row * width + column) and the number of its tile.
     first
-        Lanes of covered pixel p are `first[p]` to `first[p + 1]`; shape (p + 1,).
+        Lanes of covered pixel p in sample s are `first[s, p]` to `first[s, p + 1]`; shape (samples, p + 1). Each sample
+        has the light of every pixel, along the same camera rays but with random numbers of its own.
     coverage
         Share of each covered pixel's filter weight that lies on the target.
     constant
@@ -167,7 +178,7 @@ class RecordedPaths:
     @property
     def lanes(self) -> int:
         """Number of recorded lanes."""
-        return int(self.first[-1])
+        return int(self.first[-1, -1])
 
     @property
     def bytes(self) -> int:

@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,6 +25,7 @@ from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import tile_order, widened
 from .proposal import DefensiveProposal
 from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
+from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths
 
@@ -105,12 +105,13 @@ class RecordedScene:
         seed: int,
         near: bool,
         highlights: Highlights | None = None,
+        samples: int = 1,
     ) -> RecordedPaths:
         """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
         that of the material `vector`.
 
         `near` shapes the proposal for that material instead of for any and resolves highlights more finely, unless
-        `highlights` says how.
+        `highlights` says how. Where light is sampled each ray meets it in as many independent `samples`.
         """
         self.renderer.show(vector)
         proposal = DefensiveProposal()
@@ -118,18 +119,34 @@ class RecordedScene:
         if near and isinstance(width, float):
             proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
-        rays = float(self._covered) * float(np.mean(np.square(grid))) * (2 if self.needs.sampled else 1)
+        samples = samples if self.needs.sampled else 1
+        lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if self.needs.sampled else 1)
         if self._near_target.any():
             grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
-        stride = max(1, math.ceil(math.sqrt(rays / MOST_LANES)))
+        stride = max(1, math.ceil(math.sqrt(lanes / MOST_LANES)))
         stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
         settings = RecordSettings(
-            grid, seed, self.needs.depth, proposal, hide, stride, two_sided, held, light_paths, pixels, highlights
+            grid=grid,
+            seed=seed,
+            depth=self.needs.depth,
+            proposal=proposal,
+            hide_emitters=hide,
+            stride=stride,
+            two_sided=two_sided,
+            held=held,
+            light_paths=light_paths,
+            pixels=pixels,
+            highlights=highlights,
+            samples=samples,
         )
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def finest_grid(self, samples: int) -> int:
+        """The finest grid with which a recording of so many samples of the light still holds every tile."""
+        return int(math.sqrt(MOST_LANES / (2 * samples * self._covered)))
 
     def _highlights(self, vector: NDArray[np.float64]) -> Highlights:
         """How finely highlights of the material `vector` are recorded: an anisotropic lobe is narrow along one axis."""
@@ -170,29 +187,19 @@ class RecordedScene:
         reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
         return widened(self.renderer.target_mask(), reach)
 
-    def evaluator(
-        self, paths: RecordedPaths, groups: LaneGroups
-    ) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
-        """The function from a vector to image and Jacobian (g, 3, 1 + K) of the groups, background included."""
+    def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
+        """The function from a vector to image and Jacobian of the groups, background included."""
         constant = groups.average(paths.constant)
         # 1 + 0.2 K: Mitsuba's principled takes 564 operations for a value and 2098 with 14 derivatives
         share = len(groups.pixels) / max(len(paths.pixel), 1)
         cost = share * (1.0 + 0.2 * self.renderer.table.length)
 
-        def at(vector: NDArray[np.float64]) -> NDArray[np.float32]:
-            table = self.jacobian(vector, paths, groups)
-            table[:, :, 0] += constant
+        def at(vector: NDArray[np.float64]) -> TwoSamples:
+            samples = self.jacobian(vector, paths, groups)
             self.renderer.passes += cost
-            return table
+            return TwoSamples.of(samples, constant)
 
-        return at
-
-    def effective_samples(
-        self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups
-    ) -> NDArray[np.float64]:
-        """How many equal samples the light of each group is worth at a vector, shape (g,)."""
-        self.renderer.passes += len(groups.pixels) / max(len(paths.pixel), 1)
-        return self.jacobian.effective_samples(vector, paths, groups)
+        return RecordedImage(at, recalled)
 
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table

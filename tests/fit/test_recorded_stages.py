@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from mfo_backend.fit.recorded_plan import RecordedPlan
 from mfo_backend.render.renderer import load_renderer
 from tests.render.scenes import AREA, SKY, write_scene
 
 NAMES = ["base_color", "roughness", "metallic", "specular"]
 TRUTH = {"base_color": (0.8, 0.5, 0.3), "roughness": 0.12, "metallic": 0.9, "specular": 0.5}
+PLAN = RecordedPlan()
 FAR = {"base_color": (0.3, 0.5, 0.8), "roughness": 0.45, "metallic": 0.2, "specular": 0.5}
 
 
@@ -24,19 +27,18 @@ def refined(tmp_path, monkeypatch):
     )
     from mfo_backend.fit import recorded_stages
     from mfo_backend.fit.course import Course
-    from mfo_backend.fit.recorded_plan import RecordedPlan
     from mfo_backend.fit.residuals import RelativeResidual, WeightedResidual
     from mfo_backend.render.recorded_scene import RecordedScene
 
     table, mask = renderer.table, renderer.target_mask()
     reference, true = (renderer.image(table.pack(TRUTH), seed=seed, spp=256) for seed in (5, 9))
 
-    def run(**guards):
+    def run(plan=PLAN, **guards):
         for name, value in guards.items():
             monkeypatch.setattr(recorded_stages, name, value)
         course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
         scene = RecordedScene(renderer, int(mask.sum()))
-        fit = recorded_stages.RecordedFit(scene, reference, mask, RecordedPlan(), 1, course)
+        fit = recorded_stages.RecordedFit(scene, reference, mask, plan, 1, course)
         fit.paths = None  # `refine` makes its own
         refined = fit.refine(table.pack(FAR), RelativeResidual, WeightedResidual)
         found = renderer.image(refined.x, seed=9, spp=256)
@@ -49,11 +51,21 @@ NEVER = float("inf")
 
 
 def test_a_recording_that_is_too_old_is_made_anew(refined):
-    stale, recordings = refined(MOVED=NEVER, FEWER=NEVER)
+    plan = RecordedPlan(too_noisy=NEVER)
+    stale, recordings = refined(plan, MOVED=NEVER, NOISIER=NEVER)
     assert recordings == 1
     assert stale > 0.05  # a highlight of roughness 0.12, seen by directions for 0.45
     # either guard alone sees it
-    for guards in ({"MOVED": 0.15, "FEWER": NEVER}, {"MOVED": NEVER, "FEWER": 1.5}):
-        error, recordings = refined(**guards)
+    for guards in ({"MOVED": 0.15, "NOISIER": NEVER}, {"MOVED": NEVER, "NOISIER": 1.25}):
+        error, recordings = refined(plan, **guards)
         assert recordings > 1, guards
         assert error < 0.3 * stale, guards
+
+
+def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):
+    coarse = RecordedPlan(grid_last=2, too_noisy=NEVER)
+    noisy, recordings = refined(coarse, MOVED=NEVER, NOISIER=NEVER)
+    assert recordings == 1
+    error, recordings = refined(replace(coarse, too_noisy=0.07), MOVED=NEVER, NOISIER=NEVER)
+    assert recordings > 1
+    assert error < 0.5 * noisy

@@ -72,7 +72,7 @@ def test_weights_still_add_up_and_the_dark_takes_no_more_rays(tmp_path):
     _, paths = picture(4, share=0.5)
     np.testing.assert_allclose(paths.coverage[paths.interior], 1.0, atol=1e-5)
     np.testing.assert_array_equal(paths.pixel, plain.pixel)
-    lanes, before = (np.bincount(p.pixel, np.diff(p.first), 24 * 24) for p in (paths, plain))
+    lanes, before = (np.bincount(p.pixel, np.diff(p.first[0]), 24 * 24) for p in (paths, plain))
     assert ((lanes > before).sum()) < 0.1 * (before > 0).sum()
 
 

@@ -34,12 +34,12 @@ def test_columns_equal_central_differences(recording):
     scene, paths = recording
     table, groups = scene.renderer.table, paths.tile_groups()
     x, h = middle(table), 2e-3
-    jacobian = scene.jacobian(x, paths, groups)[:, :, 1:]
+    jacobian = scene.jacobian(x, paths, groups)[0, :, :, 1:]
     for k in range(table.length):
         step = np.zeros(table.length)
         step[k] = h
         difference = (
-            scene.jacobian(x + step, paths, groups)[:, :, 0] - scene.jacobian(x - step, paths, groups)[:, :, 0]
+            scene.jacobian(x + step, paths, groups)[0, :, :, 0] - scene.jacobian(x - step, paths, groups)[0, :, :, 0]
         ) / (2 * h)
         # float32 images of order 1 over 4e-3, and the curvature of the column
         scale = max(np.abs(difference).max(), 0.05)
@@ -50,7 +50,7 @@ def test_tiles_are_means_of_pixels(recording):
     scene, paths = recording
     x = middle(scene.renderer.table)
     pixels, tiles = paths.pixel_groups(), paths.tile_groups()
-    by_pixel, by_tile = scene.jacobian(x, paths, pixels), scene.jacobian(x, paths, tiles)
+    (by_pixel,), (by_tile,) = scene.jacobian(x, paths, pixels), scene.jacobian(x, paths, tiles)
     expected = np.stack([by_pixel[a:b].mean(axis=0) for a, b in zip(tiles.first[:-1], tiles.first[1:], strict=True)])
     np.testing.assert_allclose(by_tile, expected, rtol=1e-4, atol=1e-5)  # another order of float32 sums
     image = np.random.default_rng(0).uniform(size=(20, 20, 3)).astype(np.float32)
@@ -59,18 +59,35 @@ def test_tiles_are_means_of_pixels(recording):
     np.testing.assert_allclose(tiles.average(image), means, rtol=1e-5)
 
 
-@pytest.mark.parametrize("side", [2, 4])
-def test_effective_samples_are_those_of_the_lanes(recording, side):
-    from mfo_backend.render.recorded_paths import LaneGroups
+def test_two_samples_share_their_camera_rays_and_tell_their_noise(recording):
+    scene, single = recording
+    x = middle(scene.renderer.table)
+    means, noise = [], []
+    for seed in range(12):
+        paths = scene.record(scene.renderer.start, grid=3, seed=seed, near=False, samples=2)
+        np.testing.assert_array_equal(paths.pixel, single.pixel)
+        np.testing.assert_array_equal(paths.coverage, single.coverage)
+        two = scene.evaluator(paths, paths.tile_groups()).samples(x)
+        means.append(two.mean[:, :, 0])
+        noise.append(np.square(two.half_difference[:, :, 0]))
+    stated, found = np.mean(noise), np.var(means, axis=0, ddof=1).mean()
+    # 12 pictures of 25 tiles, whose channels share their noise: each estimate has a deviation of about 12 %
+    assert stated == pytest.approx(found, rel=0.35)
+    alone = scene.evaluator(single, single.tile_groups()).samples(x)
+    assert alone.half_difference is None
+    # half the noise of one sample alone: the mean of all is nearer to it than three of its deviations
+    assert np.abs(alone.mean[:, :, 0] - np.mean(means, axis=0)).mean() < 3.0 * np.sqrt(2.0 * stated)
 
-    scene, paths = recording
-    x, tiles = middle(scene.renderer.table), paths.tile_groups(side=side)
-    each = np.arange(paths.lanes)
-    lanes = LaneGroups(each, np.arange(paths.lanes + 1), each, np.arange(paths.lanes + 1))
-    light = scene.jacobian(x, paths, lanes)[:, :, 0].mean(axis=1).astype(np.float64)
-    first = paths.first[tiles.first]  # pixels of a tile follow each other
-    expected = [light[a:b].sum() ** 2 / (light[a:b] ** 2).sum() for a, b in pairwise(first)]
-    np.testing.assert_allclose(scene.effective_samples(x, paths, tiles), expected, rtol=1e-3)
+
+def test_lights_of_no_extent_are_the_same_in_both_samples(tmp_path):
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    renderer = load_renderer(
+        write_scene(tmp_path, POINT, size=20), "target", model="mitsuba_principled", parameters=NAMES
+    )
+    scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    paths = scene.record(renderer.start, grid=3, seed=1, near=True, samples=2)
+    assert paths.first.shape[0] == 1  # a second one would tell nothing
 
 
 def test_quarters_of_tiles_are_two_pixels_wide_and_hold_all(recording):
@@ -89,7 +106,7 @@ def test_chosen_groups_equal_the_rows_of_all(recording):
     x, tiles = middle(scene.renderer.table), paths.tile_groups()
     chosen = np.array([0, 2, 3, 7])
     np.testing.assert_allclose(
-        scene.jacobian(x, paths, tiles.take(chosen)), scene.jacobian(x, paths, tiles)[chosen], rtol=1e-4, atol=1e-5
+        scene.jacobian(x, paths, tiles.take(chosen)), scene.jacobian(x, paths, tiles)[:, chosen], rtol=1e-4, atol=1e-5
     )
 
 
