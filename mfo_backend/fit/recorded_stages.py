@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..render.primary_rays import TILE
 from ..render.recorded_image import RECALLED, RecordedImage
 from ..render.recorded_paths import LaneGroups, RecordedPaths
-from ..render.recorded_scene import RecordedScene
+from ..render.recorded_scene import MOST_LANES, RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..types.errors import UnrecordableError
 from ..types.image import Pixels
@@ -38,6 +38,7 @@ LEAST_NOISE = 0.002
 # part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
 # weights, which come from the solution that it is compared with, are only about right
 CLEARLY_LOWER = 0.97
+SPARE = 1.5  # times the lanes a start is found on are recorded for it: its tiles are chosen by what they show
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
@@ -136,7 +137,8 @@ class RecordedFit:
         with self.course.stage("scan") as stage:
             # where every light is exact, only the pixel's footprint is sampled
             grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
-            self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False)
+            enough = SPARE * plan.start_lanes if sampled else MOST_LANES
+            self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False, enough=enough)
             groups = all_groups(self.paths, TILE if sampled else 1)
             lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
             few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)

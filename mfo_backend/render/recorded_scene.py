@@ -106,12 +106,14 @@ class RecordedScene:
         near: bool,
         highlights: Highlights | None = None,
         samples: int = 1,
+        enough: float = MOST_LANES,
     ) -> RecordedPaths:
         """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
         that of the material `vector`.
 
         `near` shapes the proposal for that material instead of for any and resolves highlights more finely, unless
         `highlights` says how. Where light is sampled each ray meets it in as many independent `samples`.
+        Tiles are left out, evenly, as long as about `enough` lanes remain.
         """
         self.renderer.show(vector)
         proposal = DefensiveProposal()
@@ -123,7 +125,7 @@ class RecordedScene:
         lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if self.needs.sampled else 1)
         if self._near_target.any():
             grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
-        stride = max(1, math.ceil(math.sqrt(lanes / MOST_LANES)))
+        stride = max(1, math.ceil(math.sqrt(lanes / MOST_LANES)), int(math.sqrt(lanes / enough)))
         stride, pixels = self._affordable(grid, stride)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
