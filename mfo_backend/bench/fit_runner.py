@@ -165,7 +165,8 @@ class FitRunner:
         judge = self._judge
         picture = judge.picture(result.recovered)
         self._keep_picture(task, picture)
-        difference, relit = judge.difference_of(picture), judge.relit(result.recovered)
+        difference, judge_spp = judge.settled(judge.difference_of(picture), result.recovered, picture)
+        relit = judge.relit(result.recovered)
         start, floor = judge.pictures.start, judge.pictures.floor
         return Row(
             **common,
@@ -181,6 +182,7 @@ class FitRunner:
             relative_rmse=difference.relative_rmse,
             jod=difference.jod,
             q_jod=difference.q_jod,
+            judge_spp=judge_spp,
             relit_relative_rmse=sum(d.relative_rmse for d in relit) / len(relit) if relit else None,
             relit_flips=[d.flip for d in relit],
             reference_flip=judge.reference_flip(picture),

@@ -53,6 +53,8 @@ class Row:
         the last is the root of the mean square difference over the root of the mean square.
     jod, q_jod
         ColorVideoVDP's and HDR-VDP-3's score of the same pictures, None where they are not installed.
+    judge_spp
+        Samples a pixel of the pictures that were scored: more where their own noise would lower the score.
     reference_flip
         Of the reference and the picture of the recovered values: less `floor_flip` it is the error above the noise.
     start_flip, floor_flip, floor_relative_rmse
@@ -91,6 +93,7 @@ class Row:
     relative_rmse: float | None = None
     jod: float | None = None
     q_jod: float | None = None
+    judge_spp: int | None = None
     relit_relative_rmse: float | None = None
     relit_flips: list[float] = field(default_factory=list)
     reference_flip: float | None = None

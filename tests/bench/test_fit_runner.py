@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 
 from mfo_backend.bench import fit_runner
+from mfo_backend.bench import judge as judge_module
 from mfo_backend.bench.assets import Assets
 from mfo_backend.bench.fit_runner import FitRunner
+from mfo_backend.bench.judge import DOUBTED_JOD, MORE_PARTS
 from mfo_backend.bench.method import method_settings
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.summary import SOLVED_FLIP
@@ -44,6 +47,49 @@ def test_the_truth_itself_has_no_error(runner):
     assert (difference.flip, difference.relative_rmse) == (0.0, 0.0)  # the same picture twice
     assert judge.relit(judge.true_values())[0].relative_rmse == 0.0
     assert judge.pictures.floor.relative_rmse > 0
+
+
+@dataclass(frozen=True)
+class Said:
+    jod: float
+    hdrvdp3_q_jod: float | None = None
+
+
+def test_a_score_that_the_judges_own_noise_lowers_is_taken_again(runner, monkeypatch):
+    runner(Task("noise", 0, "fast"), never)
+    judge = runner._judge
+    values = judge.true_values()
+    picture = judge._renderer.image(judge.truth, seed=judge._seed + 77, spp=judge._spp)
+
+    def scored(scale):
+        def judged(true, test):
+            error = np.sqrt(np.mean(np.square(true.pixels - test.pixels))) / true.pixels.mean()
+            return Said(10.0 - scale * float(error))
+
+        monkeypatch.setattr(judge_module, "judge_images", judged)
+        return judge.settled(judge.difference_of(picture), values, picture)
+
+    monkeypatch.setattr(judge_module, "judges_present", lambda: True)
+    noisy = judge.difference_of(judge._renderer.image(judge.truth, seed=judge._seed + 78, spp=judge._spp))
+    clear, spp = scored(1e-9)
+    assert spp == judge._spp
+    scale = 2.0 / (10.0 - scored(1.0)[0].jod)  # two pictures of the truth get about 8
+    again, spp = scored(scale)
+    assert spp == MORE_PARTS * judge._spp
+    assert again.jod > DOUBTED_JOD > judge.difference_of(picture).jod
+    assert again.flip == judge.difference_of(picture).flip == pytest.approx(noisy.flip, rel=0.2)
+    assert clear.jod == pytest.approx(10.0)
+
+
+def test_a_wrong_picture_is_not_saved_by_more_samples(runner, monkeypatch):
+    runner(Task("parameters", 0, "fast"), never)
+    judge = runner._judge
+    monkeypatch.setattr(judge_module, "judges_present", lambda: True)
+    monkeypatch.setattr(judge_module, "judge_images", lambda true, test: Said(10.0 - 2.0 * (true is not test)))
+    start = judge._renderer.table.unpack(judge._renderer.start)
+    picture = judge.picture(start)
+    again, _ = judge.settled(judge.difference_of(picture), start, picture)
+    assert again.jod == 8.0
 
 
 def test_glass_is_fitted_in_blenders_model(runner):
