@@ -21,7 +21,7 @@ DETERMINED_BELOW = 0.02  # of a value that spans [0, 1]: two such steps are hard
 WEAK_BELOW = 0.15
 # Relative error a picture has even where the residual says 0: float32, quantisation, small differences of renderers
 MODEL_ERROR = 0.002
-INFLATION = 1.2  # own noise in the Jacobian is not counted
+INFLATION = 1.2  # where own noise in the derivatives is not known
 PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite
 
 
@@ -35,19 +35,19 @@ def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_er
     g, _, columns = rows.shape
     k = columns - 1
     width = table.upper - table.lower
-    scaled, residual = rows[:, :, 1:] * width, rows[:, :, 0]
+    scaled, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
     noise = np.maximum(np.abs(residual), model_error)
     q = np.einsum("gck,gc->gk", scaled, np.where(residual < 0.0, -noise, noise), optimize=True)
     gram = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)
     if own is not None:
         scaled = own[:, :, 1:] * width
         q -= np.einsum("gck,gc->gk", scaled, own[:, :, 0], optimize=True)
-        gram = without_own_noise(gram, np.einsum("gck,gcl->kl", scaled, scaled, optimize=True))
+        gram, inflation = without_own_noise(gram, np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)), 1.0
     # a prior as wide as the box, in units of the mean noise
     prior = float(np.mean(noise**2)) / PRIOR_SD**2
     inverse = np.linalg.inv(gram + prior * np.eye(k))
     found = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
-    return INFLATION**2 * g / max(g - k / 3, 1) * found
+    return inflation**2 * g / max(g - k / 3, 1) * found
 
 
 def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:
