@@ -38,6 +38,7 @@ SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 # Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
 MOST_RAYS = 12_000_000
 BYTES_PER_RAY = 272
+BYTES_PER_SAMPLE = 130  # of each further sample of the light
 # Bytes that are mapped beyond those: Dr.Jit rounds sizes up to powers of two and keeps what is freed by its size
 MAPPED_PER_RAY = 340
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
@@ -126,7 +127,7 @@ class RecordedScene:
         if self._near_target.any():
             grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
         stride = max(1, math.ceil(math.sqrt(lanes / MOST_LANES)), int(math.sqrt(lanes / enough)))
-        stride, pixels = self._affordable(grid, stride)
+        stride, pixels = self._affordable(grid, stride, samples)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
         settings = RecordSettings(
@@ -156,7 +157,9 @@ class RecordedScene:
         narrow = 1.0 - 0.9 * anisotropy if isinstance(anisotropy, float) else 1.0  # of both models
         return Highlights(share=SHARE_NEAR, narrow=narrow, turn=turn if isinstance(turn, float) else 0.0)
 
-    def _affordable(self, grid: int | NDArray[np.int64], stride: int) -> tuple[int, NDArray[np.bool_] | None]:
+    def _affordable(
+        self, grid: int | NDArray[np.int64], stride: int, samples: int
+    ) -> tuple[int, NDArray[np.bool_] | None]:
         """The stride with which a recording does not take too many camera rays, and the pixels it should look at.
 
         Raises
@@ -172,11 +175,12 @@ class RecordedScene:
             pixels = self._near_target
             while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
                 stride += 1
-        needed = count * BYTES_PER_RAY
+        further = (samples - 1) * BYTES_PER_SAMPLE
+        needed = count * (BYTES_PER_RAY + further)
         if needed > self._taken:  # Dr.Jit keeps what an earlier recording has freed
             require_memory(
                 needed - self._taken,
-                mapped=count * MAPPED_PER_RAY,
+                mapped=count * (MAPPED_PER_RAY + further),
                 what="Tracing the light of this picture",
                 cure="use a smaller picture or free some",
             )
