@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -96,28 +95,33 @@ class Judge:
     def settled(self, difference: Difference, values: Mapping[str, Value], picture: Pixels) -> tuple[Difference, int]:
         """The difference of a `picture` of the values with scores that the judge's own noise does not lower, and the
         samples a pixel of the pictures they are for."""
-        score, truth = difference.jod, self.truth
-        if score is None or score >= DOUBTED_JOD or truth is None or self._scene.given:
+        if difference.jod is None or difference.jod >= DOUBTED_JOD or self.truth is None or self._scene.given:
             return difference, self._spp
-        if self._truth_to_itself(truth) >= CLEAR_JOD:
+        itself = _difference(self.pictures.truth[0], self._second_truth, self.pictures.mask).jod
+        if itself is None or itself >= CLEAR_JOD:
             return difference, self._spp
-        true = self._finer(truth, self.pictures.truth[0])
         found = self._finer(self._renderer.table.pack(values), picture)
-        finer = _difference(true, found, self.pictures.mask)
+        finer = _difference(self._finer_truth, found, self.pictures.mask)
         return replace(difference, jod=finer.jod, q_jod=finer.q_jod), MORE_PARTS * self._spp
 
-    def _truth_to_itself(self, truth: NDArray[np.float64]) -> float:
-        """The score of two of the judge's pictures of the truth."""
-        other = self._renderer.image(truth, seed=self._seed + _NEXT_PART, spp=self._spp)
-        score = _difference(self.pictures.truth[0], other, self.pictures.mask).jod
-        return math.inf if score is None else score
+    @functools.cached_property
+    def _second_truth(self) -> Pixels:
+        """The truth under other random numbers: the second part of a finer picture."""
+        assert self.truth is not None
+        return self._part(self.truth, 1)
 
-    def _finer(self, vector: NDArray[np.float64], first: Pixels) -> Pixels:
-        parts = (
-            self._renderer.image(vector, seed=self._seed + part * _NEXT_PART, spp=self._spp)
-            for part in range(1, MORE_PARTS)
-        )
-        return sum(parts, start=first) / np.float32(MORE_PARTS)
+    @functools.cached_property
+    def _finer_truth(self) -> Pixels:
+        assert self.truth is not None
+        return self._finer(self.truth, self.pictures.truth[0], self._second_truth)
+
+    def _finer(self, vector: NDArray[np.float64], *parts: Pixels) -> Pixels:
+        """The mean of `MORE_PARTS` pictures, the first of which are there."""
+        more = (self._part(vector, part) for part in range(len(parts), MORE_PARTS))
+        return sum(more, start=sum(parts, start=np.zeros_like(parts[0]))) / np.float32(MORE_PARTS)
+
+    def _part(self, vector: NDArray[np.float64], part: int) -> Pixels:
+        return self._renderer.image(vector, seed=self._seed + part * _NEXT_PART, spp=self._spp)
 
     def flip(self, values: Mapping[str, Value]) -> float:
         """Mean FLIP alone, without the judges' scores."""

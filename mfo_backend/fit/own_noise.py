@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..render.recorded_image import TwoSamples
 from ..solve.bounded_least_squares import NormalEquations
-from .residuals import Residual, gram_of, sloped
+from .residuals import Residual, gram_of, rows_and_slope, sloped
 
 Vector = NDArray[np.float64]
 
@@ -27,9 +27,7 @@ MOST_OWN = 0.95  # of the square of a derivative in any direction: both are esti
 
 def rows_of_samples(two: TwoSamples, residual: Residual) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Values and derivatives (g, 3, 1 + k) of the residual at the mean, and half their difference to first order."""
-    values, slope = residual(two.mean[:, :, 0])
-    rows = sloped(two.mean, slope)
-    rows[:, :, 0] = values
+    rows, slope = rows_and_slope(two.mean, residual)
     return rows, None if two.half_difference is None else sloped(two.half_difference, slope)
 
 

@@ -133,10 +133,15 @@ class OneSidedResidual:
 
 def residual_rows(table: Rows, residual: Residual) -> NDArray[np.float64]:
     """Values and derivatives (g, 3, 1 + k) of the residual from those of the image."""
+    return rows_and_slope(table, residual)[0]
+
+
+def rows_and_slope(table: Rows, residual: Residual) -> tuple[NDArray[np.float64], Rows]:
+    """The same, and the residual's derivative by the image."""
     values, slope = residual(table[:, :, 0])
     rows = sloped(table, slope)
     rows[:, :, 0] = values
-    return rows
+    return rows, slope
 
 
 def sloped(table: Rows, slope: Rows) -> NDArray[np.float64]:

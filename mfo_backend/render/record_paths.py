@@ -26,7 +26,7 @@ from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_o
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
 
-NEXT_SAMPLE = 0x0C2B2AE3  # of a seed
+NEXT_SAMPLE = 0x0C2B2AE3  # added to the seed for each further sample of the light
 
 
 @dataclass(frozen=True)
