@@ -75,12 +75,14 @@ def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
 def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     sockets = {"Sheen Tint": {"value": [0.3, 0.3, 0.3], "linked": False}}
     renderer = load(tmp_path, [*NAMES, "sheen_weight", "sheen_tint"], sockets, size=32)
-    reference = renderer.image(renderer.table.pack({**TRUTH, "sheen_tint": (0.9, 0.1, 0.1)}), seed=5, spp=64)
+    # with 64 samples the sheen is unsure by 0.07, and another BLAS kernel's rounding moves it from 0.028 to 0.042
+    reference = renderer.image(renderer.table.pack({**TRUTH, "sheen_tint": (0.9, 0.1, 0.1)}), seed=5, spp=256)
     result, _ = fit(renderer, reference)
     assert result.certainty["sheen_tint"].level is Level.NOT_VISIBLE
     assert result.recovered["sheen_tint"] == pytest.approx((0.3, 0.3, 0.3))
     assert "sheen_tint" in result.notes[0]
     assert result.recovered["sheen_weight"] == pytest.approx(0.0, abs=0.03)
+    assert result.recovered["sheen_weight"] < 2.0 * result.certainty["sheen_weight"].sd[0]
 
 
 @pytest.mark.parametrize("visible", [False, True])
