@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 # Of the own noise where a problem was made: no more than this is taken away. Far from the material that was recorded
 # few lanes carry the light, and what they say of their noise is noise itself.
 MOST_TAKEN = 3.0
-MOST_OWN = 0.95  # of the square of a derivative in any direction: both are estimates
+MOST_OWN = 0.95  # of the cost, and of the square of a derivative in any direction: both are estimates
 
 
 def rows_of_samples(two: TwoSamples, residual: Residual) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
@@ -45,13 +45,14 @@ def unbiased_equations(
     def at(x: Vector) -> NormalEquations:
         rows, half_difference = rows_of_samples(samples(x), residual)
         gram = gram_of(rows)
-        cost, gradient, hessian = 0.5 * float(gram[0, 0]), gram[1:, 0], gram[1:, 1:]
+        gradient, hessian = gram[1:, 0], gram[1:, 1:]
         if half_difference is None or not np.isfinite(gram).all():
-            return NormalEquations(cost, gradient, hessian)
+            return NormalEquations(0.5 * float(gram[0, 0]), gradient, hessian)
         own = gram_of(half_difference)
+        taken = min(float(own[0, 0]), MOST_TAKEN * own_near) - own_near
+        cost = 0.5 * (float(gram[0, 0]) - min(taken, MOST_OWN * float(gram[0, 0])))
         if own[0, 0] > MOST_TAKEN * own_near:
-            return NormalEquations(cost - 0.5 * (MOST_TAKEN - 1.0) * own_near, gradient, hessian)
-        cost -= 0.5 * (float(own[0, 0]) - own_near)
+            return NormalEquations(cost, gradient, hessian)
         return NormalEquations(cost, gradient - own[1:, 0], without_own_noise(hessian, own[1:, 1:]))
 
     return at

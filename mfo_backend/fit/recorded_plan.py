@@ -47,7 +47,7 @@ class RecordedPlan:
     grid_first: int = 4
     grid_last: int = 4
     too_noisy: float = 0.07
-    low_noise: float = 0.05
+    low_noise: float = 0.06
     grid_finest: int = 16
     side_last: int = 2
     first_tiles: int = 1000

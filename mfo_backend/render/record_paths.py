@@ -274,8 +274,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         traced = valid & far.is_valid() & dr.opaque(mi.Bool, not settings.direct_only)
         radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, traced, before=before)
         weight += dr.select(traced, dr.maximum(radiance - emission, 0.0) / density, 0.0)
-    weight *= share
-    lanes.append(_compress(hits, wo, weight, valid & (dr.max(weight) > 0.0)))
+    # the share may be negative, where the pixel filter is
+    lanes.append(_compress(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
     return lanes
 
 

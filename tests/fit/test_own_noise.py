@@ -113,3 +113,14 @@ def test_numbers_that_are_not_finite_are_handed_on():
 
     equations = unbiased_equations(samples, WeightedResidual(np.ones((4, 3)), np.ones((4, 3))), np.zeros(2))
     assert not equations(np.zeros(2)).finite
+
+
+def test_a_cost_stays_positive_where_own_noise_is_all_there_is():
+    residual = WeightedResidual(
+        table(TRUTH, np.zeros((GROUPS, 3)))[:, :, 0].astype(np.float32), np.full((GROUPS, 3), 0.1)
+    )
+    for seed in range(5):
+        samples = two_samples(seed)
+        # with little of it where the problem was made, more is taken than is there
+        near = np.array([TRUTH[0], TRUTH[1], 0.55 * TRUTH[2]])
+        assert unbiased_equations(samples, residual, near)(TRUTH).cost > 0.0
