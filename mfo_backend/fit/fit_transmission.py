@@ -101,6 +101,12 @@ def fit_transmission(
     best = best if seen[best] < seen[0] else 0
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
     notes = [kept_note(unseen)] if kept and best else []
+    counts = fit.pictures.counts
+    if counts is not None:
+        notes.append(
+            f"The picture is as noisy as one of {counts.count} samples a pixel: compressed pixels of as many "
+            "samples were compared, so that no firefly decides."
+        )
     status = Status.CANCELLED if stopped or should_stop() else Status.CONVERGED
     result = final_result(
         renderer,

@@ -46,8 +46,13 @@ class TileRows:
         size: int,
         clipped: Pixels | None = None,
         most: int = 1 << 30,
+        *,
+        noise: Pixels | None = None,
     ) -> TileRows:
-        """Tiles of all pixels in `mask`; where these are more than `most`, of evenly spread blocks of pixels."""
+        """Tiles of all pixels in `mask`; where these are more than `most`, of evenly spread blocks of pixels.
+
+        Differences count relative to the radiance around a tile, or to a pixel's `noise`, its variance.
+        """
         height, width = mask.shape
         pixel = np.flatnonzero(mask.ravel())
         row, column = np.divmod(pixel, width)
@@ -59,7 +64,10 @@ class TileRows:
         count = np.diff(np.append(first, len(pixel)))
         flat = reference.reshape(-1, 3)
         sums = np.add.reduceat(flat[pixel].astype(np.float64), first, axis=0)
-        weight = _weights(sums, count, tile[first], columns, -(-height // size))
+        if noise is None:
+            weight = _weights(sums, count, tile[first], columns, -(-height // size))
+        else:
+            weight = (np.add.reduceat(noise.reshape(-1, 3)[pixel], first, axis=0) / count[:, None]) ** -0.5
         # small tiles at the silhouette are noisier
         weight *= np.sqrt(count / count.max())[:, None]
         limit = np.zeros((len(first), 3), bool)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
@@ -16,7 +15,7 @@ from ..solve.noisy_least_squares import SafeMatrix, cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
 from .tile_pools import TilePools
-from .tile_rows import TileRows
+from .traced_tiles import GEOMETRIC, SECANT_BELOW, TracedTiles
 from .transmission_plan import TransmissionPlan
 from .two_halves import is_unsure, two_half_equations
 from .uncertainty import WEAK_BELOW
@@ -25,14 +24,10 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ..render.traced_paths import TracedPaths
 
 Vector = NDArray[np.float64]
-Samples = list[NDArray[np.float32]]
 
 CORE = ("base_color", "transmission_weight", "roughness", "ior")
-GEOMETRIC = ("roughness", "ior")  # they move the paths
 ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
-SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
-SECANTS = {"roughness": 0.12, "ior": 0.06}
 TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
@@ -43,6 +38,8 @@ OWN = 0.25  # of the expected error: below, more samples help little
 FEW_STEPS = 4  # before, the error is that of few samples everywhere
 FAR = {True: 0.015, False: 0.06}  # of the range, of sharp materials and others: samples from so far away count half
 TRUST = 0.25  # of the range: the longest step
+MOST_COUNTINGS = 3  # of the reference's samples
+STILL = 0.25  # relative change of a count
 
 
 @dataclass
@@ -81,9 +78,10 @@ class TransmissionFit:
         course: Course,
         clipped: NDArray[np.float32] | None = None,
     ) -> None:
-        self.paths, self.start, self.reference, self.mask = paths, start, reference, mask
-        self.plan, self.seed, self.course, self.clipped = plan, seed, course, clipped
+        self.paths, self.start, self.mask = paths, start, mask
+        self.plan, self.seed, self.course = plan, seed, course
         self.table = paths.table
+        self.pictures = TracedTiles(paths, reference, mask, clipped, course.should_stop)
         self._width = self.table.upper - self.table.lower
         # values besides those of the glass stay as in the scene until the polish; without glass none does
         self._extras = np.ones(self.table.length, bool)
@@ -93,75 +91,11 @@ class TransmissionFit:
         if "transmission_weight" not in self.table.names:
             self._extras[:] = False
 
-    def tiles(self, size: int, most: int) -> TileRows:
-        """Tiles of the reference."""
-        return TileRows.of(self.reference, self.mask, size, self.clipped, most)
-
-    def halves(
-        self,
-        tiles: TileRows,
-        xs: Vector,
-        *,
-        seed: int,
-        samples: int,
-        jacobian: bool = True,
-        moving: bool = True,
-    ) -> list[Samples]:
-        """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
-
-        Without `moving` the derivatives by roughness and index stay those of fixed paths.
-        """
-        tables = self._tables(tiles.pixels, xs, seed, samples, jacobian, moving)
-        return [[tiles.rows(half) for half in np.split(table, 2)] for table in tables]
-
-    def _tables(
-        self,
-        pixels: NDArray[np.int64],
-        xs: Vector,
-        seed: int,
-        samples: int,
-        jacobian: bool = True,
-        moving: bool = True,
-    ) -> NDArray[np.float32]:
-        """Pictures with derivatives (m, 2 p, 3, 1 + k), the pixels twice."""
-        pixels = np.concatenate([pixels, pixels])  # the second time with other random numbers
-
-        def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
-            return self.paths.images(
-                vectors, pixels, seed=seed, samples=samples, jacobian=derivatives, should_stop=self.course.should_stop
-            )
-
-        tables = trace(xs, jacobian)
-        if jacobian and moving:
-            self._secants(tables, xs, trace)
-        return tables
-
-    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable) -> None:
-        """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
-        moved, where = [], []
-        for i, x in enumerate(xs):
-            if self.paths.roughness(x) >= SECANT_BELOW:
-                continue
-            for name in GEOMETRIC:
-                if name not in self.table.names:
-                    continue
-                k = self.table.slice_of(name).start
-                h = SECANTS[name]
-                h = -h if x[k] + h > self.table.upper[k] else h
-                trial = x.copy()
-                trial[k] += h
-                moved.append(trial)
-                where.append((i, k, h))
-        if moved:
-            images = trace(np.array(moved), False)[..., 0]
-            for image, (i, k, h) in zip(images, where, strict=True):
-                tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
-
     def scan(self) -> list[tuple[float, Vector]]:
         """Stage `scan`: all nodes of roughness and index with the best other values, best first."""
         plan, table = self.plan, self.table
         with self.course.stage("scan") as stage:
-            tiles = self.tiles(4, plan.scan_pixels)
+            tiles = self.pictures.tiles(4, plan.scan_pixels)
             nodes = {"roughness": ROUGHNESS_NODES, "ior": IOR_NODES}
             held = [name for name in GEOMETRIC if name in table.names]
             middle = self.start.copy()
@@ -182,7 +116,7 @@ class TransmissionFit:
             equations: list[NormalEquations] = []
             order = np.arange(len(xs))
             for turn in range(plan.scan_steps + 1):
-                rows = self.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
+                rows = self.pictures.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
                 equations = [two_half_equations(*pair) for pair in rows]
                 order = np.argsort([e.cost for e in equations])
                 self._note(stage, xs[order[0]], equations[order[0]].cost)
@@ -198,19 +132,19 @@ class TransmissionFit:
         """Stage `race`: damped steps from the best different nodes and the scene's material, all in one launch."""
         plan = self.plan
         with self.course.stage("race") as stage:
-            tiles = self.tiles(4, plan.race_pixels)
+            tiles = self.pictures.tiles(4, plan.race_pixels)
             few = len(tiles.pixels) < self.mask.sum()
             runners = [Runner(x.copy()) for x in self._different(nodes, plan.starts)]
             runners.append(Runner(self.table.clip(self.start)))
             best, cost = runners[0], np.inf
             for turn in range(plan.race_steps + 1):
                 trials = [r.x if r.equations is None else r.x + self._damped(r) for r in runners]
-                rows = self.halves(tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples)
+                rows = self.pictures.halves(tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples)
                 if self.course.should_stop():
                     break
                 if few and turn == 0 and is_unsure(*rows[0]):
-                    tiles = self.tiles(4, 2 * plan.race_pixels)
-                    rows = self.halves(tiles, np.array(trials), seed=self._seed(3), samples=plan.race_samples)
+                    tiles = self.pictures.tiles(4, 2 * plan.race_pixels)
+                    rows = self.pictures.halves(tiles, np.array(trials), seed=self._seed(3), samples=plan.race_samples)
                 for runner, trial, pair in zip(runners, trials, rows, strict=True):
                     self._accept(runner, trial, two_half_equations(*pair))
                 runners.sort(key=lambda r: r.equations.cost if r.equations else np.inf)
@@ -256,9 +190,9 @@ class TransmissionFit:
         Where the picture does not determine some values, a second end follows, fitted with those as in the scene.
         """
         with self.course.stage("polish") as stage:
-            core = start
+            core = self._counted(stage, start)
             if self._extras.any():
-                core = self._pool(stage, start, self._extras, stream=50).x
+                core = self._pool(stage, core, self._extras, stream=50).x
             ends = [self._pool(stage, core, np.zeros(self.table.length, bool), stream=10)]
             unseen = self._unseen(ends[0])
             if unseen.any() and not unseen.all() and not self.course.should_stop():
@@ -267,17 +201,38 @@ class TransmissionFit:
             stage.vector = ends[-1].x
         return ends
 
-    def _pool(self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int) -> Polished:
-        plan = self.plan
+    def _counted(self, stage: Stage, x: Vector) -> Vector:
+        """Find out how noisy the reference is and so how it is compared from now on; returns a point nearer to it.
+
+        Far from the solution the count is too low, so it is taken again after a few steps until it holds still.
+        """
+        count = 0
+        for turn in range(MOST_COUNTINGS):
+            counts = self.pictures.count_samples(x, self.plan.polish_pixels, self._seed(5000 + 100 * turn))
+            if counts is None or abs(counts.count - count) <= STILL * count or self.course.should_stop():
+                break
+            count = counts.count
+            x = self._pool(stage, x, self._extras, stream=200 + 10 * turn, steps=FEW_STEPS).x
+        return x
+
+    def _pool(
+        self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int, steps: int | None = None
+    ) -> Polished:
+        plan, counts = self.plan, self.pictures.counts
         x, variance = start.copy(), np.diag(self._width**2)
         equations, noise = None, variance
-        pools = TilePools.of((self.tiles(size, plan.polish_pixels) for size in TILE_SIZES), 1 + self.table.length)
+        most = plan.polish_pixels if counts is None else min(plan.polish_pixels, plan.counted_paths // counts.count)
+        pools = TilePools.of((self.pictures.tiles(size, most) for size in TILE_SIZES), 1 + self.table.length)
         # few pixels need more paths each: products of two noisy numbers average slowly
         samples = int(np.clip(plan.polish_paths // len(pools.pixels), 2, MOST_SAMPLES))
         most = min(GROWTH * samples, MOST_SAMPLES)
+        unseen = plan.unseen**2
+        if counts is not None:
+            samples = most = counts.count
+            unseen /= counts.mean_noise  # differences count in deviations of the noise
         moved, settled = 0.0, 0
-        for turn in range(plan.polish_steps):
-            (table,) = self._tables(pools.pixels, x[None], self._seed(stream + turn), samples)
+        for turn in range(steps or plan.polish_steps):
+            (table,) = self.pictures.tables(pools.pixels, x[None], self._seed(stream + turn), samples)
             if self.course.should_stop():
                 break
             table[..., 1:][..., frozen] = 0.0
@@ -294,7 +249,7 @@ class TransmissionFit:
             variance = SafeMatrix(equations, self._width).covariance(noise)
             error = pools.expected_error(equations, noise, size, self._width)
             near = moved <= far and error.total < plan.enough * error.there
-            if error.total > plan.unseen**2 and error.own >= OWN * error.total:
+            if error.total > unseen and error.own >= OWN * error.total:
                 near = False
                 if turn >= FEW_STEPS:
                     samples = min(2 * samples, most)
@@ -332,12 +287,16 @@ class TransmissionFit:
 
     def choose(self, candidates: list[Vector]) -> int:
         """The first candidate, unless another is better by two standard errors on paths that none has seen."""
-        tiles = self.tiles(4, self.plan.polish_pixels)
-        xs, samples = np.array(candidates), self.plan.guard_samples
+        xs, samples, most = np.array(candidates), self.plan.guard_samples, self.plan.polish_pixels
+        counts = self.pictures.counts
+        if counts is not None:
+            samples = counts.count
+            most = min(most, self.plan.counted_paths // (len(candidates) * samples))
+        tiles = self.pictures.tiles(4, most)
         gains: list[Vector] = []
         mean = error = np.zeros(len(xs))
         for part in range(GUARD_PARTS):
-            rows = self.halves(tiles, xs, seed=self._seed(999 + part), samples=samples, jacobian=False)
+            rows = self.pictures.halves(tiles, xs, seed=self._seed(999 + part), samples=samples, jacobian=False)
             if self.course.should_stop():
                 return 0
             costs = np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])

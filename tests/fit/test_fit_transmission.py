@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit import fit_transmission, verified_end
+from mfo_backend.fit import equal_counts, fit_transmission, verified_end
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.tile_pools import TilePools
@@ -109,6 +109,7 @@ def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeyp
 def test_a_polish_takes_more_samples_where_an_eye_would_see_their_noise(tmp_path, monkeypatch, lights, grows):
     renderer = load(tmp_path, size=56, lights=lights)
     reference = renderer.image(renderer.table.pack(TRUTH), seed=5, spp=32)
+    monkeypatch.setattr(equal_counts, "LEAST_NOISE", np.inf)  # as where a reference has more samples than are compared
     weights, add = [], TilePools.add
 
     def added(self, samples, weight):
@@ -120,6 +121,21 @@ def test_a_polish_takes_more_samples_where_an_eye_would_see_their_noise(tmp_path
     assert weights[0] < MOST_SAMPLES
     assert (max(weights) > weights[0]) is grows
     assert max(weights) <= MOST_SAMPLES
+
+
+def test_fireflies_do_not_decide_where_counts_are_equal(tmp_path, monkeypatch):
+    renderer = load(tmp_path, size=48, lights=SKY + FLOOR + SMALL_LAMP)
+    x = renderer.table.pack(TRUTH)
+    width = renderer.table.upper - renderer.table.lower
+    errors = {True: [], False: []}
+    for seed in (5, 6, 7):
+        reference = renderer.image(x, seed=seed, spp=8)
+        for equal in errors:
+            monkeypatch.setattr(equal_counts, "LEAST_NOISE", 0.02 if equal else np.inf)
+            result, _ = fit(renderer, reference)
+            assert any("as noisy as one of" in note for note in result.notes) is equal
+            errors[equal].append(np.mean(np.abs(renderer.table.pack(result.recovered) - x) / width))
+    assert np.mean(errors[True]) < 0.3 * np.mean(errors[False])  # 0.011 and 0.092
 
 
 def test_the_start_is_kept_where_nothing_is_better(tmp_path):

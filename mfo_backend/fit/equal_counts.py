@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noisy pictures compared as an eye sees them: compressed pixels of as many samples as the reference has.
+
+Under small bright lights few paths carry much of the light, and sums of squares see little else. A compressed pixel
+does not care how bright a firefly is, but its mean depends on how many samples it has: few are darker than many. So
+the model's pixels are made of as many samples as the reference's, and what the compression takes away from both
+cancels (D. McFadden, "A Method of Simulated Moments", 1989). How many those are the noise tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.image import Pixels
+
+Vector = NDArray[np.float64]
+# (samples a pixel, stream of random numbers) -> two independent pictures (2, p, 3), scene-linear
+TwoPictures = Callable[[int, int], NDArray[np.float32]]
+
+LEVEL = 0.25  # of the median: below, compressed values are about linear
+MOST_COUNT = 64  # samples a pixel; more take too long, and there is less to compress
+ALIKE = 0.2  # logarithm: with so much more noise at the most samples these are taken
+LEAST_NOISE = 0.02  # variance of compressed pixels: a cleaner reference is compared as it is
+REACH = 3  # pixels to each side that noise is averaged over
+PRIOR, FLOOR = 8.0, 0.2  # pixels that the whole picture's noise counts for, and the part of it that is everywhere
+
+
+@dataclass(frozen=True)
+class EqualCounts:
+    """How a noisy reference is compared.
+
+    Attributes
+    ----------
+    reference, noise
+        Compressed values of the reference, and the variance of a pixel's, both (height, width, 3).
+    level, top
+        Compressed is log(1 + y / level); radiance above `top`, which a display cannot show, counts as that.
+    count
+        Samples a pixel of the pictures to compare with it.
+    """
+
+    reference: Pixels = field(repr=False)
+    noise: Pixels = field(repr=False)
+    level: float
+    top: float
+    count: int
+
+    def compress(self, table: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Compressed values and their derivatives from those of radiance (..., 1 + k)."""
+        return compressed(table, self.level, self.top)
+
+    @property
+    def mean_noise(self) -> float:
+        """Mean variance of a compressed pixel."""
+        return float(self.noise.mean())
+
+
+def compressed(table: NDArray[np.float32], level: float, top: float) -> NDArray[np.float32]:
+    """log(1 + y / level) of the first entries of the last axis, and the derivatives that follow them."""
+    value = np.clip(table[..., :1], 0.0, top)
+    slope = np.where(table[..., :1] < top, 1.0 / (level + value), 0.0)
+    return np.concatenate([np.log1p(value / level), slope * table[..., 1:]], axis=-1).astype(np.float32)
+
+
+def equal_counts(
+    reference: Pixels,
+    mask: NDArray[np.bool_],
+    pixels: NDArray[np.int64],
+    clipped: Pixels | None,
+    pictures: TwoPictures,
+) -> EqualCounts | None:
+    """How to compare with a noisy linear `reference` (height, width, 3); None where it is clean, or has more samples.
+
+    `pictures` are a model's, of the pixels with the flat indices `pixels`. At equal counts the reference differs from
+    one of them as another does. Differences are compared between neighbouring pixels, where a misfit cancels in part;
+    where the model is far off the count is too low.
+    """
+    seen = reference[mask]
+    level = LEVEL * float(np.median(seen))
+    if level <= 0.0:
+        return None
+    top = np.inf if clipped is None or not clipped[mask].any() else float(seen[clipped[mask] > 0].min())
+    target = compressed(reference[..., None], level, top)[..., 0]
+    shown = target.reshape(-1, 3)[pixels]
+    halves = np.zeros((2, len(pixels), 3))
+    squares = np.zeros((len(pixels), 3))
+    count, before, excess = 0, np.inf, np.inf
+    while excess > 0.0 and count < MOST_COUNT:
+        more = max(count, 1)
+        halves = (count * halves + more * pictures(more, count)) / (count + more)
+        count += more
+        first, second = (compressed(half[..., None], level, top)[..., 0] for half in halves)
+        squares = 0.5 * np.square(first - second)
+        own = _roughness(first - second, pixels, mask)
+        others = 0.5 * sum(_roughness(shown - half, pixels, mask) for half in (first, second))
+        before, excess = excess, float(np.log(max(own, 1e-30) / max(others, 1e-30)))
+    if squares.mean() < LEAST_NOISE or excess > ALIKE:
+        return None
+    if excess < 0.0 < before < np.inf:
+        # the excess falls about evenly with the logarithm of the count
+        count = max(round(count * 2.0 ** (excess / (before - excess))), 1)
+    return EqualCounts(target, _local_noise(squares, pixels, mask), level, top, count)
+
+
+def _roughness(residual: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> float:
+    """Mean difference of residuals (p, 3) in pixels next to each other: no square, which few fireflies would rule."""
+    inside, shown = _in_picture(residual, pixels, mask)
+    steps = [np.subtract(*_next_to(shown, axis))[np.logical_and(*_next_to(inside, axis))] for axis in (0, 1)]
+    return float(np.abs(np.concatenate(steps)).mean()) if any(len(step) for step in steps) else 0.0
+
+
+def _next_to(picture: NDArray, axis: int) -> tuple[NDArray, NDArray]:
+    """All pixels but the last along an axis, and their neighbours."""
+    last = picture.shape[axis] - 1
+    return np.take(picture, range(last), axis), np.take(picture, range(1, last + 1), axis)
+
+
+def _local_noise(variance: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> Pixels:
+    """Variances (p, 3) averaged with those around them, and nowhere near 0: (height, width, 3)."""
+    inside, shown = _in_picture(variance, pixels, mask)
+    mean = variance.mean(axis=0)
+    total, count = (_around(picture) for picture in (shown, inside.astype(np.float64)))
+    return ((total + PRIOR * mean) / (count + PRIOR)[..., None] + FLOOR * mean).astype(np.float32)
+
+
+def _around(picture: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sums over squares of pixels."""
+    for axis in (0, 1):
+        padded = np.pad(picture, [(REACH, REACH) if k == axis else (0, 0) for k in range(picture.ndim)])
+        size = picture.shape[axis]
+        picture = np.sum([np.take(padded, range(k, k + size), axis) for k in range(2 * REACH + 1)], axis=0)
+    return picture
+
+
+def _in_picture(
+    values: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Which pixels (height, width) have values (p, n), and these (height, width, n), 0 elsewhere."""
+    inside, shown = np.zeros(mask.size, bool), np.zeros((mask.size, values.shape[1]))
+    inside[pixels], shown[pixels] = True, values
+    return inside.reshape(mask.shape), shown.reshape(*mask.shape, -1)
