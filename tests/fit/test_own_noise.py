@@ -115,12 +115,15 @@ def test_numbers_that_are_not_finite_are_handed_on():
     assert not equations(np.zeros(2)).finite
 
 
-def test_a_cost_stays_positive_where_own_noise_is_all_there_is():
-    residual = WeightedResidual(
-        table(TRUTH, np.zeros((GROUPS, 3)))[:, :, 0].astype(np.float32), np.full((GROUPS, 3), 0.1)
-    )
-    for seed in range(5):
-        samples = two_samples(seed)
-        # with little of it where the problem was made, more is taken than is there
-        near = np.array([TRUTH[0], TRUTH[1], 0.55 * TRUTH[2]])
-        assert unbiased_equations(samples, residual, near)(TRUTH).cost > 0.0
+def test_a_cost_stays_positive_where_the_mean_of_both_samples_hits_the_reference():
+    exact = table(TRUTH, np.zeros((GROUPS, 3)))
+    residual = WeightedResidual(exact[:, :, 0].astype(np.float32), np.full((GROUPS, 3), 10.0))
+    noise = np.random.default_rng(4).normal(size=exact.shape)
+
+    def samples(x):
+        return TwoSamples((exact + 0.01 * x[0]).astype(np.float32), (0.01 * (1.0 + x[1]) * noise).astype(np.float32))
+
+    at = unbiased_equations(samples, residual, np.zeros(3))
+    assert at(np.array([0.1, 0.0, 0.0])).cost > 0.0
+    assert at(np.array([0.1, 0.5, 0.0])).cost > 0.0  # there own noise is 2.25 times that where the problem was made
+    assert at(np.array([0.1, 2.0, 0.0])).cost > 0.0  # and here too far from it
