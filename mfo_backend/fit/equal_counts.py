@@ -24,7 +24,7 @@ TwoPictures = Callable[[int, int], NDArray[np.float32]]
 LEVEL = 0.25  # of the median: below, compressed values are about linear
 MOST_COUNT = 64  # samples a pixel; more take too long, and there is less to compress
 ALIKE = 0.2  # logarithm: with so much more noise at the most samples these are taken
-LEAST_NOISE = 0.02  # variance of compressed pixels: a cleaner reference is compared as it is
+LEAST_NOISE = 0.05  # variance of compressed pixels: a cleaner reference is compared as it is, which takes half the time
 REACH = 3  # pixels to each side that noise is averaged over
 PRIOR, FLOOR = 8.0, 0.2  # pixels that the whole picture's noise counts for, and the part of it that is everywhere
 

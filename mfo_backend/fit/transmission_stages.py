@@ -14,6 +14,7 @@ from ..solve.bounded_least_squares import NormalEquations
 from ..solve.noisy_least_squares import SafeMatrix, cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
+from .equal_counts import MOST_COUNT
 from .tile_pools import TilePools
 from .traced_tiles import GEOMETRIC, SECANT_BELOW, TracedTiles
 from .transmission_plan import TransmissionPlan
@@ -39,6 +40,7 @@ FEW_STEPS = 4  # before, the error is that of few samples everywhere
 FAR = {True: 0.015, False: 0.06}  # of the range, of sharp materials and others: samples from so far away count half
 TRUST = 0.25  # of the range: the longest step
 MOST_COUNTINGS = 3  # of the reference's samples
+COUNTED_STEPS = 3  # between them
 STILL = 0.25  # relative change of a count
 
 
@@ -206,22 +208,33 @@ class TransmissionFit:
 
         Far from the solution the count is too low, so it is taken again after a few steps until it holds still.
         """
-        count = 0
+        count, few = 0, self.plan.counted_paths // 4
         for turn in range(MOST_COUNTINGS):
-            counts = self.pictures.count_samples(x, self.plan.polish_pixels, self._seed(5000 + 100 * turn))
+            most = (4 * few if turn else few) // MOST_COUNT
+            counts = self.pictures.count_samples(x, most, self._seed(5000 + 100 * turn))
             if counts is None or abs(counts.count - count) <= STILL * count or self.course.should_stop():
                 break
             count = counts.count
-            x = self._pool(stage, x, self._extras, stream=200 + 10 * turn, steps=FEW_STEPS).x
+            x = self._pool(stage, x, self._extras, 200 + 10 * turn, steps=COUNTED_STEPS, paths=few).x
         return x
 
     def _pool(
-        self, stage: Stage, start: Vector, frozen: NDArray[np.bool_], stream: int, steps: int | None = None
+        self,
+        stage: Stage,
+        start: Vector,
+        frozen: NDArray[np.bool_],
+        stream: int,
+        *,
+        steps: int | None = None,
+        paths: int | None = None,
     ) -> Polished:
+        """A polish from `start` with the `frozen` values held; `paths` of a step bound those at equal counts."""
         plan, counts = self.plan, self.pictures.counts
         x, variance = start.copy(), np.diag(self._width**2)
         equations, noise = None, variance
-        most = plan.polish_pixels if counts is None else min(plan.polish_pixels, plan.counted_paths // counts.count)
+        most = plan.polish_pixels
+        if counts is not None:
+            most = min(most, (paths or plan.counted_paths) // counts.count)
         pools = TilePools.of((self.pictures.tiles(size, most) for size in TILE_SIZES), 1 + self.table.length)
         # few pixels need more paths each: products of two noisy numbers average slowly
         samples = int(np.clip(plan.polish_paths // len(pools.pixels), 2, MOST_SAMPLES))
