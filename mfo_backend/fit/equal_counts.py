@@ -24,7 +24,7 @@ TwoPictures = Callable[[int, int], NDArray[np.float32]]
 LEVEL = 0.25  # of the median: below, compressed values are about linear
 MOST_COUNT = 64  # samples a pixel; more take too long, and there is less to compress
 ALIKE = 0.2  # logarithm: with so much more noise at the most samples these are taken
-LEAST_NOISE = 0.05  # variance of compressed pixels: a cleaner reference is compared as it is, which takes half the time
+LOUD = 0.25  # relative variance of a pixel's radiance; for a calmer reference plain squares do, in half the time
 REACH = 3  # pixels to each side that noise is averaged over
 PRIOR, FLOOR = 8.0, 0.2  # pixels that the whole picture's noise counts for, and the part of it that is everywhere
 
@@ -98,7 +98,7 @@ def equal_counts(
         own = _roughness(first - second, pixels, mask)
         others = 0.5 * sum(_roughness(shown - half, pixels, mask) for half in (first, second))
         before, excess = excess, float(np.log(max(own, 1e-30) / max(others, 1e-30)))
-    if squares.mean() < LEAST_NOISE or excess > ALIKE:
+    if excess > ALIKE or _relative_variance(reference.reshape(-1, 3)[pixels], halves, pixels, mask) < LOUD:
         return None
     if excess < 0.0 < before < np.inf:
         # the excess falls about evenly with the logarithm of the count
@@ -108,9 +108,31 @@ def equal_counts(
 
 def _roughness(residual: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> float:
     """Mean difference of residuals (p, 3) in pixels next to each other: no square, which few fireflies would rule."""
+    steps = _steps(residual, pixels, mask)
+    return float(np.abs(steps).mean()) if len(steps) else 0.0
+
+
+def _relative_variance(
+    seen: NDArray[np.float32], halves: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]
+) -> float:
+    """Variance of the reference `seen` (p, 3), relative to the model's radiance around and a tenth of its mean.
+
+    From residuals of neighbours, as a misfit cancels there in part: the reference's noise and half of the model's.
+    """
+    model = halves.mean(axis=0)
+    inside, shown = _in_picture(model, pixels, mask)
+    total, count = (_around(picture) for picture in (shown, inside.astype(np.float64)))
+    level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + 0.1 * float(model.mean())
+    steps = _steps((seen - model) / np.maximum(level, 1e-30), pixels, mask)
+    return 0.5 * float(np.mean(np.square(steps))) / 1.5 if len(steps) else 0.0
+
+
+def _steps(residual: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> Vector:
+    """Differences (n, 3) of residuals (p, 3) between pixels next to each other."""
     inside, shown = _in_picture(residual, pixels, mask)
-    steps = [np.subtract(*_next_to(shown, axis))[np.logical_and(*_next_to(inside, axis))] for axis in (0, 1)]
-    return float(np.abs(np.concatenate(steps)).mean()) if any(len(step) for step in steps) else 0.0
+    return np.concatenate(
+        [np.subtract(*_next_to(shown, axis))[np.logical_and(*_next_to(inside, axis))] for axis in (0, 1)]
+    )
 
 
 def _next_to(picture: NDArray, axis: int) -> tuple[NDArray, NDArray]:

@@ -109,7 +109,7 @@ def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeyp
 def test_a_polish_takes_more_samples_where_an_eye_would_see_their_noise(tmp_path, monkeypatch, lights, grows):
     renderer = load(tmp_path, size=56, lights=lights)
     reference = renderer.image(renderer.table.pack(TRUTH), seed=5, spp=32)
-    monkeypatch.setattr(equal_counts, "LEAST_NOISE", np.inf)  # as where a reference has more samples than are compared
+    monkeypatch.setattr(equal_counts, "LOUD", np.inf)  # as where a reference has more samples than are compared
     weights, add = [], TilePools.add
 
     def added(self, samples, weight):
@@ -131,7 +131,7 @@ def test_fireflies_do_not_decide_where_counts_are_equal(tmp_path, monkeypatch):
     for seed in (5, 6, 7):
         reference = renderer.image(x, seed=seed, spp=8)
         for equal in errors:
-            monkeypatch.setattr(equal_counts, "LEAST_NOISE", 0.05 if equal else np.inf)
+            monkeypatch.setattr(equal_counts, "LOUD", 0.25 if equal else np.inf)
             result, _ = fit(renderer, reference)
             assert any("as noisy as one of" in note for note in result.notes) is equal
             errors[equal].append(np.mean(np.abs(renderer.table.pack(result.recovered) - x) / width))
