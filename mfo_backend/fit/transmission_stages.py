@@ -42,6 +42,7 @@ TRUST = 0.25  # of the range: the longest step
 MOST_COUNTINGS = 3  # of the reference's samples
 COUNTED_STEPS = 3  # between them
 STILL = 0.25  # relative change of a count
+RIVALS = 3  # other ends of a race
 
 
 @dataclass
@@ -84,6 +85,7 @@ class TransmissionFit:
         self.plan, self.seed, self.course = plan, seed, course
         self.table = paths.table
         self.pictures = TracedTiles(paths, reference, mask, clipped, course.should_stop)
+        self.rivals: list[Vector] = []  # other ends of the race
         self._width = self.table.upper - self.table.lower
         # values besides those of the glass stay as in the scene until the polish; without glass none does
         self._extras = np.ones(self.table.length, bool)
@@ -160,6 +162,8 @@ class TransmissionFit:
                     if not gained:
                         break
                     runners = self._leaders(runners)
+            others = [(0.0, x) for x in (*(runner.x for runner in runners), *(x for _, x in nodes))]
+            self.rivals = self._different([(0.0, best.x), *others], 1 + RIVALS)[1:]
             return best.x
 
     def _leaders(self, runners: list[Runner]) -> list[Runner]:
@@ -206,7 +210,8 @@ class TransmissionFit:
     def _counted(self, stage: Stage, x: Vector) -> Vector:
         """Find out how noisy the reference is and so how it is compared from now on; returns a point nearer to it.
 
-        Far from the solution the count is too low, so it is taken again after a few steps until it holds still.
+        Far from the solution the count is too low, so it is taken again after a few steps until it holds still. The
+        race compared plain squares, so its other ends get as many steps at first.
         """
         count, few = 0, self.plan.counted_paths // 4
         for turn in range(MOST_COUNTINGS):
@@ -215,7 +220,12 @@ class TransmissionFit:
             if counts is None or abs(counts.count - count) <= STILL * count or self.course.should_stop():
                 break
             count = counts.count
-            x = self._pool(stage, x, self._extras, 200 + 10 * turn, steps=COUNTED_STEPS, paths=few).x
+            starts = [x] if turn else [x, *self.rivals]
+            ends = [
+                self._pool(stage, start, self._extras, 200 + 10 * turn, steps=COUNTED_STEPS, paths=few).x
+                for start in starts
+            ]
+            x = ends[self.choose(ends)]
         return x
 
     def _pool(
@@ -300,6 +310,8 @@ class TransmissionFit:
 
     def choose(self, candidates: list[Vector]) -> int:
         """The first candidate, unless another is better by two standard errors on paths that none has seen."""
+        if len(candidates) == 1:
+            return 0
         xs, samples, most = np.array(candidates), self.plan.guard_samples, self.plan.polish_pixels
         counts = self.pictures.counts
         if counts is not None:
