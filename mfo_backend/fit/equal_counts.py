@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.image import Pixels
+from .neighbours import next_to, sums_around
 
 Vector = NDArray[np.float64]
+Shape = tuple[int, ...]
 # (samples a pixel, stream of random numbers) -> two independent pictures (2, p, 3), scene-linear
 TwoPictures = Callable[[int, int], NDArray[np.float32]]
 
@@ -55,7 +57,7 @@ class EqualCounts:
 
     @property
     def mean_noise(self) -> float:
-        """Mean variance of a compressed pixel."""
+        """Mean variance of a compressed pixel; where nothing was looked at it is that of what was."""
         return float(self.noise.mean())
 
 
@@ -95,73 +97,55 @@ def equal_counts(
         count += more
         first, second = (compressed(half[..., None], level, top)[..., 0] for half in halves)
         squares = 0.5 * np.square(first - second)
-        own = _roughness(first - second, pixels, mask)
-        others = 0.5 * sum(_roughness(shown - half, pixels, mask) for half in (first, second))
+        own = _roughness(first - second, pixels, mask.shape)
+        others = 0.5 * sum(_roughness(shown - half, pixels, mask.shape) for half in (first, second))
         before, excess = excess, float(np.log(max(own, 1e-30) / max(others, 1e-30)))
-    if excess > ALIKE or _relative_variance(reference.reshape(-1, 3)[pixels], halves, pixels, mask) < LOUD:
+    if excess > ALIKE or _relative_variance(reference.reshape(-1, 3)[pixels], halves, pixels, mask.shape) < LOUD:
         return None
     if excess < 0.0 < before < np.inf:
         # the excess falls about evenly with the logarithm of the count
         count = max(round(count * 2.0 ** (excess / (before - excess))), 1)
-    return EqualCounts(target, _local_noise(squares, pixels, mask), level, top, count)
+    return EqualCounts(target, _local_noise(squares, pixels, mask.shape), level, top, count)
 
 
-def _roughness(residual: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> float:
+def _roughness(residual: Vector, pixels: NDArray[np.int64], shape: Shape) -> float:
     """Mean difference of residuals (p, 3) in pixels next to each other: no square, which few fireflies would rule."""
-    steps = _steps(residual, pixels, mask)
+    steps = _steps(residual, pixels, shape)
     return float(np.abs(steps).mean()) if len(steps) else 0.0
 
 
-def _relative_variance(
-    seen: NDArray[np.float32], halves: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]
-) -> float:
+def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArray[np.int64], shape: Shape) -> float:
     """Variance of the reference `seen` (p, 3), relative to the model's radiance around and a tenth of its mean.
 
     From residuals of neighbours, as a misfit cancels there in part: the reference's noise and half of the model's.
     """
     model = halves.mean(axis=0)
-    inside, shown = _in_picture(model, pixels, mask)
-    total, count = (_around(picture) for picture in (shown, inside.astype(np.float64)))
+    inside, shown = _in_picture(model, pixels, shape)
+    total, count = (sums_around(picture, REACH) for picture in (shown, inside.astype(np.float64)))
     level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + 0.1 * float(model.mean())
-    steps = _steps((seen - model) / np.maximum(level, 1e-30), pixels, mask)
+    steps = _steps((seen - model) / np.maximum(level, 1e-30), pixels, shape)
     return 0.5 * float(np.mean(np.square(steps))) / 1.5 if len(steps) else 0.0
 
 
-def _steps(residual: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> Vector:
+def _steps(residual: Vector, pixels: NDArray[np.int64], shape: Shape) -> Vector:
     """Differences (n, 3) of residuals (p, 3) between pixels next to each other."""
-    inside, shown = _in_picture(residual, pixels, mask)
-    return np.concatenate(
-        [np.subtract(*_next_to(shown, axis))[np.logical_and(*_next_to(inside, axis))] for axis in (0, 1)]
-    )
+    inside, shown = _in_picture(residual, pixels, shape)
+    sides = (next_to(axis) for axis in (0, 1))
+    return np.concatenate([(shown[here] - shown[there])[inside[here] & inside[there]] for here, there in sides])
 
 
-def _next_to(picture: NDArray, axis: int) -> tuple[NDArray, NDArray]:
-    """All pixels but the last along an axis, and their neighbours."""
-    last = picture.shape[axis] - 1
-    return np.take(picture, range(last), axis), np.take(picture, range(1, last + 1), axis)
-
-
-def _local_noise(variance: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]) -> Pixels:
+def _local_noise(variance: Vector, pixels: NDArray[np.int64], shape: Shape) -> Pixels:
     """Variances (p, 3) averaged with those around them, and nowhere near 0: (height, width, 3)."""
-    inside, shown = _in_picture(variance, pixels, mask)
+    inside, shown = _in_picture(variance, pixels, shape)
     mean = variance.mean(axis=0)
-    total, count = (_around(picture) for picture in (shown, inside.astype(np.float64)))
+    total, count = (sums_around(picture, REACH) for picture in (shown, inside.astype(np.float64)))
     return ((total + PRIOR * mean) / (count + PRIOR)[..., None] + FLOOR * mean).astype(np.float32)
 
 
-def _around(picture: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums over squares of pixels."""
-    for axis in (0, 1):
-        padded = np.pad(picture, [(REACH, REACH) if k == axis else (0, 0) for k in range(picture.ndim)])
-        size = picture.shape[axis]
-        picture = np.sum([np.take(padded, range(k, k + size), axis) for k in range(2 * REACH + 1)], axis=0)
-    return picture
-
-
 def _in_picture(
-    values: Vector, pixels: NDArray[np.int64], mask: NDArray[np.bool_]
+    values: Vector, pixels: NDArray[np.int64], shape: Shape
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Which pixels (height, width) have values (p, n), and these (height, width, n), 0 elsewhere."""
-    inside, shown = np.zeros(mask.size, bool), np.zeros((mask.size, values.shape[1]))
-    inside[pixels], shown[pixels] = True, values
-    return inside.reshape(mask.shape), shown.reshape(*mask.shape, -1)
+    inside, shown = np.zeros(shape, bool), np.zeros((*shape, values.shape[1]))
+    inside.ravel()[pixels], shown.reshape(-1, values.shape[1])[pixels] = True, values
+    return inside, shown

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..render.primary_rays import TILE
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..types.image import Pixels
+from .neighbours import next_to, sums_around
 
 REACH = 8  # pixels to each side of a tile that its variance is taken from
 PRIOR_PAIRS = 8  # pairs of pixels that the variance of the whole picture counts for
@@ -62,9 +63,9 @@ def tile_noise(
 
     squares, pairs = np.zeros_like(residual), np.zeros((height, width, 1))
     for axis in (0, 1):
-        here, next_to = _shifted(axis)
-        both = inside[here] & inside[next_to]
-        squares[here] += 0.5 * np.square(residual[here] - residual[next_to]) * both
+        here, there = next_to(axis)
+        both = inside[here] & inside[there]
+        squares[here] += 0.5 * np.square(residual[here] - residual[there]) * both
         pairs[here] += both
     squares, pairs = _tiles(squares, side), _tiles(pairs, side)
     counted = pairs[..., 0] > 0
@@ -80,13 +81,6 @@ def tile_noise(
     return TileNoise(deviation, float(np.sqrt(np.mean(variance[counted]))))
 
 
-def _shifted(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Index of all pixels but the last along an axis, and of their neighbours."""
-    here, next_to = [slice(None)] * 2, [slice(None)] * 2
-    here[axis], next_to[axis] = slice(0, -1), slice(1, None)
-    return tuple(here), tuple(next_to)
-
-
 def _tiles(pixels: NDArray, side: int) -> NDArray[np.float64]:
     """Sums over tiles of an image (height, width, channels)."""
     height, width, channels = pixels.shape
@@ -96,11 +90,6 @@ def _tiles(pixels: NDArray, side: int) -> NDArray[np.float64]:
     return padded.reshape(rows, side, columns, side, channels).sum((1, 3))
 
 
-def _around(tiles: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
-    """Sums over the neighbours of each tile, `reach` to each side, without the tile itself."""
-    total = tiles
-    for axis in (0, 1):
-        padded = np.pad(total, [(reach, reach) if k == axis else (0, 0) for k in range(3)])
-        size = tiles.shape[axis]
-        total = sum(np.take(padded, range(i, i + size), axis) for i in range(2 * reach + 1))
-    return total - tiles
+def _around(tiles: NDArray, reach: int) -> NDArray[np.float64]:
+    """Sums over the neighbours of each tile, without the tile itself."""
+    return sums_around(tiles, reach) - tiles

@@ -138,7 +138,7 @@ class TransmissionFit:
         with self.course.stage("race") as stage:
             tiles = self.pictures.tiles(4, plan.race_pixels)
             few = len(tiles.pixels) < self.mask.sum()
-            runners = [Runner(x.copy()) for x in self._different(nodes, plan.starts)]
+            runners = [Runner(x.copy()) for x in self._different([x for _, x in nodes], plan.starts)]
             runners.append(Runner(self.table.clip(self.start)))
             best, cost = runners[0], np.inf
             for turn in range(plan.race_steps + 1):
@@ -162,8 +162,8 @@ class TransmissionFit:
                     if not gained:
                         break
                     runners = self._leaders(runners)
-            others = [(0.0, x) for x in (*(runner.x for runner in runners), *(x for _, x in nodes))]
-            self.rivals = self._different([(0.0, best.x), *others], 1 + RIVALS)[1:]
+            found = [best.x, *(runner.x for runner in runners), *(x for _, x in nodes)]
+            self.rivals = self._different(found, 1 + RIVALS)[1:]
             return best.x
 
     def _leaders(self, runners: list[Runner]) -> list[Runner]:
@@ -348,9 +348,9 @@ class TransmissionFit:
             lower, upper = np.where(frozen, 0.0, lower), np.where(frozen, 0.0, upper)
         return cautious_step(equations, np.minimum(lower, 0.0), np.maximum(upper, 0.0), self._width, damping, noise)
 
-    def _different(self, nodes: list[tuple[float, Vector]], count: int) -> list[Vector]:
+    def _different(self, points: list[Vector], count: int) -> list[Vector]:
         chosen: list[Vector] = []
-        for _, x in nodes:
+        for x in points:
             if all(np.max(np.abs(x - other) / self._width) > DIFFERENT for other in chosen):
                 chosen.append(x)
             if len(chosen) == count:

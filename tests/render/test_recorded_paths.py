@@ -216,6 +216,13 @@ def test_rays_far_from_the_target_are_left_out_and_change_nothing(tmp_path, rfil
     np.testing.assert_array_equal(few.constant, every.constant)
 
 
+def test_negative_parts_of_a_pixel_filter_are_in_every_technique(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, SKY, rfilter="catmullrom")
+    paths = scene.record(renderer.table.pack(VALUES), grid=20, seed=3, near=True)
+    # the filter is negative in the first and the last of 20 cells along each axis: 2 x 0.1 x 0.9 of all
+    assert (np.array(paths.weight).sum(axis=0) < 0).mean() == pytest.approx(0.18, abs=0.01)
+
+
 def test_a_mask_is_widened_as_by_scipy():
     from scipy.ndimage import binary_dilation
 
