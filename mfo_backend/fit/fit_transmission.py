@@ -24,9 +24,10 @@ from .final_result import final_result
 from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
 from .kept_values import VISIBLE, kept_note
+from .polished import Polished
 from .settings import FitSettings
 from .transmission_plan import TransmissionPlan
-from .transmission_stages import Polished, TransmissionFit
+from .transmission_stages import TransmissionFit
 from .uncertainty import WEAK_BELOW, certainties
 from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
 from .verified_end import Verification
@@ -85,7 +86,7 @@ def fit_transmission(
         candidates = [end.x for end in reversed(ends)] + found
         chosen = fit.choose(candidates)
         # values may go back to the user's by the noisy squares and not by the eye
-        found = candidates[:2] if chosen == 0 and len(ends) == 2 else [candidates[chosen]]
+        found = [ends[-1].x, ends[0].x] if chosen == 0 and len(ends) > 1 else [candidates[chosen]]
         certainty = _certainty(ends, renderer.table)
     stopped = should_stop()
     verification = Verification(
@@ -138,8 +139,9 @@ def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -
 
 
 def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certainty]:
-    """How sure each value is; those that were kept are as unsure as before, the others are so given the kept ones."""
-    variance = [np.maximum(np.diag(end.covariance), 0.0) for end in ends]
-    width = table.upper - table.lower
-    unsure = np.maximum(variance[0], (WEAK_BELOW * width) ** 2)
-    return certainties(np.sqrt(np.where(ends[-1].kept, unsure, variance[-1])), table)
+    """How sure each value is; one that was kept is as unsure as when it was last free, the others are so given it."""
+    variance = np.zeros(table.length)
+    for end in ends:
+        variance = np.where(end.kept, variance, np.diag(end.covariance))
+    least = np.where(ends[-1].unseen, WEAK_BELOW * (table.upper - table.lower), 0.0)
+    return certainties(np.maximum(np.sqrt(np.maximum(variance, 0.0)), least), table)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -15,18 +15,17 @@ from ..solve.noisy_least_squares import SafeMatrix, cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
 from .equal_counts import MOST_COUNT
+from .polished import CORE, Polished
 from .tile_pools import TilePools
 from .traced_tiles import GEOMETRIC, SECANT_BELOW, TracedTiles
 from .transmission_plan import TransmissionPlan
 from .two_halves import is_unsure, two_half_equations
-from .uncertainty import WEAK_BELOW
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ..render.traced_paths import TracedPaths
 
 Vector = NDArray[np.float64]
 
-CORE = ("base_color", "transmission_weight", "roughness", "ior")
 ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 TILE_SIZES = (1, 2, 4, 8)
@@ -43,6 +42,7 @@ MOST_COUNTINGS = 3  # of the reference's samples
 COUNTED_STEPS = 3  # between them
 STILL = 0.25  # relative change of a count
 RIVALS = 3  # other ends of a race
+MOST_RETURNS = 2  # of values to the user's
 
 
 @dataclass
@@ -53,18 +53,6 @@ class Runner:
     equations: NormalEquations | None = None
     damping: float = 0.01
     growth: float = 2.0
-
-
-@dataclass(frozen=True)
-class Polished:
-    """The end of a polish: its point, the covariance of its values, which of them stayed as in the scene, and the last
-    equations with the covariance of their gradient (None if there was no time for any)."""
-
-    x: Vector
-    covariance: Vector
-    kept: NDArray[np.bool_]
-    equations: NormalEquations | None
-    noise: Vector
 
 
 class TransmissionFit:
@@ -193,17 +181,22 @@ class TransmissionFit:
     def polish(self, start: Vector) -> list[Polished]:
         """Stage `polish`: Gauss-Newton steps on all samples so far, each with new random numbers.
 
-        Where the picture does not determine some values, a second end follows, fitted with those as in the scene.
+        Where the picture does not determine some values or needs some lobes, another end follows, fitted with those as
+        in the scene; and another where that leaves more values without effect.
         """
         with self.course.stage("polish") as stage:
             core = self._counted(stage, start)
             if self._extras.any():
                 core = self._pool(stage, core, self._extras, stream=50).x
             ends = [self._pool(stage, core, np.zeros(self.table.length, bool), stream=10)]
-            unseen = self._unseen(ends[0])
-            if unseen.any() and not unseen.all() and not self.course.should_stop():
-                kept = np.where(unseen, self.table.clip(self.start), ends[0].x)
-                ends.append(self._pool(stage, kept, unseen, stream=100))
+            for turn in range(MOST_RETURNS):
+                last, user = ends[-1], self.table.clip(self.start)
+                unseen, unneeded = last.undetermined(self.table), last.unneeded(self.table, user)
+                kept = last.kept | unseen | unneeded
+                if not np.any(unseen | unneeded) or kept.all() or self.course.should_stop():
+                    break
+                end = self._pool(stage, np.where(kept, user, last.x), kept, stream=100 + 50 * turn)
+                ends.append(replace(end, unseen=last.unseen | unseen))
             stage.vector = ends[-1].x
         return ends
 
@@ -279,34 +272,18 @@ class TransmissionFit:
             settled = settled + 1 if near else 0
             if settled == SETTLED:
                 break
-        return Polished(x, variance, frozen, equations, noise)
+        if equations is not None and not self.course.should_stop():
+            # cautious steps end up to a deviation short of what all samples together say
+            equations, noise, _ = pools.best(self._width)
+            x = x + self._step(equations, x, 1e-3, 0.1, frozen)
+            stage.vector = x
+            variance = SafeMatrix(equations, self._width).covariance(noise)
+        return Polished(x, variance, frozen, np.zeros_like(frozen), equations, noise)
 
     def _moved(self, step: Vector) -> float:
         """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""
         parts = [self.table.slice_of(name) for name in GEOMETRIC if name in self.table.names]
         return max((float(np.max(np.abs(step[part]) / self._width[part])) for part in parts), default=0.0)
-
-    def _unseen(self, end: Polished) -> NDArray[np.bool_]:
-        """Values that are not determined: the least sure one is taken for known until the rest is sure."""
-        held = np.zeros(self.table.length, bool)
-        if end.equations is None:
-            return held
-        e, names = end.equations, list(self.table.names)
-        while names:
-            free = ~held
-            part = NormalEquations(e.cost, e.gradient[free], e.hessian[np.ix_(free, free)])
-            spread = np.zeros(self.table.length)
-            sandwich = SafeMatrix(part, self._width[free]).covariance(end.noise[np.ix_(free, free)])
-            spread[free] = np.sqrt(np.maximum(np.diag(sandwich), 0.0)) / self._width[free]
-            width = {name: float(spread[self.table.slice_of(name)].max()) for name in names}
-            # the glass itself is given up last: with the others known it is often seen well
-            unsure = sorted((name in CORE, -width[name], name) for name in names if width[name] >= WEAK_BELOW)
-            if not unsure:
-                break
-            worst = unsure[0][2]
-            held[self.table.slice_of(worst)] = True
-            names.remove(worst)
-        return held
 
     def choose(self, candidates: list[Vector]) -> int:
         """The first candidate, unless another is better by two standard errors on paths that none has seen."""

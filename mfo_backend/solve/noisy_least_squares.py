@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from .bounded_least_squares import NormalEquations
 from .box_quadratic import minimise_in_box
 
+MOST_LEVERAGE = 0.9  # of a group: a residual counts ten times at most
+
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
@@ -56,17 +58,33 @@ class CrossProducts:
         pairs = self._weight**2 - self._weight_squares
         return (self.total.T @ self.total - self._own) / (max(pairs, 1e-30) * len(self.total))
 
-    def gradient_noise(self, rows_of_group: int) -> Vector:
+    def gradient_noise(self, rows_of_group: int, width: Vector) -> Vector:
         """Covariance (k, k) of the gradient of `cross_equations`, from its scatter over groups of rows.
 
-        Rows that share their noise, such as the channels of a tile, belong to one group of `rows_of_group`.
+        Rows that share their noise, such as the channels of a tile, belong to one group of `rows_of_group`. A group
+        pulls the solution towards itself and so has too small a residual r there; it counts with what a solution
+        without it would leave, (1 - h)^-1 r with h its leverage (HC3, J. MacKinnon and H. White 1985; for groups R.
+        Bell and D. McCaffrey 2002). `width` scales the unknowns.
         """
-        mean = self.mean
-        products = mean[:, 1:] * mean[:, :1]
-        groups = products.reshape(-1, rows_of_group, products.shape[1]).sum(axis=1)
+        rows = self.mean.reshape(-1, rows_of_group, self.total.shape[1])
+        derivatives, residual = rows[:, :, 1:], rows[:, :, :1]
+        transposed = derivatives.transpose(0, 2, 1)
+        left = np.linalg.solve(np.eye(rows_of_group) - self._leverage(derivatives, width), residual)
+        groups = (transposed @ left)[:, :, 0]
         groups = groups - groups.mean(axis=0)
         count = len(groups)
-        return groups.T @ groups * (count / max(count - 1, 1)) / len(mean) ** 2
+        return groups.T @ groups * (count / max(count - 1, 1)) / len(self.total) ** 2
+
+    def _leverage(self, derivatives: Vector, width: Vector) -> Vector:
+        """How much of each group's own residual (g, n, n) the solution takes up, from its derivatives (g, n, k)."""
+        safe = SafeMatrix(cross_equations(self.gram()), width)
+        inverse = safe.inverse / len(self.total)
+        inverse[safe.blind] = inverse[:, safe.blind] = 0.0
+        leverage = derivatives @ inverse @ derivatives.transpose(0, 2, 1)
+        of_group = np.trace(leverage, axis1=1, axis2=2)
+        # all groups together have one for each value; own noise in the derivatives adds to that
+        excess = max(float(of_group.sum()) / len(width), 1.0)
+        return leverage / np.maximum(of_group / MOST_LEVERAGE, excess)[:, None, None]
 
     def own_share(self) -> Vector:
         """Which part (k,) of the variances in `gradient_noise` is the samples' own, so that more of them take it away.
@@ -98,7 +116,7 @@ class SafeMatrix:
     """The matrix of noisy equations with its eigenvalues raised, so that it can be inverted.
 
     `width` scales the unknowns. After scaling by the diagonal no eigenvalue is below `FLOOR`; a column whose product
-    with itself is negative counts as one without effect.
+    with itself is negative counts as one without effect (`blind`).
     """
 
     FLOOR = 0.03
@@ -106,7 +124,7 @@ class SafeMatrix:
     def __init__(self, equations: NormalEquations, width: Vector) -> None:
         hessian = equations.hessian * np.outer(width, width)
         diagonal = np.diag(hessian)
-        self._blind = diagonal <= 1e-6 * max(float(diagonal.max()), 1e-12)
+        self.blind = diagonal <= 1e-6 * max(float(diagonal.max()), 1e-12)
         self._width = width
         self.scale: Vector = np.sqrt(np.maximum(diagonal, 1e-4 * max(float(diagonal.max()), 1e-12))) / width
         values, self.vectors = np.linalg.eigh(equations.hessian / np.outer(self.scale, self.scale))
@@ -121,19 +139,22 @@ class SafeMatrix:
         sd = np.sqrt(np.maximum(np.diag(result), 1e-300))
         shrink = np.minimum(self._width / sd, 1.0)
         result *= np.outer(shrink, shrink)
-        result[self._blind] = result[:, self._blind] = 0.0
-        result[self._blind, self._blind] = self._width[self._blind] ** 2
+        result[self.blind] = result[:, self.blind] = 0.0
+        result[self.blind, self.blind] = self._width[self.blind] ** 2
         return result
 
     def solution_covariance(self, noise: Vector) -> Vector:
         """The sandwich itself, however wide it is."""
-        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
-        return inverse @ noise @ inverse
+        return self.inverse @ noise @ self.inverse
 
     def expected_error(self, noise: Vector) -> float:
         """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""
-        inverse = (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
-        return float(np.trace(inverse @ noise))
+        return float(np.trace(self.inverse @ noise))
+
+    @property
+    def inverse(self) -> Vector:
+        """The inverse (k, k)."""
+        return (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
 
 
 def cautious_step(

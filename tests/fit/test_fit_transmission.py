@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit import equal_counts, fit_transmission, verified_end
+from mfo_backend.fit.polished import Polished
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.tile_pools import TilePools
-from mfo_backend.fit.transmission_stages import MOST_SAMPLES, Polished, TransmissionFit
+from mfo_backend.fit.transmission_stages import MOST_SAMPLES, TransmissionFit
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.event import Preview, Progress, StageEnd, Started
@@ -72,6 +73,21 @@ def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
     assert result.errors["flip"][1] < result.errors["flip"][0]
 
 
+def test_the_intervals_hold_the_truth(tmp_path):
+    renderer = load(tmp_path, size=48)
+    x = renderer.table.pack(TRUTH)
+    deviations, errors = [], []
+    for seed in range(5, 17):
+        result, _ = fit(renderer, renderer.image(x, seed=seed, spp=32))
+        sd = np.concatenate([result.certainty[name].sd for name in renderer.table.names])
+        errors.append(renderer.table.pack(result.recovered) - x)
+        deviations.append(errors[-1] / sd)
+    # 72 values; without the leverage of tiles and the last step 83 %, errors a quarter larger
+    assert 0.88 <= np.mean(np.abs(deviations) < 1.96) <= 0.99
+    assert np.sqrt(np.mean(np.square(deviations))) < 1.2
+    assert np.mean(np.abs(errors)) < 0.0075
+
+
 def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     sockets = {"Sheen Tint": {"value": [0.3, 0.3, 0.3], "linked": False}}
     renderer = load(tmp_path, [*NAMES, "sheen_weight", "sheen_tint"], sockets, size=32)
@@ -81,8 +97,7 @@ def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     assert result.certainty["sheen_tint"].level is Level.NOT_VISIBLE
     assert result.recovered["sheen_tint"] == pytest.approx((0.3, 0.3, 0.3))
     assert "sheen_tint" in result.notes[0]
-    assert result.recovered["sheen_weight"] == pytest.approx(0.0, abs=0.03)
-    assert result.recovered["sheen_weight"] < 2.0 * result.certainty["sheen_weight"].sd[0]
+    assert result.recovered["sheen_weight"] == 0.0  # the picture does not ask for it by three deviations
 
 
 @pytest.mark.parametrize("visible", [False, True])
@@ -93,8 +108,9 @@ def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeyp
     variance = np.diag((renderer.table.upper - renderer.table.lower) ** 2)
     unseen = np.zeros(len(good), bool)
     unseen[renderer.table.slice_of("roughness")] = True
-    ends = [Polished(good, 1e-6 * variance + np.diag(unseen) * variance, np.zeros_like(unseen), None, variance),
-            Polished(kept, 1e-6 * variance, unseen, None, variance)]  # fmt: skip
+    none = np.zeros_like(unseen)
+    ends = [Polished(good, 1e-6 * variance + np.diag(unseen) * variance, none, none, None, variance),
+            Polished(kept, 1e-6 * variance, unseen, unseen, None, variance)]  # fmt: skip
     monkeypatch.setattr(TransmissionFit, "polish", lambda self, start: ends)
     monkeypatch.setattr(TransmissionFit, "choose", lambda self, candidates: 0)  # squares under fireflies cannot tell
     result, _ = fit(renderer, renderer.image(good, seed=5, spp=64))

@@ -107,9 +107,57 @@ def test_the_covariance_covers_the_scatter_of_solutions(problem):
         step = cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0)
         pool.shifted(step)
         found.append(step)
-        stated.append(np.diag(SafeMatrix(equations, WIDTH).covariance(pool.gradient_noise(3))))
+        stated.append(np.diag(SafeMatrix(equations, WIDTH).covariance(pool.gradient_noise(3, WIDTH))))
     ratio = np.mean(stated, axis=0) / np.var(found, axis=0)
     assert np.all((ratio > 0.5) & (ratio < 2.0))  # the variance of 60 solutions is known to a fifth
+
+
+def few_groups(rng, count=20, heavy=1.0):
+    """Rows of few groups, some with far larger derivatives than the others, and residuals that a group shares."""
+    size = np.exp(heavy * rng.normal(size=count)).repeat(3)[:, None]
+    jacobian = size * rng.normal(size=(3 * count, 3))
+    return jacobian, rng.normal(size=count).repeat(3) + 0.3 * rng.normal(size=3 * count)
+
+
+def test_the_covariance_is_that_of_solutions_without_one_group_each():
+    jacobian, noise = few_groups(np.random.default_rng(2), count=20, heavy=0.5)
+    (solved, *_) = np.linalg.lstsq(jacobian, noise, rcond=None)
+    exact = np.column_stack([noise - jacobian @ solved, -jacobian])  # at the solution
+    pool = pooled([exact, exact])
+    covariance = SafeMatrix(cross_equations(pool.gram()), WIDTH).covariance(pool.gradient_noise(3, WIDTH))
+    left = np.array(
+        [np.linalg.lstsq(*(np.delete(a, np.s_[3 * g : 3 * g + 3], 0) for a in (jacobian, noise)), rcond=None)[0]
+         for g in range(20)]
+    )  # fmt: skip
+    np.testing.assert_allclose(covariance, 20 * np.cov(left.T), rtol=1e-9)  # the jackknife (J. Tukey 1958), 20 for 19
+
+
+def test_few_groups_that_rule_the_solution_do_not_make_it_look_sure():
+    rng = np.random.default_rng(3)
+    inside = []
+    for _ in range(200):
+        jacobian, noise = few_groups(rng)
+        (solved, *_) = np.linalg.lstsq(jacobian, noise, rcond=None)  # the truth is 0
+        exact = np.column_stack([noise - jacobian @ solved, -jacobian])
+        pool = pooled([exact, exact])
+        spread = SafeMatrix(cross_equations(pool.gram()), 100.0 * WIDTH).covariance(pool.gradient_noise(3, WIDTH))
+        inside.append(np.abs(solved) < 1.96 * np.sqrt(np.diag(spread)))
+    assert 0.91 < np.mean(inside) < 0.99  # 600 values, 95 % is asked for; without the leverage 85 %
+
+
+@pytest.mark.parametrize("columns", [1, 4])
+def test_noise_in_the_derivatives_does_not_count_as_leverage(columns):
+    rng = np.random.default_rng(4)
+    jacobian = rng.normal(size=(3000, columns))
+    exact = np.column_stack([rng.normal(size=3000), jacobian])
+    clean = pooled([exact, exact]).gradient_noise(3, np.ones(columns))
+    noisy = [exact + np.column_stack([np.zeros(3000), 5.0 * rng.normal(size=jacobian.shape)]) for _ in range(2)]
+    pool = pooled(noisy)
+    rows = pool.mean.reshape(-1, 3, 1 + columns)
+    plain = np.einsum("gck,gc->gk", rows[..., 1:], rows[..., 0])
+    plain = np.cov(plain.T).reshape(columns, columns) * len(plain) / 3000**2
+    assert np.all(np.diag(plain) > 5.0 * np.diag(clean))  # it is part of the gradient's noise
+    np.testing.assert_allclose(np.diag(pool.gradient_noise(3, np.ones(columns))), np.diag(plain), rtol=0.03)
 
 
 def test_a_column_without_effect_is_as_unsure_as_its_range():
@@ -128,7 +176,7 @@ def test_the_expected_error_is_that_of_the_solutions(problem):
         equations = cross_equations(pool.gram())
         off = cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0) - TRUE
         errors.append(np.mean((jacobian @ off) ** 2))
-        stated.append(SafeMatrix(equations, WIDTH).expected_error(pool.gradient_noise(3)))
+        stated.append(SafeMatrix(equations, WIDTH).expected_error(pool.gradient_noise(3, WIDTH)))
     assert 0.5 < np.mean(stated) / np.mean(errors) < 2.0  # as the variances above
 
 

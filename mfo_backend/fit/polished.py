@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a polish on traced paths, and which of its values go back to the user's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solve.bounded_least_squares import NormalEquations
+from ..solve.noisy_least_squares import SafeMatrix
+from ..types.parameter import ParameterTable
+from .kept_values import OFF, SIGNIFICANT
+from .uncertainty import WEAK_BELOW
+
+Vector = NDArray[np.float64]
+
+CORE = ("base_color", "transmission_weight", "roughness", "ior")
+
+
+@dataclass(frozen=True)
+class Polished:
+    """The end of a polish.
+
+    Attributes
+    ----------
+    x, covariance
+        Its point and the covariance of its values.
+    kept, unseen
+        Which values stayed as in the scene, and which of these the picture does not determine.
+    equations, noise
+        The last equations and the covariance of their gradient; None if there was no time for any.
+    """
+
+    x: Vector
+    covariance: Vector
+    kept: NDArray[np.bool_]
+    unseen: NDArray[np.bool_]
+    equations: NormalEquations | None
+    noise: Vector
+
+    def undetermined(self, table: ParameterTable) -> NDArray[np.bool_]:
+        """Further values that are not determined: the least sure one is taken for known until the rest is sure."""
+        held = self.kept.copy()
+        if self.equations is None:
+            return held & ~self.kept
+        e, width = self.equations, table.upper - table.lower
+        names = [name for name in table.names if not held[table.slice_of(name)].all()]
+        while names:
+            free = ~held
+            part = NormalEquations(e.cost, e.gradient[free], e.hessian[np.ix_(free, free)])
+            spread = np.zeros(table.length)
+            sandwich = SafeMatrix(part, width[free]).covariance(self.noise[np.ix_(free, free)])
+            spread[free] = np.sqrt(np.maximum(np.diag(sandwich), 0.0)) / width[free]
+            widest = {name: float(spread[table.slice_of(name)].max()) for name in names}
+            # the glass itself is given up last: with the others known it is often seen well
+            unsure = sorted((name in CORE, -widest[name], name) for name in names if widest[name] >= WEAK_BELOW)
+            if not unsure:
+                break
+            worst = unsure[0][2]
+            held[table.slice_of(worst)] = True
+            names.remove(worst)
+        return held & ~self.kept
+
+    def unneeded(self, table: ParameterTable, user: Vector) -> NDArray[np.bool_]:
+        """Further values that are off in the user's material and not further from that than three standard deviations.
+
+        One after another, the nearest first; the distance of several together is theirs by the covariance (A. Wald
+        1943), and each may add as much as it could alone.
+        """
+        off, width = np.zeros(table.length, bool), table.upper - table.lower
+        names = [
+            name
+            for name in table.names
+            if name not in CORE
+            and not self.kept[part := table.slice_of(name)].any()
+            and np.all((user - table.lower)[part] <= OFF * width[part])
+        ]
+
+        def distance(held: NDArray[np.bool_]) -> float:
+            step = (self.x - user)[held]
+            return float(step @ np.linalg.lstsq(self.covariance[np.ix_(held, held)], step, rcond=None)[0])
+
+        now = 0.0
+        while names:
+            with_each = {}
+            for name in names:
+                held = off.copy()
+                held[table.slice_of(name)] = True
+                with_each[name] = distance(held), held
+            nearest = min(names, key=lambda name: with_each[name][0])
+            if with_each[nearest][0] - now > SIGNIFICANT:
+                break
+            now, off = with_each[nearest]
+            names.remove(nearest)
+        return off

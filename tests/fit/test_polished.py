@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which values of a polished glass go back to the user's, on covariances made by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.polished import Polished
+from mfo_backend.solve.bounded_least_squares import NormalEquations
+from mfo_backend.types.parameter import Parameter, ParameterTable
+
+TABLE = ParameterTable(
+    Parameter(name, size, 0.0, 1.0, 0.0)
+    for name, size in (("base_color", 3), ("roughness", 1), ("coat_weight", 1), ("sheen_weight", 1), ("sheen_tint", 3))
+)
+CORE = ("base_color", "roughness")
+USER = TABLE.pack({"base_color": (0.5,) * 3, "roughness": 0.0, "coat_weight": 0.0, "sheen_weight": 0.0,
+                   "sheen_tint": (0.3,) * 3})  # fmt: skip
+
+
+def polished(values, sd, kept=(), tied=()):
+    """An end at `values` with standard deviations `sd` (0.001 for the others); `tied` values err together."""
+    x = TABLE.pack({**TABLE.unpack(USER), **values})
+    spread = np.full(TABLE.length, 0.001)
+    for name, value in sd.items():
+        spread[TABLE.slice_of(name)] = value
+    correlation = np.eye(TABLE.length)
+    for one in tied:
+        for other in tied:
+            if one != other:
+                correlation[TABLE.slice_of(one), TABLE.slice_of(other)] = 0.95  # a safe matrix knows no more
+    covariance = correlation * np.outer(spread, spread)
+    hessian = np.linalg.inv(covariance)
+    return Polished(x, covariance, mask(kept), mask(()), NormalEquations(0.0, 0.0 * x, hessian), hessian)
+
+
+def mask(names):
+    found = np.zeros(TABLE.length, bool)
+    for name in names:
+        found[TABLE.slice_of(name)] = True
+    return found
+
+
+@pytest.mark.parametrize(
+    ("values", "sd", "tied", "expected"),
+    [
+        ({"coat_weight": 0.1, "sheen_weight": 0.1}, {"coat_weight": 0.05, "sheen_weight": 0.02}, (), ["coat_weight"]),
+        ({"coat_weight": 0.1}, {"coat_weight": 0.03}, (), ["sheen_weight"]),  # 3.3 deviations; no sheen was found
+        # each alone may be 0, both together not: their sum is known
+        ({"coat_weight": 0.1, "sheen_weight": -0.1}, dict.fromkeys(("coat_weight", "sheen_weight"), 0.05),
+         ("coat_weight", "sheen_weight"), ["coat_weight"]),
+        # the roughness of the glass may be the user's by chance, and the tint is not off in the user's material
+        ({"roughness": 0.1}, {"roughness": 0.1, "sheen_tint": 0.4}, (), ["coat_weight", "sheen_weight"]),
+    ],
+)  # fmt: skip
+def test_lobes_that_no_three_deviations_ask_for_are_off(values, sd, tied, expected):
+    np.testing.assert_array_equal(polished(values, sd, tied=tied).unneeded(TABLE, USER), mask(expected))
+
+
+def test_values_that_are_not_determined_go_back_until_the_rest_is_sure():
+    end = polished({}, {"sheen_weight": 0.2, "sheen_tint": 0.5, "coat_weight": 0.1})
+    np.testing.assert_array_equal(end.undetermined(TABLE), mask(["sheen_weight", "sheen_tint"]))
+    # two values that only together are unknown: one is taken for known, then the other is
+    tied = polished({}, dict.fromkeys(("coat_weight", "sheen_weight"), 0.2), tied=("coat_weight", "sheen_weight"))
+    assert tied.undetermined(TABLE).sum() == 1
+
+
+def test_what_was_kept_is_named_once():
+    end = polished({}, {"sheen_weight": 0.2, "coat_weight": 0.1}, kept=["sheen_weight", "coat_weight"])
+    assert not end.undetermined(TABLE).any()
+    assert not end.unneeded(TABLE, USER).any()
+
+
+def test_without_equations_nothing_goes_back_as_undetermined():
+    end = Polished(USER, np.eye(TABLE.length), mask(()), mask(()), None, np.eye(TABLE.length))
+    assert not end.undetermined(TABLE).any()
