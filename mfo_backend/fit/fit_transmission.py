@@ -24,7 +24,7 @@ from .final_result import final_result
 from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
 from .kept_values import VISIBLE, kept_note
-from .polished import Polished
+from .polished import CORE, Polished
 from .settings import FitSettings
 from .transmission_plan import TransmissionPlan
 from .transmission_stages import TransmissionFit
@@ -139,9 +139,14 @@ def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -
 
 
 def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certainty]:
-    """How sure each value is; one that was kept is as unsure as when it was last free, the others are so given it."""
+    """How sure each value is, given those that went back to the user's; these are as unsure as when they were free.
+
+    A value of the glass itself that the picture does not determine is hardly the user's, so given it nothing is surer.
+    """
     variance = np.zeros(table.length)
+    doubted = any(ends[-1].kept[table.slice_of(name)].any() for name in CORE if name in table.names)
     for end in ends:
-        variance = np.where(end.kept, variance, np.diag(end.covariance))
+        found = np.maximum(variance, np.diag(end.covariance)) if doubted else np.diag(end.covariance)
+        variance = np.where(end.kept, variance, found)
     least = np.where(ends[-1].unseen, WEAK_BELOW * (table.upper - table.lower), 0.0)
-    return certainties(np.maximum(np.sqrt(np.maximum(variance, 0.0)), least), table)
+    return certainties(np.maximum(np.sqrt(variance), least), table)

@@ -83,7 +83,7 @@ class TilePools:
         chosen: tuple[float, NormalEquations, Vector, int] | None = None
         for size, pool in enumerate(self.pools):
             equations, noise = cross_equations(pool.gram()), pool.gradient_noise(CHANNELS, width)
-            variance = np.diag(SafeMatrix(equations, width).covariance(noise)) / width**2
+            variance = np.diag(SafeMatrix(equations, width).covariance(noise, SafeMatrix.FLOOR)) / width**2
             total = float(np.minimum(variance, 1.0).sum())
             if chosen is None or total < chosen[0]:
                 chosen = total, equations, noise, size

@@ -32,6 +32,7 @@ TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
+LEAST_STEPS = 4  # two steps alone once looked settled with a value off by a tenth of its range
 MOST_SAMPLES = 16  # of a pixel in a step of the polish
 GROWTH = 4  # of a step's samples, at most
 OWN = 0.25  # of the expected error: below, more samples help little
@@ -270,7 +271,7 @@ class TransmissionFit:
                 if turn >= FEW_STEPS:
                     samples = min(2 * samples, most)
             settled = settled + 1 if near else 0
-            if settled == SETTLED:
+            if settled >= SETTLED and turn + 1 >= LEAST_STEPS:
                 break
         if equations is not None and not self.course.should_stop():
             # cautious steps end up to a deviation short of what all samples together say

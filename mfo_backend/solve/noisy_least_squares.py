@@ -81,10 +81,8 @@ class CrossProducts:
         inverse = safe.inverse / len(self.total)
         inverse[safe.blind] = inverse[:, safe.blind] = 0.0
         leverage = derivatives @ inverse @ derivatives.transpose(0, 2, 1)
-        of_group = np.trace(leverage, axis1=1, axis2=2)
-        # all groups together have one for each value; own noise in the derivatives adds to that
-        excess = max(float(of_group.sum()) / len(width), 1.0)
-        return leverage / np.maximum(of_group / MOST_LEVERAGE, excess)[:, None, None]
+        of_group = np.trace(leverage, axis1=1, axis2=2)[:, None, None]
+        return leverage * np.minimum(MOST_LEVERAGE / np.maximum(of_group, 1e-300), 1.0)
 
     def own_share(self) -> Vector:
         """Which part (k,) of the variances in `gradient_noise` is the samples' own, so that more of them take it away.
@@ -120,6 +118,7 @@ class SafeMatrix:
     """
 
     FLOOR = 0.03
+    SURE = 0.003  # the same in a covariance: a step must not follow noise, but what trades against another is not sure
 
     def __init__(self, equations: NormalEquations, width: Vector) -> None:
         hessian = equations.hessian * np.outer(width, width)
@@ -127,15 +126,16 @@ class SafeMatrix:
         self.blind = diagonal <= 1e-6 * max(float(diagonal.max()), 1e-12)
         self._width = width
         self.scale: Vector = np.sqrt(np.maximum(diagonal, 1e-4 * max(float(diagonal.max()), 1e-12))) / width
-        values, self.vectors = np.linalg.eigh(equations.hessian / np.outer(self.scale, self.scale))
-        self.values = np.maximum(values, self.FLOOR)
+        self._raw, self.vectors = np.linalg.eigh(equations.hessian / np.outer(self.scale, self.scale))
+        self.values: Vector = np.maximum(self._raw, self.FLOOR)
 
-    def covariance(self, noise: Vector) -> Vector:
+    def covariance(self, noise: Vector, floor: float = SURE) -> Vector:
         """Covariance (k, k) of the solution: the sandwich H^-1 noise H^-1 (P. Huber 1967; H. White 1980).
 
         A column without effect may lie anywhere in its width, and none is less sure than that.
         """
-        result = self.solution_covariance(noise)
+        inverse = self._inverse_of(floor)
+        result = inverse @ noise @ inverse
         sd = np.sqrt(np.maximum(np.diag(result), 1e-300))
         shrink = np.minimum(self._width / sd, 1.0)
         result *= np.outer(shrink, shrink)
@@ -154,7 +154,11 @@ class SafeMatrix:
     @property
     def inverse(self) -> Vector:
         """The inverse (k, k)."""
-        return (self.vectors / self.values) @ self.vectors.T / np.outer(self.scale, self.scale)
+        return self._inverse_of(self.FLOOR)
+
+    def _inverse_of(self, floor: float) -> Vector:
+        values = np.maximum(self._raw, floor)
+        return (self.vectors / values) @ self.vectors.T / np.outer(self.scale, self.scale)
 
 
 def cautious_step(
