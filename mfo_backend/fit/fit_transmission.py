@@ -79,6 +79,7 @@ def fit_transmission(
     fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
 
     certainty: dict[str, Certainty] = {}
+    ends: list[Polished] = []
     nodes = fit.scan()
     found = [fit.race(nodes) if not should_stop() else nodes[0][1]]
     if not should_stop():
@@ -86,8 +87,8 @@ def fit_transmission(
         candidates = [end.x for end in reversed(ends)] + found
         chosen = fit.choose(candidates)
         # values may go back to the user's by the noisy squares and not by the eye
-        found = [ends[-1].x, ends[0].x] if chosen == 0 and len(ends) > 1 else [candidates[chosen]]
-        certainty = _certainty(ends, renderer.table)
+        ends = ends[: max(len(ends) - chosen, 1)]
+        found = [candidates[chosen]] + [end.x for end in ends if chosen == 0 and ends[-1].kept.any() and end.is_whole]
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
@@ -100,6 +101,9 @@ def fit_transmission(
     best = 1 if kept else len(found)
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
+    if ends:
+        whole = [end for end in ends if end.is_whole]
+        certainty = _certainty(ends if kept or len(found) == 1 else whole, renderer.table)
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
     notes = [kept_note(unseen)] if kept and best else []
     counts = fit.pictures.counts

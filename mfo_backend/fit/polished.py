@@ -17,6 +17,7 @@ from .uncertainty import WEAK_BELOW
 Vector = NDArray[np.float64]
 
 CORE = ("base_color", "transmission_weight", "roughness", "ior")
+AMOUNTS = ("metallic", "coat_weight", "sheen_weight")
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,11 @@ class Polished:
     equations: NormalEquations | None
     noise: Vector
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether all values were free."""
+        return not self.kept.any()
+
     def undetermined(self, table: ParameterTable) -> NDArray[np.bool_]:
         """Further values that are not determined: the least sure one is taken for known until the rest is sure."""
         held = self.kept.copy()
@@ -54,11 +60,11 @@ class Polished:
             sandwich = SafeMatrix(part, width[free]).covariance(self.noise[np.ix_(free, free)])
             spread[free] = np.sqrt(np.maximum(np.diag(sandwich), 0.0)) / width[free]
             widest = {name: float(spread[table.slice_of(name)].max()) for name in names}
-            # the glass itself is given up last: with the others known it is often seen well
-            unsure = sorted((name in CORE, -widest[name], name) for name in names if widest[name] >= WEAK_BELOW)
+            unsure = [name for name in names if widest[name] >= WEAK_BELOW]
             if not unsure:
                 break
-            worst = unsure[0][2]
+            # with the details known how much there is of a lobe is often seen well, and so is the glass itself
+            worst = min(unsure, key=lambda name: (name in CORE, name in AMOUNTS, -widest[name]))
             held[table.slice_of(worst)] = True
             names.remove(worst)
         return held & ~self.kept

@@ -19,6 +19,7 @@ from .tile_rows import TileRows
 
 Vector = NDArray[np.float64]
 CHANNELS = 3  # of a tile share their noise
+MANY = 50  # the largest tiles of a picture of 128 x 128 are about 100; with the 38 of one of 64 x 64 fits got stuck
 
 
 @dataclass(frozen=True)
@@ -82,13 +83,24 @@ class TilePools:
         """
         chosen: tuple[float, NormalEquations, Vector, int] | None = None
         for size, pool in enumerate(self.pools):
-            equations, noise = cross_equations(pool.gram()), pool.gradient_noise(CHANNELS, width)
+            equations = cross_equations(pool.gram())
+            noise = pool.jackknife_noise(CHANNELS, width) if self.are_many else pool.gradient_noise(CHANNELS)
             variance = np.diag(SafeMatrix(equations, width).covariance(noise, SafeMatrix.FLOOR)) / width**2
             total = float(np.minimum(variance, 1.0).sum())
             if chosen is None or total < chosen[0]:
                 chosen = total, equations, noise, size
         assert chosen is not None
         return chosen[1:]
+
+    @property
+    def are_many(self) -> bool:
+        """Whether there are enough of the largest tiles to go by the leverage of each."""
+        return len(self.tiles[-1]) >= MANY
+
+    def covariance(self, equations: NormalEquations, size: int, width: Vector) -> tuple[Vector, Vector]:
+        """Covariance (k, k) of the solution of `equations`, those of size `size`, and of their gradient."""
+        noise = self.pools[size].jackknife_noise(CHANNELS, width)
+        return SafeMatrix(equations, width).covariance(noise), noise
 
     def expected_error(self, equations: NormalEquations, noise: Vector, size: int, width: Vector) -> ExpectedError:
         """What `noise` in the gradient of `equations`, those of size `size`, leaves at their solution."""

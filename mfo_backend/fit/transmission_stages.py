@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solve.bounded_least_squares import NormalEquations
-from ..solve.noisy_least_squares import SafeMatrix, cautious_step
+from ..solve.noisy_least_squares import cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
 from .equal_counts import MOST_COUNT
-from .polished import CORE, Polished
+from .polished import AMOUNTS, CORE, Polished
 from .tile_pools import TilePools
 from .traced_tiles import GEOMETRIC, SECANT_BELOW, TracedTiles
 from .transmission_plan import TransmissionPlan
@@ -182,14 +182,22 @@ class TransmissionFit:
     def polish(self, start: Vector) -> list[Polished]:
         """Stage `polish`: Gauss-Newton steps on all samples so far, each with new random numbers.
 
-        Where the picture does not determine some values or needs some lobes, another end follows, fitted with those as
-        in the scene; and another where that leaves more values without effect.
+        One end has the details of the lobes as in the scene, one has all values free. Where the picture does not
+        determine some of these or does not need some lobes, another end follows, fitted with those as in the scene;
+        and another where that leaves more values without effect.
         """
         with self.course.stage("polish") as stage:
-            core = self._counted(stage, start)
+            x, ends = self._counted(stage, start), []
             if self._extras.any():
-                core = self._pool(stage, core, self._extras, stream=50).x
-            ends = [self._pool(stage, core, np.zeros(self.table.length, bool), stream=10)]
+                x = self._pool(stage, x, self._extras, stream=50).x
+                details = self._extras.copy()
+                for name in AMOUNTS:
+                    if name in self.table.names:
+                        details[self.table.slice_of(name)] = False
+                # how much there is of a lobe before its details: together they may trade places with the glass
+                ends.append(replace(self._pool(stage, x, details, stream=70), unseen=details))
+                x = ends[-1].x
+            ends.append(self._pool(stage, x, np.zeros(self.table.length, bool), stream=10))
             for turn in range(MOST_RETURNS):
                 last, user = ends[-1], self.table.clip(self.start)
                 unseen, unneeded = last.undetermined(self.table), last.unneeded(self.table, user)
@@ -234,8 +242,7 @@ class TransmissionFit:
     ) -> Polished:
         """A polish from `start` with the `frozen` values held; `paths` of a step bound those at equal counts."""
         plan, counts = self.plan, self.pictures.counts
-        x, variance = start.copy(), np.diag(self._width**2)
-        equations, noise = None, variance
+        x, equations, size = start.copy(), None, 0
         most = plan.polish_pixels
         if counts is not None:
             most = min(most, (paths or plan.counted_paths) // counts.count)
@@ -263,7 +270,6 @@ class TransmissionFit:
             x = x + step
             pools.shifted(step)
             stage.vector = x
-            variance = SafeMatrix(equations, self._width).covariance(noise)
             error = pools.expected_error(equations, noise, size, self._width)
             near = moved <= far and error.total < plan.enough * error.there
             if error.total > unseen and error.own >= OWN * error.total:
@@ -273,13 +279,15 @@ class TransmissionFit:
             settled = settled + 1 if near else 0
             if settled >= SETTLED and turn + 1 >= LEAST_STEPS:
                 break
-        if equations is not None and not self.course.should_stop():
+        if equations is None:
+            return Polished(x, np.diag(self._width**2), frozen, np.zeros_like(frozen), None, np.diag(self._width**2))
+        if pools.are_many and not self.course.should_stop():
             # cautious steps end up to a deviation short of what all samples together say
-            equations, noise, _ = pools.best(self._width)
+            equations, _, size = pools.best(self._width)
             x = x + self._step(equations, x, 1e-3, 0.1, frozen)
             stage.vector = x
-            variance = SafeMatrix(equations, self._width).covariance(noise)
-        return Polished(x, variance, frozen, np.zeros_like(frozen), equations, noise)
+        covariance, noise = pools.covariance(equations, size, self._width)
+        return Polished(x, covariance, frozen, np.zeros_like(frozen), equations, noise)
 
     def _moved(self, step: Vector) -> float:
         """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""

@@ -58,19 +58,32 @@ class CrossProducts:
         pairs = self._weight**2 - self._weight_squares
         return (self.total.T @ self.total - self._own) / (max(pairs, 1e-30) * len(self.total))
 
-    def gradient_noise(self, rows_of_group: int, width: Vector) -> Vector:
+    def gradient_noise(self, rows_of_group: int) -> Vector:
         """Covariance (k, k) of the gradient of `cross_equations`, from its scatter over groups of rows.
 
-        Rows that share their noise, such as the channels of a tile, belong to one group of `rows_of_group`. A group
-        pulls the solution towards itself and so has too small a residual r there; it counts with what a solution
-        without it would leave, (1 - h)^-1 r with h its leverage (HC3, J. MacKinnon and H. White 1985; for groups R.
-        Bell and D. McCaffrey 2002). `width` scales the unknowns.
+        Rows that share their noise, such as the channels of a tile, belong to one group of `rows_of_group`.
         """
-        rows = self.mean.reshape(-1, rows_of_group, self.total.shape[1])
+        rows = self._groups(rows_of_group)
+        return self._scatter(rows[:, :, 1:], rows[:, :, :1])
+
+    def jackknife_noise(self, rows_of_group: int, width: Vector) -> Vector:
+        """`gradient_noise` where few groups rule the solution.
+
+        Such a group pulls the solution towards itself and so has too small a residual r there; it counts with what a
+        solution without it would leave, (1 - h)^-1 r with h its leverage (HC3, J. MacKinnon and H. White 1985; for
+        groups R. Bell and D. McCaffrey 2002). `width` scales the unknowns.
+        """
+        rows = self._groups(rows_of_group)
         derivatives, residual = rows[:, :, 1:], rows[:, :, :1]
-        transposed = derivatives.transpose(0, 2, 1)
-        left = np.linalg.solve(np.eye(rows_of_group) - self._leverage(derivatives, width), residual)
-        groups = (transposed @ left)[:, :, 0]
+        kept = np.eye(rows_of_group) - self._leverage(derivatives, width)
+        return self._scatter(derivatives, np.linalg.solve(kept, residual))
+
+    def _groups(self, rows_of_group: int) -> Vector:
+        return self.mean.reshape(-1, rows_of_group, self.total.shape[1])
+
+    def _scatter(self, derivatives: Vector, residual: Vector) -> Vector:
+        """Covariance of a sum over groups of derivatives (g, n, k) by residuals (g, n, 1), per row."""
+        groups = (derivatives.transpose(0, 2, 1) @ residual)[:, :, 0]
         groups = groups - groups.mean(axis=0)
         count = len(groups)
         return groups.T @ groups * (count / max(count - 1, 1)) / len(self.total) ** 2

@@ -78,7 +78,7 @@ def test_the_expected_error_counts_what_tiles_do_not_show():
     pools = pools_of(reference.reshape(SIDE, SIDE, 3).astype(np.float32))
     pools.add([sample(rng, picture, columns, 0.3, 3.0) for _ in range(30)])
     tile = cross_equations(pools.pools[2].gram())
-    noise = pools.pools[2].gradient_noise(3, WIDTH)
+    noise = pools.pools[2].gradient_noise(3)
     error = pools.expected_error(tile, noise, 2, WIDTH)
     assert error.total == pytest.approx(5.0 * SafeMatrix(tile, WIDTH).expected_error(noise), rel=0.4)
     assert error.there == pytest.approx(2.0 * cross_equations(pools.pools[0].gram()).cost)
