@@ -97,6 +97,20 @@ def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     assert result.recovered["sheen_weight"] == 0.0  # the picture does not ask for it by three deviations
 
 
+def test_a_coat_is_found_with_all_values_free(tmp_path):
+    renderer = load(tmp_path, "all", size=64)
+    truth = {**renderer.table.unpack(renderer.start), **TRUTH, "coat_weight": 0.5}
+    result, _ = fit(renderer, renderer.image(renderer.table.pack(truth), seed=5, spp=64))
+    for name, atol in {"base_color": 0.02, "roughness": 0.03, "ior": 0.02, "coat_weight": 0.1}.items():
+        np.testing.assert_allclose(result.recovered[name], truth[name], atol=atol, err_msg=name)
+    # its roughness free from the start, it came out as 1 with a roughness of 0.98; other lobes are not asked for
+    assert [result.recovered[name] for name in ("metallic", "sheen_weight")] == [0.0, 0.0]
+    assert result.certainty["coat_weight"].level is not Level.NOT_VISIBLE
+    for name, certainty in result.certainty.items():
+        wrong = np.abs(np.subtract(result.recovered[name], truth[name])) > np.maximum(3 * np.array(certainty.sd), 0.02)
+        assert not (certainty.level is Level.DETERMINED and wrong.any()), name
+
+
 @pytest.mark.parametrize("visible", [False, True])
 def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeypatch, visible):
     renderer = load(tmp_path, size=32)
