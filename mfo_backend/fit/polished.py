@@ -47,7 +47,10 @@ class Polished:
         return not self.kept.any()
 
     def undetermined(self, table: ParameterTable) -> NDArray[np.bool_]:
-        """Further values that are not determined: the least sure one is taken for known until the rest is sure."""
+        """Further values that are not determined: the least sure one is taken for known until the rest is sure.
+
+        Values of the glass itself are none as long as others go back.
+        """
         held = self.kept.copy()
         if self.equations is None:
             return held & ~self.kept
@@ -65,6 +68,8 @@ class Polished:
                 break
             # with the details known how much there is of a lobe is often seen well, and so is the glass itself
             worst = min(unsure, key=lambda name: (name in CORE, name in AMOUNTS, -widest[name]))
+            if worst in CORE and np.any(held & ~self.kept):
+                break  # it may be sure once the others are as in the scene
             held[table.slice_of(worst)] = True
             names.remove(worst)
         return held & ~self.kept

@@ -66,6 +66,12 @@ def test_values_that_are_not_determined_go_back_until_the_rest_is_sure():
     assert tied.undetermined(TABLE).sum() == 1
 
 
+def test_the_glass_itself_goes_back_only_where_nothing_else_does():
+    sd = {"roughness": 0.3, "sheen_tint": 0.5}
+    np.testing.assert_array_equal(polished({}, sd).undetermined(TABLE), mask(["sheen_tint"]))
+    np.testing.assert_array_equal(polished({}, sd, kept=["sheen_tint"]).undetermined(TABLE), mask(["roughness"]))
+
+
 def test_what_was_kept_is_named_once():
     end = polished({}, {"sheen_weight": 0.2, "coat_weight": 0.1}, kept=["sheen_weight", "coat_weight"])
     assert not end.undetermined(TABLE).any()
