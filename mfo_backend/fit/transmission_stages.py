@@ -182,21 +182,22 @@ class TransmissionFit:
     def polish(self, start: Vector) -> list[Polished]:
         """Stage `polish`: Gauss-Newton steps on all samples so far, each with new random numbers.
 
-        One end has the details of the lobes as in the scene, one has all values free. Where the picture does not
-        determine some of these or does not need some lobes, another end follows, fitted with those as in the scene;
-        and another where that leaves more values without effect.
+        Where lobes are free, the first end has their details as in the scene; another has all values free. Where the
+        picture does not determine some of these or does not need some lobes, an end with those as in the scene follows,
+        and one more where that leaves further values without effect.
         """
         with self.course.stage("polish") as stage:
             x, ends = self._counted(stage, start), []
             if self._extras.any():
                 x = self._pool(stage, x, self._extras, stream=50).x
-                details = self._extras.copy()
-                for name in AMOUNTS:
-                    if name in self.table.names:
-                        details[self.table.slice_of(name)] = False
-                # how much there is of a lobe before its details: together they may trade places with the glass
-                ends.append(replace(self._pool(stage, x, details, stream=70), unseen=details))
-                x = ends[-1].x
+                amounts = np.zeros_like(self._extras)
+                for name in set(AMOUNTS) & set(self.table.names):
+                    amounts[self.table.slice_of(name)] = True
+                details = self._extras & ~amounts
+                if amounts.any() and details.any():
+                    # how much there is of a lobe before its details: together they may trade places with the glass
+                    ends.append(replace(self._pool(stage, x, details, stream=70), unseen=details))
+                    x = ends[-1].x
             ends.append(self._pool(stage, x, np.zeros(self.table.length, bool), stream=10))
             for turn in range(MOST_RETURNS):
                 last, user = ends[-1], self.table.clip(self.start)
