@@ -86,9 +86,11 @@ def fit_transmission(
         ends = fit.polish(found[0])
         candidates = [end.x for end in reversed(ends)] + found
         chosen = fit.choose(candidates)
-        # values may go back to the user's by the noisy squares and not by the eye
         ends = ends[: max(len(ends) - chosen, 1)]
-        found = [candidates[chosen]] + [end.x for end in ends if chosen == 0 and ends[-1].kept.any() and end.is_whole]
+        found = [candidates[chosen]]
+        if chosen == 0 and not ends[-1].is_whole:
+            # values may go back to the user's by the noisy squares and not by the eye
+            found += [end.x for end in ends if end.is_whole]
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
@@ -102,8 +104,8 @@ def fit_transmission(
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
     if ends:
-        whole = [end for end in ends if end.is_whole]
-        certainty = _certainty(ends if kept or len(found) == 1 else whole, renderer.table)
+        shown = ends if kept or len(found) == 1 else [end for end in ends if end.is_whole]
+        certainty = _certainty(shown, renderer.table)
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
     notes = [kept_note(unseen)] if kept and best else []
     counts = fit.pictures.counts
@@ -148,7 +150,7 @@ def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certain
     A value of the glass itself that the picture does not determine is hardly the user's, so given it nothing is surer.
     """
     variance = np.zeros(table.length)
-    doubted = any(ends[-1].kept[table.slice_of(name)].any() for name in CORE if name in table.names)
+    doubted = np.any(ends[-1].kept & table.mask_of(CORE))
     for end in ends:
         found = np.maximum(variance, np.diag(end.covariance)) if doubted else np.diag(end.covariance)
         variance = np.where(end.kept, variance, found)

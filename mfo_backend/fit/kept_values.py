@@ -84,14 +84,13 @@ def kept_note(names: Iterable[str]) -> str:
 def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: ParameterTable, least: float) -> list[str]:
     """Names whose user's value is off and whose return to it the picture cannot tell from noise.
 
-    One after another, the cheapest first, on the quadratic around `found`: with the lobes' weights the picture is
-    nearly linear in them. `least` is the least root mean square of a residual that is no noise.
+    On the quadratic around `found`: with the lobes' weights the picture is nearly linear in them. `least` is the least
+    root mean square of a residual that is no noise.
     """
     equations = problem.equations(found)
     noise = max(2.0 * equations.cost, least**2, 1e-30)
     hessian = equations.hessian + 1e-9 * np.diag(equations.hessian).max() * np.eye(len(found))
     lower, upper = table.lower, table.upper
-    candidates = [p.name for p in table if np.all((user - lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))]
 
     def change(names: list[str]) -> float:
         """How much the cost rises with these names at the user's values and all others at their best."""
@@ -105,16 +104,26 @@ def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: Paramet
             step[free] = minimise_in_box(hessian[rest], slope, (lower - found)[free], (upper - found)[free])
         return float(equations.gradient @ step + 0.5 * step @ hessian @ step)
 
-    off: list[str] = []
-    now = change([])
-    while candidates:
-        rise, cheapest = min((change([*off, name]) - now, name) for name in candidates)
-        if 2.0 * rise * problem.independent > SIGNIFICANT * noise:
+    return dispensable(values_off(table, user), change, SIGNIFICANT * noise / (2.0 * problem.independent))
+
+
+def values_off(table: ParameterTable, user: Vector) -> list[str]:
+    """Names whose values are off in the user's material."""
+    return [p.name for p in table if np.all((user - table.lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))]
+
+
+def dispensable(names: Iterable[str], cost: Callable[[list[str]], float], limit: float) -> list[str]:
+    """Those of `names` that can be done without, one after another, the cheapest first, for at most `limit` each."""
+    left, without = list(names), []
+    now = cost(without)
+    while left:
+        rise, cheapest = min((cost([*without, name]) - now, name) for name in left)
+        if rise > limit:
             break
-        off.append(cheapest)
-        candidates.remove(cheapest)
+        without.append(cheapest)
+        left.remove(cheapest)
         now += rise
-    return off
+    return without
 
 
 class _Judged:

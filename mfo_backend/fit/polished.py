@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..solve.bounded_least_squares import NormalEquations
 from ..solve.noisy_least_squares import SafeMatrix
 from ..types.parameter import ParameterTable
-from .kept_values import OFF, SIGNIFICANT
+from .kept_values import SIGNIFICANT, dispensable, values_off
 from .uncertainty import WEAK_BELOW
 
 Vector = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Polished:
         """
         held = self.kept.copy()
         if self.equations is None:
-            return held & ~self.kept
+            return np.zeros_like(held)
         e, width = self.equations, table.upper - table.lower
         names = [name for name in table.names if not held[table.slice_of(name)].all()]
         while names:
@@ -77,32 +77,15 @@ class Polished:
     def unneeded(self, table: ParameterTable, user: Vector) -> NDArray[np.bool_]:
         """Further values that are off in the user's material and not further from that than three standard deviations.
 
-        One after another, the nearest first; the distance of several together is theirs by the covariance (A. Wald
-        1943), and each may add as much as it could alone.
+        The distance of several together is theirs by the covariance (A. Wald 1943), and each may add as much as it
+        could alone.
         """
-        off, width = np.zeros(table.length, bool), table.upper - table.lower
-        names = [
-            name
-            for name in table.names
-            if name not in CORE
-            and not self.kept[part := table.slice_of(name)].any()
-            and np.all((user - table.lower)[part] <= OFF * width[part])
-        ]
+        kept = self.kept
 
-        def distance(held: NDArray[np.bool_]) -> float:
-            step = (self.x - user)[held]
-            return float(step @ np.linalg.lstsq(self.covariance[np.ix_(held, held)], step, rcond=None)[0])
+        def distance(held: list[str]) -> float:
+            away = table.mask_of(held)
+            step = (self.x - user)[away]
+            return float(step @ np.linalg.lstsq(self.covariance[np.ix_(away, away)], step, rcond=None)[0])
 
-        now = 0.0
-        while names:
-            with_each = {}
-            for name in names:
-                held = off.copy()
-                held[table.slice_of(name)] = True
-                with_each[name] = distance(held), held
-            nearest = min(names, key=lambda name: with_each[name][0])
-            if with_each[nearest][0] - now > SIGNIFICANT:
-                break
-            now, off = with_each[nearest]
-            names.remove(nearest)
-        return off
+        names = [n for n in values_off(table, user) if n not in CORE and not kept[table.slice_of(n)].any()]
+        return table.mask_of(dispensable(names, distance, SIGNIFICANT))

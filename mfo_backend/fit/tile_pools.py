@@ -84,8 +84,9 @@ class TilePools:
         chosen: tuple[float, NormalEquations, Vector, int] | None = None
         for size, pool in enumerate(self.pools):
             equations = cross_equations(pool.gram())
-            noise = pool.jackknife_noise(CHANNELS, width) if self.are_many else pool.gradient_noise(CHANNELS)
-            variance = np.diag(SafeMatrix(equations, width).covariance(noise, SafeMatrix.FLOOR)) / width**2
+            safe = SafeMatrix(equations, width)
+            noise = pool.jackknife_noise(CHANNELS, safe) if self.are_many else pool.gradient_noise(CHANNELS)
+            variance = np.diag(safe.covariance(noise, SafeMatrix.FLOOR)) / width**2
             total = float(np.minimum(variance, 1.0).sum())
             if chosen is None or total < chosen[0]:
                 chosen = total, equations, noise, size
@@ -99,8 +100,9 @@ class TilePools:
 
     def covariance(self, equations: NormalEquations, size: int, width: Vector) -> tuple[Vector, Vector]:
         """Covariance (k, k) of the solution of `equations`, those of size `size`, and of their gradient."""
-        noise = self.pools[size].jackknife_noise(CHANNELS, width)
-        return SafeMatrix(equations, width).covariance(noise), noise
+        safe = SafeMatrix(equations, width)
+        noise = self.pools[size].jackknife_noise(CHANNELS, safe)
+        return safe.covariance(noise), noise
 
     def expected_error(self, equations: NormalEquations, noise: Vector, size: int, width: Vector) -> ExpectedError:
         """What `noise` in the gradient of `equations`, those of size `size`, leaves at their solution."""

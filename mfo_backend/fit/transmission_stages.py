@@ -77,12 +77,7 @@ class TransmissionFit:
         self.rivals: list[Vector] = []  # other ends of the race
         self._width = self.table.upper - self.table.lower
         # values besides those of the glass stay as in the scene until the polish; without glass none does
-        self._extras = np.ones(self.table.length, bool)
-        for name in CORE:
-            if name in self.table.names:
-                self._extras[self.table.slice_of(name)] = False
-        if "transmission_weight" not in self.table.names:
-            self._extras[:] = False
+        self._extras = ~self.table.mask_of(CORE if "transmission_weight" in self.table.names else self.table.names)
 
     def scan(self) -> list[tuple[float, Vector]]:
         """Stage `scan`: all nodes of roughness and index with the best other values, best first."""
@@ -103,9 +98,7 @@ class TransmissionFit:
                     x[table.slice_of(name)] = value
                 xs.append(x)
             xs = table.clip(np.array(xs))
-            frozen = self._extras.copy()
-            for name in held:
-                frozen[table.slice_of(name)] = True
+            frozen = self._extras | table.mask_of(held)
             equations: list[NormalEquations] = []
             order = np.arange(len(xs))
             for turn in range(plan.scan_steps + 1):
@@ -190,9 +183,7 @@ class TransmissionFit:
             x, ends = self._counted(stage, start), []
             if self._extras.any():
                 x = self._pool(stage, x, self._extras, stream=50).x
-                amounts = np.zeros_like(self._extras)
-                for name in set(AMOUNTS) & set(self.table.names):
-                    amounts[self.table.slice_of(name)] = True
+                amounts = self.table.mask_of(AMOUNTS)
                 details = self._extras & ~amounts
                 if amounts.any() and details.any():
                     # how much there is of a lobe before its details: together they may trade places with the glass
@@ -280,15 +271,17 @@ class TransmissionFit:
             settled = settled + 1 if near else 0
             if settled >= SETTLED and turn + 1 >= LEAST_STEPS:
                 break
+        none = np.zeros_like(frozen)
         if equations is None:
-            return Polished(x, np.diag(self._width**2), frozen, np.zeros_like(frozen), None, np.diag(self._width**2))
+            unknown = np.diag(self._width**2)
+            return Polished(x, unknown, frozen, none, None, unknown)
         if pools.are_many and not self.course.should_stop():
             # cautious steps end up to a deviation short of what all samples together say
             equations, _, size = pools.best(self._width)
             x = x + self._step(equations, x, 1e-3, 0.1, frozen)
             stage.vector = x
         covariance, noise = pools.covariance(equations, size, self._width)
-        return Polished(x, covariance, frozen, np.zeros_like(frozen), equations, noise)
+        return Polished(x, covariance, frozen, none, equations, noise)
 
     def _moved(self, step: Vector) -> float:
         """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""

@@ -9,6 +9,8 @@ the matrix may be indefinite and `SafeMatrix` raises its eigenvalues.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -66,16 +68,16 @@ class CrossProducts:
         rows = self._groups(rows_of_group)
         return self._scatter(rows[:, :, 1:], rows[:, :, :1])
 
-    def jackknife_noise(self, rows_of_group: int, width: Vector) -> Vector:
-        """`gradient_noise` where few groups rule the solution.
+    def jackknife_noise(self, rows_of_group: int, matrix: SafeMatrix) -> Vector:
+        """`gradient_noise` where few groups rule the solution; `matrix` is that of the equations.
 
         Such a group pulls the solution towards itself and so has too small a residual r there; it counts with what a
         solution without it would leave, (1 - h)^-1 r with h its leverage (HC3, J. MacKinnon and H. White 1985; for
-        groups R. Bell and D. McCaffrey 2002). `width` scales the unknowns.
+        groups R. Bell and D. McCaffrey 2002).
         """
         rows = self._groups(rows_of_group)
         derivatives, residual = rows[:, :, 1:], rows[:, :, :1]
-        kept = np.eye(rows_of_group) - self._leverage(derivatives, width)
+        kept = np.eye(rows_of_group) - self._leverage(derivatives, matrix)
         return self._scatter(derivatives, np.linalg.solve(kept, residual))
 
     def _groups(self, rows_of_group: int) -> Vector:
@@ -88,11 +90,10 @@ class CrossProducts:
         count = len(groups)
         return groups.T @ groups * (count / max(count - 1, 1)) / len(self.total) ** 2
 
-    def _leverage(self, derivatives: Vector, width: Vector) -> Vector:
+    def _leverage(self, derivatives: Vector, matrix: SafeMatrix) -> Vector:
         """How much of each group's own residual (g, n, n) the solution takes up, from its derivatives (g, n, k)."""
-        safe = SafeMatrix(cross_equations(self.gram()), width)
-        inverse = safe.inverse / len(self.total)
-        inverse[safe.blind] = inverse[:, safe.blind] = 0.0
+        inverse = matrix.inverse / len(self.total)
+        inverse[matrix.blind] = inverse[:, matrix.blind] = 0.0
         leverage = derivatives @ inverse @ derivatives.transpose(0, 2, 1)
         of_group = np.trace(leverage, axis1=1, axis2=2)[:, None, None]
         return leverage * np.minimum(MOST_LEVERAGE / np.maximum(of_group, 1e-300), 1.0)
@@ -164,7 +165,7 @@ class SafeMatrix:
         """Mean square of the weighted rows that noise of this covariance in the gradient leaves at the solution."""
         return float(np.trace(self.inverse @ noise))
 
-    @property
+    @cached_property
     def inverse(self) -> Vector:
         """The inverse (k, k)."""
         return self._inverse_of(self.FLOOR)

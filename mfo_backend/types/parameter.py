@@ -77,6 +77,11 @@ class ParameterTable(Sequence[Parameter]):
         """Entries of the vector that hold `name`."""
         return self._slices[name]
 
+    def mask_of(self, names: Iterable[str]) -> NDArray[np.bool_]:
+        """Which entries of the vector, shape (length,), hold one of `names`; a name that is not here holds none."""
+        wanted = set(names)
+        return np.concatenate([np.full(p.size, p.name in wanted) for p in self._parameters])
+
     def select(self, names: Iterable[str]) -> ParameterTable:
         """The named parameters in this table's order.
 

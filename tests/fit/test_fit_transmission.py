@@ -168,7 +168,7 @@ def test_fireflies_do_not_decide_where_counts_are_equal(tmp_path, monkeypatch):
 def test_the_start_is_kept_where_nothing_is_better(tmp_path):
     renderer = load(tmp_path, size=24)
     result, _ = fit(renderer, renderer.image(renderer.start, seed=5, spp=512))
-    assert result.errors["hdr_flip"][1] <= result.errors["hdr_flip"][0]  # by which ends are compared
+    assert result.errors["flip"][1] <= result.errors["flip"][0]
 
 
 @pytest.mark.parametrize("calls", [2, 12, 30])

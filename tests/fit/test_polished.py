@@ -14,7 +14,6 @@ TABLE = ParameterTable(
     Parameter(name, size, 0.0, 1.0, 0.0)
     for name, size in (("base_color", 3), ("roughness", 1), ("coat_weight", 1), ("sheen_weight", 1), ("sheen_tint", 3))
 )
-CORE = ("base_color", "roughness")
 USER = TABLE.pack({"base_color": (0.5,) * 3, "roughness": 0.0, "coat_weight": 0.0, "sheen_weight": 0.0,
                    "sheen_tint": (0.3,) * 3})  # fmt: skip
 
@@ -32,14 +31,9 @@ def polished(values, sd, kept=(), tied=()):
                 correlation[TABLE.slice_of(one), TABLE.slice_of(other)] = 0.95  # a safe matrix knows no more
     covariance = correlation * np.outer(spread, spread)
     hessian = np.linalg.inv(covariance)
-    return Polished(x, covariance, mask(kept), mask(()), NormalEquations(0.0, 0.0 * x, hessian), hessian)
-
-
-def mask(names):
-    found = np.zeros(TABLE.length, bool)
-    for name in names:
-        found[TABLE.slice_of(name)] = True
-    return found
+    return Polished(
+        x, covariance, TABLE.mask_of(kept), TABLE.mask_of(()), NormalEquations(0.0, 0.0 * x, hessian), hessian
+    )
 
 
 @pytest.mark.parametrize(
@@ -55,12 +49,12 @@ def mask(names):
     ],
 )  # fmt: skip
 def test_lobes_that_no_three_deviations_ask_for_are_off(values, sd, tied, expected):
-    np.testing.assert_array_equal(polished(values, sd, tied=tied).unneeded(TABLE, USER), mask(expected))
+    np.testing.assert_array_equal(polished(values, sd, tied=tied).unneeded(TABLE, USER), TABLE.mask_of(expected))
 
 
 def test_values_that_are_not_determined_go_back_until_the_rest_is_sure():
     end = polished({}, {"sheen_weight": 0.2, "sheen_tint": 0.5, "coat_weight": 0.1})
-    np.testing.assert_array_equal(end.undetermined(TABLE), mask(["sheen_weight", "sheen_tint"]))
+    np.testing.assert_array_equal(end.undetermined(TABLE), TABLE.mask_of(["sheen_weight", "sheen_tint"]))
     # two values that only together are unknown: one is taken for known, then the other is
     tied = polished({}, dict.fromkeys(("coat_weight", "sheen_weight"), 0.2), tied=("coat_weight", "sheen_weight"))
     assert tied.undetermined(TABLE).sum() == 1
@@ -68,8 +62,10 @@ def test_values_that_are_not_determined_go_back_until_the_rest_is_sure():
 
 def test_the_glass_itself_goes_back_only_where_nothing_else_does():
     sd = {"roughness": 0.3, "sheen_tint": 0.5}
-    np.testing.assert_array_equal(polished({}, sd).undetermined(TABLE), mask(["sheen_tint"]))
-    np.testing.assert_array_equal(polished({}, sd, kept=["sheen_tint"]).undetermined(TABLE), mask(["roughness"]))
+    np.testing.assert_array_equal(polished({}, sd).undetermined(TABLE), TABLE.mask_of(["sheen_tint"]))
+    np.testing.assert_array_equal(
+        polished({}, sd, kept=["sheen_tint"]).undetermined(TABLE), TABLE.mask_of(["roughness"])
+    )
 
 
 def test_what_was_kept_is_named_once():
@@ -79,5 +75,5 @@ def test_what_was_kept_is_named_once():
 
 
 def test_without_equations_nothing_goes_back_as_undetermined():
-    end = Polished(USER, np.eye(TABLE.length), mask(()), mask(()), None, np.eye(TABLE.length))
+    end = Polished(USER, np.eye(TABLE.length), TABLE.mask_of(()), TABLE.mask_of(()), None, np.eye(TABLE.length))
     assert not end.undetermined(TABLE).any()
