@@ -100,11 +100,11 @@ class RecordedFit:
 
     def picture(self, x: Vector) -> Pixels:
         """The recorded picture of a vector, linear; the reference where nothing is recorded."""
-        return self._shown(self.scene.evaluator(self.paths, self.paths.pixel_groups())(x))
+        return self._shown(self._pixels(x))
 
-    def _shown(self, table: NDArray[np.float32]) -> Pixels:
+    def _shown(self, pixels: NDArray[np.float32]) -> Pixels:
         image = self.reference.astype(np.float32).copy()
-        image.reshape(-1, 3)[self.paths.pixel] = table[:, :, 0]
+        image.reshape(-1, 3)[self.paths.pixel] = pixels
         return image
 
     def problem(
@@ -251,13 +251,17 @@ class RecordedFit:
         return refined
 
     def _refine_exact(self, stage: Stage, start: Vector, make: MakeResidual) -> Refined:
-        grid = np.maximum(*(detail_grid(p, self.mask) for p in (self.reference, self.picture(start))))
-        grid = np.maximum(np.minimum(FINER * grid, FINEST), grid)
-        if np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS:
-            self._record(start, grid, 1)
+        grid = detail_grid(self.reference, self.mask)
+        if self._is_few(_finer(grid)):
+            grid = _finer(np.maximum(grid, detail_grid(self.picture(start), self.mask)))
+            if self._is_few(grid):
+                self._record(start, grid, 1)
         groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
         problem = self.problem(groups, make)
         return Refined(self._solve(problem, start, 15, stage=stage).x, problem, problem)
+
+    def _is_few(self, grid: NDArray[np.int64]) -> bool:
+        return bool(np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS)
 
     def _refine_sampled(
         self,
@@ -269,14 +273,14 @@ class RecordedFit:
     ) -> Refined:
         x = stage.vector = self._recorded_near(stage, start, make, weigh)
         # the first weights came from a model that was still off
-        refined = self._problems(x, make, weigh)
+        refined = self._problems(x, make, weigh, solve_all=True)
         rival = self._rival(refined.few, x, others)
         if rival is not None:
             del refined  # and with it the recording
             self._record(rival, self.plan.grid_last, self.recordings + 1)
             refined = self._problems(rival, make, weigh)
             x = self._solve(refined.few, rival, 12, stage=stage).x
-            refined = self._problems(x, make, weigh)
+            refined = self._problems(x, make, weigh, solve_all=True)
         return replace(refined, x=self._solve(refined.all, x, 12, stage=stage).x)
 
     def _recorded_near(self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Vector:
@@ -308,30 +312,42 @@ class RecordedFit:
         self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True, samples=SAMPLES)
         self.recordings = number
 
-    def _problems(self, x: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Refined:
-        """All tiles of the last stage and some of them; `weigh` weighs by the noise that the model `x` leaves."""
+    def _problems(
+        self, x: Vector, make: MakeResidual, weigh: MakeWeighted | None, *, solve_all: bool = False
+    ) -> Refined:
+        """All tiles of the last stage and some of them; `weigh` weighs by the noise that the model `x` leaves.
+
+        With `solve_all`, the picture for that noise brings all tiles' derivatives at `x`, where their solve begins.
+        """
         groups = self.tiles(self.plan.side_last)
         some = np.arange(0, len(groups), max(len(groups) // self.plan.first_tiles, 1))
         weighing = fewer = make
         if weigh is not None:
-            noise = self.noise = self._noise(x, groups, self.plan.side_last)
+            pixels = self._pixels_with_tiles(x, groups) if solve_all else self._pixels(x)
+            noise = self.noise = tile_noise(
+                self.calm, pixels, self.paths, groups, self.paths.interior, self.plan.side_last
+            )
             weighing, fewer = (self._weighing(n, groups, weigh) for n in (noise, noise.take(some)))
         problem = self.problem(groups, weighing, near=x)
         few = problem if len(some) == len(groups) else self.problem(groups.take(some), fewer, near=x)
         return Refined(x, problem, few)
 
-    def _noise(self, x: Vector, groups: LaneGroups, side: int) -> TileNoise:
+    def _pixels(self, x: Vector) -> NDArray[np.float32]:
+        """Radiance of the covered pixels, (p, 3)."""
+        return self.scene.image(x, self.paths, self.paths.pixel_groups())
+
+    def _pixels_with_tiles(self, x: Vector, groups: LaneGroups) -> NDArray[np.float32]:
+        """The same by an evaluation with derivatives, which those of the tiles `groups` are made of."""
         pixels = self.scene.evaluator(self.paths, self.paths.pixel_groups()).samples(x)
-        if groups in self._tiles:
-            self._tiles[groups].note(x, pixels.averaged(groups.mean_of_pixels))
-        return tile_noise(self.calm, pixels.mean[:, :, 0], self.paths, groups, self.paths.interior, side)
+        self._tiles[groups].note(x, pixels.averaged(groups.mean_of_pixels))
+        return pixels.mean[:, :, 0]
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
-        groups = self.tiles(TILE)
-        self.noise = self._noise(x, groups, TILE)
+        groups, pixels = self.tiles(TILE), self._pixels(x)
+        self.noise = tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior, TILE)
         problem = self.problem(groups, self._weighing(self.noise, groups))
-        values = problem.residual(problem.evaluate(x)[:, :, 0])[0]
+        values = problem.residual(groups.mean_of_pixels(pixels))[0]
         # as far as a few outliers go, it is their number that counts and not their size
         return float(np.sqrt(np.mean(np.minimum(np.abs(values), WeightedResidual.LIMIT) ** 2)))
 
@@ -365,7 +381,7 @@ class RecordedFit:
                 rows = gradient.reshape(-1, 3)[self.paths.pixel].astype(np.float64)
                 return np.einsum("gck,gc->k", table[:, :, 1:], rows, optimize=True)
 
-            return self._shown(table), pullback
+            return self._shown(table[:, :, 0]), pullback
 
         with self.course.stage("flip") as stage:
             told = self.course.values(stage)
@@ -373,6 +389,11 @@ class RecordedFit:
             ends = [minimise_flip(judge, picture, x, *self.box, on_value=told, should_stop=stop) for x in starts]
             stage.vector = min(ends, key=lambda end: end[1])[0]
         return [x for x, _ in ends]
+
+
+def _finer(grid: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The grids of a recording at the solution where lights are exact, from those for its pictures' detail."""
+    return np.maximum(np.minimum(FINER * grid, FINEST), grid)
 
 
 def _random_start(lower: Vector, upper: Vector, seed: int) -> Vector:

@@ -20,8 +20,9 @@ FIRST_SAMPLES = 16  # a quarter of the noise (squares) of a reference of 4 sampl
 # Part of the squared difference from the reference that may be the picture's own noise; below, more samples would tell
 # little. With 0.25 the root of the difference is at most 15 % too large.
 NOISE_SHARE = 0.25
+MOST_EVEN = 8  # samples of a part, stratified in each pixel; more would need another kernel and change little
 UNSEEN = 0.002  # of a display's white, half a step of 8 bits
-PATHS_OF_A_PART = 1 << 18  # after twice as many, those of both halves, a request to stop is heard
+PATHS_OF_A_PART = 1 << 19  # after twice as many, those of both halves, a request to stop is heard
 
 _SECOND_HALF = 0x00A50000
 _NEXT_SAMPLE = 0x9E3779B9  # as between the parts of one picture, so that none repeats another's numbers
@@ -84,12 +85,11 @@ class Verification:
         self._seed, self._most = seed ^ VERIFY_STREAM, max(most // 2, 1)
         linear = reference.encoding is Encoding.LINEAR
         self._reference = view.display(np.maximum(reference.pixels, 0.0)) if linear else reference.pixels
-        # a power of two: any other number of samples is another kernel
-        self._part = 1 << max(PATHS_OF_A_PART // mask.size, 1).bit_length() - 1
+        self._part = min(max(PATHS_OF_A_PART // mask.size, 1), MOST_EVEN)
 
     def begin(self, vector: Vector) -> Callable[[], GrowingPicture]:
         """Start the first samples of a picture; returns what waits for it."""
-        samples = min(FIRST_SAMPLES // 2, self._most, self._part)
+        samples = self._samples_of_a_part(min(FIRST_SAMPLES // 2, self._most))
         halves = self._halves_later(vector, 0, samples)
         return lambda: GrowingPicture(vector, [half() for half in halves], samples)
 
@@ -129,14 +129,18 @@ class Verification:
         difference = np.square(0.5 * (first + second) - self._reference[self._mask])
         return bool(noise.mean() > NOISE_SHARE * difference.mean())
 
+    def _samples_of_a_part(self, most: int) -> int:
+        """At most so many samples; a power of two, for any other number is another kernel."""
+        return 1 << min(most, self._part).bit_length() - 1
+
     def _add_part(self, picture: GrowingPicture, most: int) -> None:
-        samples = min(most, self._part)
+        samples = self._samples_of_a_part(most)
         picture.add([half() for half in self._halves_later(picture.vector, picture.samples, samples)], samples)
 
     def _halves_later(self, vector: Vector, after: int, samples: int) -> list[Callable[[], Pixels]]:
         """Start `samples` more samples a pixel of both halves; a whole picture counts as one pass."""
         passes = self._renderer.passes
         seeds = ((half + after * _NEXT_SAMPLE) % 2**32 for half in (self._seed, self._seed ^ _SECOND_HALF))
-        halves = [self._renderer.image_later(vector, seed=seed, spp=samples) for seed in seeds]
+        halves = [self._renderer.image_later(vector, seed=seed, spp=samples, even=True) for seed in seeds]
         self._renderer.passes = passes + samples / self._most
         return halves

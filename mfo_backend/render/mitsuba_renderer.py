@@ -53,15 +53,16 @@ class MitsubaRenderer:
         """See `Renderer.image`. A pixel that Mitsuba leaves non-finite is black."""
         return self.image_later(vector, seed=seed, spp=spp)()
 
-    def image_later(self, vector: Vector, *, seed: int, spp: int) -> Callable[[], Pixels]:
+    def image_later(self, vector: Vector, *, seed: int, spp: int, even: bool = False) -> Callable[[], Pixels]:
         """Start to render `image` and return what waits for it: other kernels can be compiled meanwhile.
 
+        `even` samples are stratified, for `spp` of 1, 2, 4, 8 or a square; no pull-back follows their paths.
         Memory holds one part of a picture at a time, so one of several parts is rendered when it is waited for.
         """
         from .ordered_picture import parts_of, start_part
 
         width, height = (int(n) for n in self._sensor.film().crop_size())
-        parts = list(parts_of(width * height, seed, spp))
+        parts = list(parts_of(width * height, seed, spp, even=even))
         self._update(vector, differentiable=False)
         self.passes += 1.0
         first = start_part(self._integrator, self._scene, self._sensor, parts[0])

@@ -26,24 +26,37 @@ _NEXT_SEED = 0x9E3779B9
 
 @dataclass(frozen=True)
 class Part:
-    """Some of a picture's samples: their seed, their number for each pixel, their share of all."""
+    """Some of a picture's samples: their seed, their number for each pixel, their share of all.
+
+    `even` ones are stratified in each pixel (correlated multi-jittered sampling, Kensler 2013) and not independent.
+    """
 
     seed: int
     spp: int
     share: float
+    even: bool = False
 
 
-def parts_of(pixels: int, seed: int, spp: int) -> Iterator[Part]:
+def parts_of(pixels: int, seed: int, spp: int, *, even: bool = False) -> Iterator[Part]:
     """The samples of a picture in parts that memory can hold; a picture of one part has the seed itself."""
     most = max(1, MOST_SAMPLES // pixels)
     for index, done in enumerate(range(0, spp, most)):
         count = min(most, spp - done)
-        yield Part((seed + index * _NEXT_SEED) % 2**32, count, count / spp)
+        yield Part((seed + index * _NEXT_SEED) % 2**32, count, count / spp, even)
 
 
 def opaque(seed: int) -> mi.UInt32:
     """A number whose value is not baked into the kernel, so that the next one needs no compilation."""
     return dr.opaque(mi.UInt32, seed)
+
+
+def _even_sampler(sensor: mi.Sensor, part: Part) -> mi.Sampler:
+    sampler = mi.load_dict({"type": "multijitter", "sample_count": part.spp})
+    if sampler.sample_count() != part.spp:
+        raise ValueError(f"{part.spp} even samples a pixel fill no grid: give 1, 2, 4, 8 or a square.")
+    sampler.set_samples_per_wavefront(part.spp)
+    sampler.seed(opaque(part.seed), int(dr.prod(sensor.film().crop_size())) * part.spp)
+    return sampler
 
 
 def start_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
@@ -57,7 +70,10 @@ def start_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) 
 
 
 def _start(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
-    sampler, spp = integrator.prepare(sensor, opaque(part.seed), part.spp, [])
+    if part.even:
+        sampler, spp = _even_sampler(sensor, part), part.spp
+    else:
+        sampler, spp = integrator.prepare(sensor, opaque(part.seed), part.spp, [])
     ray, weight, position = integrator.sample_rays(scene, sensor, sampler)
     light, *_ = integrator.sample(
         mode=dr.ADMode.Primal, scene=scene, sampler=sampler, ray=ray, depth=mi.UInt32(0), δL=None, δaovs=None,

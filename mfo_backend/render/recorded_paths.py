@@ -106,24 +106,30 @@ class LaneGroups:
         return arrays
 
     def add_parts(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Sums over the kernel lanes of each group in each sample, along the first axis: (samples, g, ...)."""
-        shape = (self.samples, len(self), *values.shape[1:])
-        if len(values) == self.samples * len(self):
-            return values.reshape(shape)
-        first, longer = self._parts_to_add
-        sums = values[first]
-        # few groups have several parts: adding those is four times as fast as `np.add.reduceat` over all
-        for groups, parts in longer:
-            sums[groups] += values[parts]
-        return sums.reshape(shape)
+        """Sums over the kernel lanes of each group in each sample, along the first axis: (samples, g, ...).
+
+        `values` are used up. Neighbours are added pair by pair, for a group may have a hundred parts.
+        """
+        for into, further in self._parts_to_add:
+            values[into] += values[further]
+        if len(values) > self.samples * len(self):
+            parts = self._parts_per_group
+            values = values[np.cumsum(parts) - parts]
+        return values.reshape(self.samples, len(self), *values.shape[1:])
 
     @cached_property
-    def _parts_to_add(self) -> tuple[NDArray[np.int64], list[tuple[NDArray[np.int64], NDArray[np.int64]]]]:
-        """The first part of each group; then, for the second, third, ..., the groups that have one and its number."""
+    def _parts_to_add(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Which parts to add to which, one step after another, until the first of each group holds their sum."""
         parts = self._parts_per_group
-        first = np.cumsum(parts) - parts
-        longer = [np.flatnonzero(parts > k) for k in range(1, parts.max())]
-        return first, [(groups, first[groups] + k) for k, groups in enumerate(longer, 1)]
+        place = np.arange(parts.sum())
+        number = place - np.repeat(np.cumsum(parts) - parts, parts)
+        left = np.repeat(parts, parts) - number
+        steps, apart = [], 1
+        while apart < parts.max():
+            into = place[(number % (2 * apart) == 0) & (left > apart)]
+            steps.append((into, into + apart))
+            apart *= 2
+        return steps
 
     def mean_of_pixels(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
         """Means of rows (p, ...), one for each covered pixel of the recording, over each group: (g, ...)."""

@@ -233,16 +233,16 @@ def test_no_launch_is_longer_than_a_request_to_stop_may_wait(tmp_path, monkeypat
         launches.append(len(vectors) * len(pixels) * samples)
         return launch(self, vectors, pixels, begin, seed, samples, jacobian)
 
-    def part(x, *, seed, spp):
+    def part(x, *, seed, spp, even):
         parts.append(160 * 160 * spp)
-        return image(x, seed=seed, spp=spp)
+        return image(x, seed=seed, spp=spp, even=even)
 
     monkeypatch.setattr(traced_paths.TracedPaths, "_launch", launched)
     monkeypatch.setattr(renderer, "image_later", part)
     fit(renderer, reference)
     assert max(launches) <= traced_paths.MOST_LANES == 1 << 17
     assert len(parts) > 4
-    assert max(parts) <= verified_end.PATHS_OF_A_PART == 1 << 18
+    assert max(parts) <= verified_end.PATHS_OF_A_PART == 1 << 19
 
 
 def test_losses_of_the_users_choice_are_no_stages_of_glass(tmp_path):

@@ -21,7 +21,8 @@ class Renderer:
     def __init__(self, noise: float = NOISE, shape=SHAPE) -> None:
         self.passes, self.taken, self._noise, self._shape = 0.0, [], noise, shape
 
-    def image_later(self, vector, *, seed, spp):
+    def image_later(self, vector, *, seed, spp, even):
+        assert even
         self.taken.append((float(vector[0]), seed, spp))
         self.passes += 1.0
         noise = np.random.default_rng(seed).normal(size=self._shape) * self._noise / np.sqrt(spp)

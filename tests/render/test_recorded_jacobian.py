@@ -101,6 +101,29 @@ def test_quarters_of_tiles_are_two_pixels_wide_and_hold_all(recording):
         paths.tile_groups(side=3)
 
 
+def test_the_image_alone_is_that_of_the_derivatives(recording):
+    scene, paths = recording
+    x = middle(scene.renderer.table)
+    for groups in (paths.pixel_groups(), paths.tile_groups()):
+        expected = scene.evaluator(paths, groups)(x)[:, :, 0]
+        # another kernel contracts other products and sums
+        np.testing.assert_allclose(scene.image(x, paths, groups), expected, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [[1, 1, 1], [1, 40, 2, 1, 7], [300]])
+def test_parts_of_groups_are_added_to_sums(recording, size, monkeypatch):
+    """Groups of so many parts each; the oracle adds them in float64."""
+    from mfo_backend.render.recorded_paths import LaneGroups  # needs the variant
+
+    size = np.array(size)
+    groups = LaneGroups(np.arange(len(size)), np.arange(len(size) + 1), np.arange(len(size)), np.zeros((1, 1), int))
+    monkeypatch.setitem(groups.__dict__, "_parts_per_group", size)
+    values = np.random.default_rng(0).random((size.sum(), 3, 2)).astype(np.float32)
+    ends = np.cumsum(size)
+    expected = [values[end - count : end].sum(axis=0, dtype=np.float64) for count, end in zip(size, ends, strict=True)]
+    np.testing.assert_allclose(groups.add_parts(values), [expected], rtol=1e-6)
+
+
 def test_chosen_groups_equal_the_rows_of_all(recording):
     scene, paths = recording
     x, tiles = middle(scene.renderer.table), paths.tile_groups()
