@@ -29,7 +29,7 @@ from .recorded_stages import End, MakeResidual, MakeWeighted, RecordedFit
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .verification import check_reference, picture_errors
-from .verified_end import Verification
+from .verified_end import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from .weak_combinations import weak_combinations
 
 STAGES = ("scan", "start", "refine")
@@ -79,7 +79,14 @@ def fit_recorded(
     scene = RecordedScene(renderer, int(mask.sum()))  # refuses glass, so it comes first
     # the start's picture is rendered while the kernels of the fit are compiled
     verification = Verification(
-        renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
+        renderer,
+        reference,
+        mask,
+        view,
+        seed=settings.seed,
+        first=FIRST_SAMPLES_EXACT if scene.lights_exact else FIRST_SAMPLES,
+        most=settings.verify_spp,
+        should_stop=should_stop,
     )
     start = verification.begin(renderer.start)
     finishing = finishing_residuals(settings, reference.encoding, light, mask, view)

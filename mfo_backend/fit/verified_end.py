@@ -17,6 +17,7 @@ from .stages import Candidate
 from .verification import VERIFY_STREAM
 
 FIRST_SAMPLES = 16  # a quarter of the noise (squares) of a reference of 4 samples a pixel
+FIRST_SAMPLES_EXACT = 8  # where every light is exact: for silhouettes and light over other surfaces
 # Part of the squared difference from the reference that may be the picture's own noise; below, more samples would tell
 # little. With 0.25 the root of the difference is at most 15 % too large.
 NOISE_SHARE = 0.25
@@ -62,9 +63,9 @@ class Verification:
 
     Parameters
     ----------
-    most
-        Samples a pixel of a picture, at most. The first `FIRST_SAMPLES` often say enough: the start is usually far
-        away, and under a noisy reference a picture without noise looks no nearer.
+    first, most
+        Samples a pixel of a picture, at least and at most. The first often say enough: the start is usually far away,
+        and under a noisy reference a picture without noise looks no nearer.
     view
         What a display shows: differences and noise are compared in its values, as every measure of a fit sees them
         compressed.
@@ -79,17 +80,18 @@ class Verification:
         *,
         seed: int,
         most: int,
+        first: int = FIRST_SAMPLES,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         self._renderer, self._mask, self._view, self._should_stop = renderer, mask, view, should_stop
-        self._seed, self._most = seed ^ VERIFY_STREAM, max(most // 2, 1)
+        self._seed, self._first, self._most = seed ^ VERIFY_STREAM, first // 2, max(most // 2, 1)
         linear = reference.encoding is Encoding.LINEAR
         self._reference = view.display(np.maximum(reference.pixels, 0.0)) if linear else reference.pixels
         self._part = min(max(PATHS_OF_A_PART // mask.size, 1), MOST_EVEN)
 
     def begin(self, vector: Vector) -> Callable[[], GrowingPicture]:
         """Start the first samples of a picture; returns what waits for it."""
-        samples = self._samples_of_a_part(min(FIRST_SAMPLES // 2, self._most))
+        samples = self._samples_of_a_part(min(self._first, self._most))
         halves = self._halves_later(vector, 0, samples)
         return lambda: GrowingPicture(vector, [half() for half in halves], samples)
 
@@ -106,7 +108,7 @@ class Verification:
 
     def _grow(self, pictures: list[GrowingPicture]) -> None:
         """Double the samples of all pictures until they say enough."""
-        wanted = FIRST_SAMPLES // 2
+        wanted = self._first
         while pictures:
             while pictures[0].samples < min(wanted, self._most):
                 if self._should_stop():

@@ -75,6 +75,11 @@ class RecordedScene:
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
 
+    @property
+    def lights_exact(self) -> bool:
+        """Whether no light has an extent, so that direct light has no noise but at silhouettes."""
+        return all(mi.has_flag(e.flags(), DELTA) for e in self.renderer.scene.emitters())
+
     @cached_property
     def needs(self) -> SceneNeeds:
         """What to record, found by tracing a few rays when it is first asked for."""
@@ -82,8 +87,7 @@ class RecordedScene:
 
     def _probe(self) -> SceneNeeds:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
-        scene = self.renderer.scene
-        sampled = any(not mi.has_flag(e.flags(), DELTA) for e in scene.emitters())
+        scene, sampled = self.renderer.scene, not self.lights_exact
         limit = int(getattr(self._integrator, "max_depth", 2))
         depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
         if depth <= 2:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.verified_end import FIRST_SAMPLES, PATHS_OF_A_PART, Verification
+from mfo_backend.fit.verified_end import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, PATHS_OF_A_PART, Verification
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 
@@ -50,6 +50,13 @@ def test_only_what_is_near_the_reference_takes_all_samples():
     assert samples_of(renderer, 0.8) == FIRST_SAMPLES
     assert samples_of(renderer, 0.4) == MOST
     assert renderer.passes == pytest.approx(1 + FIRST_SAMPLES / MOST)  # a whole picture is one
+
+
+def test_fewer_samples_to_begin_with_grow_as_much():
+    renderer = Renderer()
+    found(renderer, 0.4, 0.8, [0.4], first=FIRST_SAMPLES_EXACT)
+    assert samples_of(renderer, 0.8) == FIRST_SAMPLES_EXACT
+    assert samples_of(renderer, 0.4) == MOST
 
 
 def test_a_start_at_the_solution_takes_all_samples_too():
