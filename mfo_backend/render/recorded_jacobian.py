@@ -48,7 +48,7 @@ class RecordedJacobian:
         All other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
         value needs no new kernel. None is a texture's, which the recording holds for each lane.
     derivatives
-        Without them K is 0: a kernel of its own, which takes a quarter of the time.
+        Without them K is 0: a kernel of its own, which takes half the time.
 
     Notes
     -----
