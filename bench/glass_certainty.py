@@ -29,36 +29,21 @@ import numpy as np  # noqa: E402
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from bench.scene_fit import fit_to, open_bench_scene, reference_of, true_vector, write_bench_scene  # noqa: E402
+
 REFERENCE_STREAM = 0x6C000000
 WRONG_BY = 0.02
 
 
 def measure(scene: Any, number: int, arguments: argparse.Namespace) -> dict[str, Any]:
     """Fit a scene to its reference of this number."""
-    from mfo_backend.bench.method import method_settings
-    from mfo_backend.bench.scene import SHAPE
-    from mfo_backend.fit.recover_material import recover_material
-    from mfo_backend.render.mitsuba_renderer import load_mitsuba_renderer
     from mfo_backend.types.certainty import Level
-    from mfo_backend.types.image import Encoding, Image
 
-    settings = method_settings(arguments.preset, scene.scenario, scene.number)
-    values = "all" if arguments.all_values else settings.parameters
-    renderer = load_mitsuba_renderer(
-        scene.file, SHAPE, model=settings.model, parameters=values, materials=scene.materials
-    )
-    table = renderer.table
-    truth = table.pack({**table.unpack(renderer.start), **scene.truth})
-    seed = REFERENCE_STREAM + 1000 * number + scene.number
-    reference = renderer.image(truth, seed=seed, spp=scene.scenario.reference_spp)
+    renderer, settings = open_bench_scene(scene, arguments.preset, all_values=arguments.all_values)
+    table, truth = renderer.table, true_vector(scene, renderer)
+    reference = reference_of(scene, renderer, REFERENCE_STREAM + 1000 * number + scene.number)
     renderer.passes, began = 0.0, time.process_time()
-    result = recover_material(
-        renderer,
-        Image(reference, Encoding.LINEAR),
-        settings,
-        listener=lambda event: None,
-        should_stop=lambda: False,
-    ).result
+    result = fit_to(renderer, reference, settings)
     seconds = time.process_time() - began
     error = np.abs(table.pack(result.recovered) - truth)
     sd = np.concatenate([result.certainty[name].sd for name in table.names])
@@ -106,22 +91,10 @@ def main() -> None:
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--out", type=Path, help="also append a JSON line for each fit")
     chosen = parser.parse_args()
-    from mfo_backend.bench.assets import Assets
-    from mfo_backend.bench.scenario import SCENARIOS
-    from mfo_backend.bench.scene import write_scene
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
-
-    if needs_llvm():
-        configure_llvm()  # before the first import of drjit
-    from mfo_backend.render.variant import load_variant
-
-    load_variant()
     rows = []
     with tempfile.TemporaryDirectory(prefix="mfo-certainty-") as folder:
         for number in chosen.scenes:
-            scene = write_scene(
-                SCENARIOS[chosen.scenario], number, chosen.size, Assets.find(), Path(folder) / str(number)
-            )
+            scene = write_bench_scene(chosen.scenario, number, chosen.size, Path(folder) / str(number))
             for reference in range(chosen.references):
                 row = measure(scene, reference, chosen)
                 rows.append(row)

@@ -18,7 +18,6 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")  # as the `mfo` command does, before NumPy reads it
@@ -28,50 +27,9 @@ import numpy as np  # noqa: E402
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from bench.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene  # noqa: E402
+
 REFERENCE_SEED = 0x3E300000
-
-
-def opened(scenario: str, number: int, size: int, preset: str, folder: Path) -> tuple[Any, Any, Any]:
-    """A scene of the bench, its renderer and the settings of its fit."""
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
-
-    if needs_llvm():
-        configure_llvm()  # before the first import of drjit
-    from mfo_backend.bench.assets import Assets
-    from mfo_backend.bench.method import method_settings
-    from mfo_backend.bench.scenario import SCENARIOS
-    from mfo_backend.bench.scene import SHAPE, write_scene
-    from mfo_backend.render.mitsuba_renderer import load_mitsuba_renderer
-
-    scene = write_scene(SCENARIOS[scenario], number, size, Assets.find(), folder)
-    settings = method_settings(preset, scene.scenario, number)
-    renderer = load_mitsuba_renderer(
-        scene.file, SHAPE, model=settings.model, parameters=settings.parameters, materials=scene.materials
-    )
-    return scene, renderer, settings
-
-
-def render_reference(scene: Any, renderer: Any, file: Path) -> None:
-    """Write the picture of the scene's true values."""
-    truth = renderer.table.pack({**renderer.table.unpack(renderer.start), **scene.truth})
-    np.save(file, renderer.image(truth, seed=REFERENCE_SEED, spp=scene.scenario.reference_spp))
-
-
-def fit(renderer: Any, settings: Any, file: Path) -> dict[str, float]:
-    """Fit to that picture; seconds and GiB."""
-    from mfo_backend.fit.recover_material import recover_material
-    from mfo_backend.types.image import Encoding, Image
-
-    began = time.monotonic()
-    recover_material(
-        renderer,
-        Image(np.load(file), Encoding.LINEAR),
-        settings,
-        listener=lambda event: None,
-        should_stop=lambda: False,
-    )
-    kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return {"seconds": time.monotonic() - began, "gib": kilobytes / 2**20}
 
 
 def main() -> None:
@@ -86,13 +44,15 @@ def main() -> None:
     if chosen.inside:
         step, folder = chosen.inside[0], Path(chosen.inside[1])
         file = folder / "reference.npy"
-        scene, renderer, settings = opened(
-            chosen.scenario, chosen.scenes[0], chosen.sizes[0], chosen.preset, folder / step
-        )
+        scene = write_bench_scene(chosen.scenario, chosen.scenes[0], chosen.sizes[0], folder / step)
+        renderer, settings = open_bench_scene(scene, chosen.preset)
         if step == "render":
-            render_reference(scene, renderer, file)
-        else:
-            print(json.dumps(fit(renderer, settings, file)))
+            np.save(file, reference_of(scene, renderer, REFERENCE_SEED))
+            return
+        began = time.monotonic()
+        fit_to(renderer, np.load(file), settings)
+        gib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        print(json.dumps({"seconds": time.monotonic() - began, "gib": gib}))
         return
     for size in chosen.sizes:
         for scene in chosen.scenes:
