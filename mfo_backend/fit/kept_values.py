@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solve.box_quadratic import minimise_in_box
+from ..solve.bounded_least_squares import step_in_box
 from ..types.certainty import Certainty, Level
 from ..types.image import Pixels
 from ..types.parameter import ParameterTable
@@ -89,20 +89,10 @@ def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: Paramet
     """
     equations = problem.equations(found)
     noise = max(2.0 * equations.cost, least**2, 1e-30)
-    hessian = equations.hessian + 1e-9 * np.diag(equations.hessian).max() * np.eye(len(found))
-    lower, upper = table.lower, table.upper
 
     def change(names: list[str]) -> float:
         """How much the cost rises with these names at the user's values and all others at their best."""
-        step, free = np.zeros_like(found), np.ones(len(found), bool)
-        for name in names:
-            part = table.slice_of(name)
-            step[part], free[part] = (user - found)[part], False
-        if free.any():
-            rest = np.ix_(free, free)
-            slope = equations.gradient[free] + hessian[np.ix_(free, ~free)] @ step[~free]
-            step[free] = minimise_in_box(hessian[rest], slope, (lower - found)[free], (upper - found)[free])
-        return float(equations.gradient @ step + 0.5 * step @ hessian @ step)
+        return step_in_box(equations, found, *box_holding(table, user, names))[1]
 
     return dispensable(values_off(table, user), change, SIGNIFICANT * noise / (2.0 * problem.independent))
 
@@ -171,13 +161,25 @@ def box_holding(table: ParameterTable, user: Vector, names: Iterable[str]) -> tu
 
 
 def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: list[str]) -> Vector | None:
-    """The best vector with these names at the user's values; None where it is hopeless by some of the groups alone."""
+    """The best vector with these names at the user's values; None where it is hopeless by some of the groups alone.
+
+    The quadratic around `found` mostly tells where it is: what goes back hardly shows.
+    """
     lower, upper = box_holding(fit.table, fit.scene.renderer.start, names)
     start = np.clip(found, lower, upper)
     if np.all(lower >= upper):
         return start
     if refined.few is not refined.all:
-        start = fit.solve_within(refined.few, start, lower, upper)
-        if refined.few.equations(start).cost > HOPELESS * refined.few.equations(found).cost:
+        around = refined.all.equations(found)
+        step, rise = step_in_box(around, found, lower, upper)
+        if rise > around.cost:
             return None
+        guess, cost = found + step, refined.few.equations
+        before = cost(found).cost
+        if cost(guess).cost <= KEEP_TOLERANCE * before:
+            start = guess
+        else:
+            start = fit.solve_within(refined.few, min(start, guess, key=lambda x: cost(x).cost), lower, upper)
+            if cost(start).cost > HOPELESS * before:
+                return None
     return fit.solve_within(refined.all, start, lower, upper)

@@ -14,7 +14,7 @@ from ..render.primary_rays import TILE
 from ..render.recorded_image import RECALLED, RecordedImage
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import MOST_LANES, RecordedScene
-from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
+from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, lowest_promised, solve_bounded
 from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
@@ -24,6 +24,7 @@ from .flip_stage import minimise_flip
 from .global_start import different_nodes, scan
 from .picture_judge import PictureJudge
 from .problem import Problem, Refined
+from .race import CLEARLY_LOWER, race
 from .recorded_plan import RecordedPlan
 from .residuals import OneSidedResidual, Residual, WeightedResidual
 from .tile_noise import TileNoise, tile_noise
@@ -35,9 +36,6 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 
 # Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
 LEAST_NOISE = 0.002
-# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
-# weights, which come from the solution that it is compared with, are only about right
-CLEARLY_LOWER = 0.97
 SPARE = 1.5  # times the lanes a start is found on are recorded for it: its tiles are chosen by what they show
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
@@ -160,43 +158,10 @@ class RecordedFit:
         return basins
 
     def _race(self, stage: Stage, problem: Problem, starts: list[Vector]) -> list[Solution]:
-        """Bounded fits from all starts; those that fall behind are given up, and all others once one has solved it."""
-        plan, found = self.plan, []
-        for start in starts:
-            first = self._solve(problem, start, plan.trial_evaluations, stage=stage)
-            found.append(first)
-            if self._solved(first) or self.course.should_stop():
-                break
-        found.sort(key=lambda solution: solution.equations.cost)
-        leader = found[0]
-        for place, candidate in enumerate(list(found)):
-            near = self._within(leader, plan.seen_rms)
-            behind = candidate.equations.cost > (1.0 if near else plan.keep_factor) * leader.equations.cost
-            if candidate.converged or behind or self._solved(leader) or self.course.should_stop():
-                continue
-            longer = self._solve(problem, candidate.x, 40, stage=stage)
-            found[place] = longer
-            if longer.equations.cost < leader.equations.cost:
-                leader = longer
-        others = [] if self._solved(leader) else sorted(found, key=lambda solution: solution.equations.cost)
-        return self._different([leader, *others])
+        def solve(start: Vector, evaluations: int, known: float) -> Solution:
+            return self._solve(problem, start, evaluations, stage=stage, known=known)
 
-    def _different(self, solutions: list[Solution]) -> list[Solution]:
-        """The best solutions that are further apart than a tenth of the box in some value and cost little more."""
-        chosen = solutions[:1]
-        width = self.table.upper - self.table.lower
-        for solution in solutions[1:]:
-            apart = all(np.max(np.abs(solution.x - other.x) / width) > 0.1 for other in chosen)
-            if apart and solution.equations.cost <= self.plan.basin_factor * chosen[0].equations.cost:
-                chosen.append(solution)
-        return chosen[: self.plan.basins]
-
-    def _solved(self, solution: Solution) -> bool:
-        return self._within(solution, self.plan.solved_rms)
-
-    @staticmethod
-    def _within(solution: Solution, rms: float) -> bool:
-        return np.sqrt(2.0 * solution.equations.cost) < rms
+        return race(solve, starts, self.table.upper - self.table.lower, self.plan, self.course.should_stop)
 
     def _solve(
         self,
@@ -206,9 +171,14 @@ class RecordedFit:
         *,
         stage: Stage | None = None,
         box: tuple[Vector, Vector] | None = None,
+        known: float = 0.0,
     ) -> Solution:
-        """A bounded solve whose evaluations are noted in `stage`; any other solution is better than one not finite."""
-        limits = SolveLimits(evaluations=evaluations, cost_change=self._cost_change(problem), cost_floor=COST_FLOOR)
+        """A bounded solve whose evaluations are noted in `stage`; any other solution is better than one not finite.
+
+        With the cost of a `known` solution it ends where it is nearly as good and promises nothing clearly better.
+        """
+        limits = replace(self._limits(problem, evaluations), known=self.plan.basin_factor * known)
+        limits = replace(limits, wanted=CLEARLY_LOWER * known)
         lower, upper = box or (self.table.lower, self.table.upper)
         equations = problem.equations if stage is None else self.course.watch(stage, problem.equations)
         try:
@@ -219,20 +189,22 @@ class RecordedFit:
 
     def solve_within(self, problem: Problem, start: Vector, lower: Vector, upper: Vector) -> Vector:
         """A few steps with other bounds from another solution."""
-        limits = SolveLimits(evaluations=8, cost_change=self._cost_change(problem), cost_floor=COST_FLOOR)
+        limits = self._limits(problem, 8)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
-    def _cost_change(self, problem: Problem) -> float:
-        """The relative change of the cost at which a solve ends: where there is noise, what it explains by itself."""
-        return max(COST_CHANGE, NOT_SEEN / problem.independent) if self.scene.needs.sampled else COST_CHANGE
+    def _limits(self, problem: Problem, evaluations: int) -> SolveLimits:
+        """Limits of a solve, which ends where there is noise at the change that it explains by itself."""
+        noise = NOT_SEEN / problem.independent if self.scene.needs.sampled else 0.0
+        return SolveLimits(evaluations=evaluations, cost_change=max(COST_CHANGE, noise), cost_floor=COST_FLOOR)
 
     def _rival(self, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
         """The best of the other basins on the same problem, if it is clearly better."""
         if not others:
             return None
-        solution, *rivals = (self._solve(problem, x, self.plan.trial_evaluations) for x in (found, *others))
+        known = lowest_promised(problem.equations(found), found, self.table.lower, self.table.upper)
+        rivals = (self._solve(problem, x, self.plan.trial_evaluations, known=known) for x in others)
         best = min(rivals, key=lambda rival: rival.equations.cost)
-        return best.x if best.equations.cost < CLEARLY_LOWER * solution.equations.cost else None
+        return best.x if best.equations.cost < CLEARLY_LOWER * known else None
 
     def refine(
         self, start: Vector, make: MakeResidual, weigh: MakeWeighted | None, others: Sequence[Vector] = ()

@@ -34,6 +34,7 @@ class NormalEquations:
 
 
 Residuals = Callable[[Vector], NormalEquations]
+TRIED = 3  # evaluations after which the quadratic is believed when it promises little
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,9 @@ class SolveLimits:
     """When to stop.
 
     `cost_change` is relative, `step` is relative to the width of the box, `cost_floor` is absolute. `damping` is the
-    first one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away.
+    first one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away. `known` and `wanted` are
+    costs, of another solution and of one that would be better: a solve that has come below the first, and whose
+    quadratic promises no less than the second, ends there.
     """
 
     evaluations: int = 60
@@ -49,11 +52,16 @@ class SolveLimits:
     step: float = 1e-6
     cost_floor: float = 0.0
     damping: float = 1e-2
+    known: float = 0.0
+    wanted: float = 0.0
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The best point found, its normal equations, and the cost of each evaluation (inf where it was not finite)."""
+    """The best point found, its normal equations, and the cost of each evaluation (inf where it was not finite).
+
+    `converged` says that more evaluations would not have been worth it.
+    """
 
     x: Vector
     equations: NormalEquations
@@ -104,6 +112,10 @@ def solve_bounded(
         if here.cost <= limits.cost_floor or small or predicted <= limits.cost_change * here.cost * 1e-2:
             converged = True
             break
+        tried = len(costs) >= TRIED and here.cost <= limits.known
+        if tried and lowest_promised(here, x, lower, upper) > limits.wanted:
+            converged = True
+            break
         trial = residuals(x + step)
         costs.append(trial.cost if trial.finite else np.inf)
         gain = (here.cost - trial.cost) / predicted if trial.finite else -1.0
@@ -120,3 +132,23 @@ def solve_bounded(
             if damping > 1e12:
                 break
     return Solution(x, here, tuple(costs), converged)
+
+
+def lowest_promised(equations: NormalEquations, x: Vector, lower: Vector, upper: Vector) -> float:
+    """The lowest cost in the box by the quadratic around `x`, without damping; at least 0."""
+    _, rise = step_in_box(equations, x, lower, upper)
+    return max(equations.cost + rise, 0.0)
+
+
+def step_in_box(equations: NormalEquations, x: Vector, lower: Vector, upper: Vector) -> tuple[Vector, float]:
+    """The step from `x` to the lowest cost in the box by the quadratic around it, and how much the cost rises by it.
+
+    `x` may lie outside where the box holds a value still: that goes there.
+    """
+    hessian = equations.hessian + 1e-9 * np.diag(equations.hessian).max() * np.eye(len(x))
+    step, free = np.clip(x, lower, upper) - x, lower < upper
+    if free.any():
+        slope = equations.gradient[free] + hessian[np.ix_(free, ~free)] @ step[~free]
+        inside = (lower - x)[free], (upper - x)[free]
+        step[free] = minimise_in_box(hessian[np.ix_(free, free)], slope, *inside)
+    return step, float(equations.gradient @ step + 0.5 * step @ hessian @ step)

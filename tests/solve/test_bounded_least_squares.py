@@ -5,9 +5,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
-from mfo_backend.solve.bounded_least_squares import NormalEquations, SolveLimits, solve_bounded
+from mfo_backend.solve.bounded_least_squares import (
+    TRIED,
+    NormalEquations,
+    SolveLimits,
+    lowest_promised,
+    solve_bounded,
+    step_in_box,
+)
 
 T = np.linspace(0, 4, 40)
 DATA = 0.8 * np.exp(-1.3 * T) + 0.4 * np.cos(1.7 * T)
@@ -102,3 +109,41 @@ def test_stops_when_asked():
 def test_a_start_without_finite_residuals_is_refused():
     with pytest.raises(ValueError, match="not finite at the start"):
         solve_bounded(lambda x: NormalEquations(np.nan, x, np.eye(2)), np.zeros(2), -np.ones(2), np.ones(2))
+
+
+def never_below(x: np.ndarray) -> NormalEquations:
+    """The curve with a residual of 1 that nothing changes: no cost is below a half."""
+    good = equations(x)
+    return NormalEquations(good.cost + 0.5, good.gradient, good.hessian)
+
+
+@pytest.mark.parametrize(
+    ("known", "wanted", "ends_early"),
+    [(np.inf, 0.49, True), (np.inf, 0.51, False), (0.4, 0.39, False), (0.0, 0.0, False)],
+    ids=["promises nothing better", "may be better", "worse than the known", "none known"],
+)
+def test_a_solve_without_promise_ends(known, wanted, ends_early):
+    start, box = np.array([0.3, 0.5, 0.9, 1.2]), np.full(4, 3.0)
+    limits = SolveLimits(evaluations=100, cost_change=1e-12, step=1e-10)
+    whole = solve_bounded(never_below, start, LOWER, box, limits)
+    assert len(whole.costs) > TRIED + 1
+    limits = SolveLimits(evaluations=100, cost_change=1e-12, step=1e-10, known=known, wanted=wanted)
+    solution = solve_bounded(never_below, start, LOWER, box, limits)
+    assert (len(solution.costs) == TRIED) == ends_early
+    assert solution.converged
+    assert ends_early or solution.equations.cost == whole.equations.cost
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_quadratic_promises_the_least_cost_in_the_box(seed):
+    rng = np.random.default_rng(seed)
+    a, b, x = rng.normal(size=(30, 6)), 4 * rng.normal(size=30), rng.uniform(-0.4, 0.4, 6)
+    lower, upper = np.full(6, -0.5), np.full(6, 0.5)
+    lower[0] = upper[0] = 0.3  # held
+    residual = a @ x - b
+    here = NormalEquations(0.5 * float(residual @ residual), a.T @ residual, a.T @ a)
+    free = lsq_linear(a[:, 1:], b - 0.3 * a[:, 0], (lower[1:], upper[1:]), tol=1e-12, method="bvls")
+    step, rise = step_in_box(here, x, lower, upper)
+    np.testing.assert_allclose(x + step, [0.3, *free.x], atol=1e-7)
+    assert here.cost + rise == pytest.approx(free.cost, rel=1e-9)
+    assert lowest_promised(here, x, lower, upper) == pytest.approx(free.cost, rel=1e-9)
