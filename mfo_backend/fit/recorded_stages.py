@@ -14,7 +14,7 @@ from ..render.primary_rays import TILE
 from ..render.recorded_image import RECALLED, RecordedImage
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..render.recorded_scene import MOST_LANES, RecordedScene
-from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, lowest_promised, solve_bounded
+from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
@@ -201,7 +201,8 @@ class RecordedFit:
         """The best of the other basins on the same problem, if it is clearly better."""
         if not others:
             return None
-        known = lowest_promised(problem.equations(found), found, self.table.lower, self.table.upper)
+        # a solve that ended for want of evaluations has more to gain than its quadratic says
+        known = self._solve(problem, found, self.plan.trial_evaluations).equations.cost
         rivals = (self._solve(problem, x, self.plan.trial_evaluations, known=known) for x in others)
         best = min(rivals, key=lambda rival: rival.equations.cost)
         return best.x if best.equations.cost < CLEARLY_LOWER * known else None
@@ -227,7 +228,7 @@ class RecordedFit:
         if self._is_few(_finer(grid)):
             grid = _finer(np.maximum(grid, detail_grid(self.picture(start), self.mask)))
             if self._is_few(grid):
-                self._record(start, grid, 1)
+                self._record(start, grid)
         groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
         problem = self.problem(groups, make)
         return Refined(self._solve(problem, start, 15, stage=stage).x, problem, problem)
@@ -243,32 +244,41 @@ class RecordedFit:
         weigh: MakeWeighted | None,
         others: Sequence[Vector],
     ) -> Refined:
-        x = stage.vector = self._recorded_near(stage, start, make, weigh)
+        x, grid = self._recorded_near(stage, start, make, weigh)
+        stage.vector = x
         # the first weights came from a model that was still off
         refined = self._problems(x, make, weigh, solve_all=True)
         rival = self._rival(refined.few, x, others)
         if rival is not None:
+            known = refined.few.equations(x).cost
             del refined  # and with it the recording
-            self._record(rival, self.plan.grid_last, self.recordings + 1)
-            refined = self._problems(rival, make, weigh)
-            x = self._solve(refined.few, rival, 12, stage=stage).x
-            refined = self._problems(x, make, weigh, solve_all=True)
+            better, _ = self._recorded_near(stage, rival, make, weigh)
+            refined = self._problems(better, make, weigh, solve_all=True)
+            if refined.few.equations(better).cost < known:
+                x = better
+            else:  # what had made it look better was the noise of a recording for another material
+                del refined
+                self._record(x, grid)
+                refined = self._problems(x, make, weigh, solve_all=True)
         return replace(refined, x=self._solve(refined.all, x, 12, stage=stage).x)
 
-    def _recorded_near(self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None) -> Vector:
-        """The solution on some tiles of a recording, made anew until it is near the material that was recorded."""
-        number, grid = 1, self.plan.grid_last
+    def _recorded_near(
+        self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None
+    ) -> tuple[Vector, int]:
+        """The solution on some tiles of a recording, made anew until it is near the material that was recorded, and
+        the grid of the last one."""
+        grid, most = self.plan.grid_last, self.recordings + MOST_RECORDINGS
         while True:
-            self._record(start, grid, number)
+            self._record(start, grid)
             few = self._problems(start, make, weigh).few
             x = self._solve(few, start, 12, stage=stage).x
             before, after = few.own_noise(start), few.own_noise(x)
             moved = self._moved(few, start, x) > MOVED or after > NOISIER * before
             finer = self._finer(grid, after)
-            if not (moved or finer > grid) or number == MOST_RECORDINGS or self.course.should_stop():
-                return x
+            if not (moved or finer > grid) or self.recordings == most or self.course.should_stop():
+                return x, grid
             del few  # and with it the recording
-            start, number, grid = x, number + 1, finer
+            start, grid = x, finer
 
     def _finer(self, grid: int, noise: float) -> int:
         """The grid with which the recording's own noise, `noise` with this one, is low enough."""
@@ -277,12 +287,13 @@ class RecordedFit:
         wanted = math.ceil(grid * noise / self.plan.low_noise)
         return max(min(wanted, self.plan.grid_finest, self.scene.finest_grid(SAMPLES)), grid)
 
-    def _record(self, x: Vector, grid: int | NDArray[np.int64], number: int) -> None:
+    def _record(self, x: Vector, grid: int | NDArray[np.int64]) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
         self._groups, self._tiles = {}, {}
-        self.paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=True, samples=SAMPLES)
-        self.recordings = number
+        self.recordings += 1
+        seed = self.seed + self.recordings
+        self.paths = self.scene.record(x, grid=grid, seed=seed, near=True, samples=SAMPLES)
 
     def _problems(
         self, x: Vector, make: MakeResidual, weigh: MakeWeighted | None, *, solve_all: bool = False

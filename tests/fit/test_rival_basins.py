@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.problem import Refined
 from mfo_backend.fit.recorded_plan import RecordedPlan
 from mfo_backend.fit.recorded_stages import RecordedFit
 from mfo_backend.solve.bounded_least_squares import NormalEquations
@@ -38,3 +39,30 @@ def test_the_better_valley_is_gone_on_with(others, expected):
     assert (rival is None) == (expected is None)
     if rival is not None:
         assert rival[0] == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize(("cost_there", "kept"), [(0.4, "rival"), (0.6, "found")])
+def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_there, kept):
+    """On a recording made for another material its own noise may pass for a lower cost."""
+    fit = RecordedFit.__new__(RecordedFit)
+    found, rival = np.array([0.0]), np.array([1.0])
+    recorded = [(found, 7)]
+
+    def recorded_near(stage, start, make, weigh):
+        at, grid = (found, 7) if start is not rival else (rival, 9)
+        recorded.append((at, grid))
+        return at, grid
+
+    def problems(x, make, weigh, *, solve_all=False):
+        few = SimpleNamespace(equations=lambda at: SimpleNamespace(cost=cost_there if at is rival else 0.5))
+        return Refined(x, few, few)
+
+    monkeypatch.setattr(fit, "_recorded_near", recorded_near)
+    monkeypatch.setattr(fit, "_problems", problems)
+    monkeypatch.setattr(fit, "_rival", lambda problem, x, others: rival)
+    monkeypatch.setattr(fit, "_record", lambda x, grid: recorded.append((x, grid)))
+    monkeypatch.setattr(fit, "_solve", lambda problem, x, evaluations, *, stage: SimpleNamespace(x=x))
+    refined = fit._refine_sampled(SimpleNamespace(vector=None), found, None, None, [rival])
+    expected = rival if kept == "rival" else found
+    assert refined.x is expected
+    assert recorded[-1] == ((rival, 9) if kept == "rival" else (found, 7))
