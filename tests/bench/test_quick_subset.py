@@ -19,10 +19,10 @@ def runner(tmp_path_factory):
     ("scenario", "method", "flips", "passes"),
     [
         # FLIP and passes when this was written:
-        ("base", "fast", (0.0019, 0.0010), (149, 141)),
-        ("noise", "fast", (0.041, 0.093), (368, 467)),  # 4 samples a pixel; noise alone is 0.054 and 0.317
-        ("objects", "fast", (0.115, 0.127), (872, 355)),  # 4 samples a pixel; noise alone is 0.116 and 0.175
-        ("relighting", "balanced", (0.016,), (587,)),
+        ("base", "fast", (0.0006, 0.0008), (113, 130)),
+        ("noise", "fast", (0.041, 0.093), (280, 286)),  # 4 samples a pixel; noise alone is 0.054 and 0.317
+        ("objects", "fast", (0.051, 0.049), (601, 360)),  # 4 samples a pixel; noise alone is 0.116 and 0.175
+        ("relighting", "balanced", (0.012,), (322,)),
     ],
 )
 def test_no_scene_gets_worse_or_dearer(runner, scenario, method, flips, passes):
