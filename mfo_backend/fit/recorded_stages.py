@@ -199,7 +199,7 @@ class RecordedFit:
 
     def _rival(self, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
         """The best of the other basins on the same problem, if it is clearly better."""
-        if not others:
+        if not others or self.course.should_stop():
             return None
         # a solve that ended for want of evaluations has more to gain than its quadratic says
         known = self._solve(problem, found, self.plan.trial_evaluations).equations.cost
