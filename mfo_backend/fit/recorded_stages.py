@@ -177,8 +177,9 @@ class RecordedFit:
 
         With the cost of a `known` solution it ends where it is nearly as good and promises nothing clearly better.
         """
-        limits = replace(self._limits(problem, evaluations), known=self.plan.basin_factor * known)
-        limits = replace(limits, wanted=CLEARLY_LOWER * known)
+        limits = replace(
+            self._limits(problem, evaluations), known=self.plan.basin_factor * known, wanted=CLEARLY_LOWER * known
+        )
         lower, upper = box or (self.table.lower, self.table.upper)
         equations = problem.equations if stage is None else self.course.watch(stage, problem.equations)
         try:

@@ -113,7 +113,7 @@ def solve_bounded(
             converged = True
             break
         tried = len(costs) >= TRIED and here.cost <= limits.known
-        if tried and lowest_promised(here, x, lower, upper) > limits.wanted:
+        if tried and here.cost + step_in_box(here, x, lower, upper)[1] > limits.wanted:
             converged = True
             break
         trial = residuals(x + step)
@@ -134,21 +134,11 @@ def solve_bounded(
     return Solution(x, here, tuple(costs), converged)
 
 
-def lowest_promised(equations: NormalEquations, x: Vector, lower: Vector, upper: Vector) -> float:
-    """The lowest cost in the box by the quadratic around `x`, without damping; at least 0."""
-    _, rise = step_in_box(equations, x, lower, upper)
-    return max(equations.cost + rise, 0.0)
-
-
 def step_in_box(equations: NormalEquations, x: Vector, lower: Vector, upper: Vector) -> tuple[Vector, float]:
-    """The step from `x` to the lowest cost in the box by the quadratic around it, and how much the cost rises by it.
+    """The step from `x` to the lowest cost in the box by the undamped quadratic, and how much the cost rises by it.
 
     `x` may lie outside where the box holds a value still: that goes there.
     """
     hessian = equations.hessian + 1e-9 * np.diag(equations.hessian).max() * np.eye(len(x))
-    step, free = np.clip(x, lower, upper) - x, lower < upper
-    if free.any():
-        slope = equations.gradient[free] + hessian[np.ix_(free, ~free)] @ step[~free]
-        inside = (lower - x)[free], (upper - x)[free]
-        step[free] = minimise_in_box(hessian[np.ix_(free, free)], slope, *inside)
+    step = minimise_in_box(hessian, equations.gradient, lower - x, upper - x)
     return step, float(equations.gradient @ step + 0.5 * step @ hessian @ step)

@@ -13,7 +13,8 @@ def minimise_in_box(hessian: Vector, gradient: Vector, lower: Vector, upper: Vec
     """The s with lower <= s <= upper that minimises gradient . s + s . hessian s / 2.
 
     Primal active-set method (J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., algorithm 16.3), exact for a
-    positive definite `hessian`; meant for some twenty unknowns. 0 has to lie inside the box.
+    positive definite `hessian`; meant for some twenty unknowns. 0 has to lie inside the box, but where that has
+    no width.
 
     Raises
     ------

@@ -11,7 +11,6 @@ from mfo_backend.solve.bounded_least_squares import (
     TRIED,
     NormalEquations,
     SolveLimits,
-    lowest_promised,
     solve_bounded,
     step_in_box,
 )
@@ -146,4 +145,3 @@ def test_the_quadratic_promises_the_least_cost_in_the_box(seed):
     step, rise = step_in_box(here, x, lower, upper)
     np.testing.assert_allclose(x + step, [0.3, *free.x], atol=1e-7)
     assert here.cost + rise == pytest.approx(free.cost, rel=1e-9)
-    assert lowest_promised(here, x, lower, upper) == pytest.approx(free.cost, rel=1e-9)
