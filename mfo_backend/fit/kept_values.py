@@ -179,7 +179,8 @@ def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: lis
         if cost(guess).cost <= KEEP_TOLERANCE * before:
             start = guess
         else:
-            start = fit.solve_within(refined.few, min(start, guess, key=lambda x: cost(x).cost), lower, upper)
-            if cost(start).cost > HOPELESS * before:
+            nearer, hopeless = min(start, guess, key=lambda x: cost(x).cost), HOPELESS * before
+            start = fit.solve_within(refined.few, nearer, lower, upper, wanted=hopeless)
+            if cost(start).cost > hopeless:
                 return None
     return fit.solve_within(refined.all, start, lower, upper)

@@ -188,15 +188,18 @@ class RecordedFit:
             nothing = np.zeros(len(start))
             return Solution(start, NormalEquations(np.inf, nothing, np.diag(nothing)), (np.inf,), True)
 
-    def solve_within(self, problem: Problem, start: Vector, lower: Vector, upper: Vector) -> Vector:
-        """A few steps with other bounds from another solution."""
-        limits = self._limits(problem, 8)
+    def solve_within(
+        self, problem: Problem, start: Vector, lower: Vector, upper: Vector, *, wanted: float = np.inf
+    ) -> Vector:
+        """A few steps with other bounds from another solution, given up where they promise no less than `wanted`."""
+        limits = replace(self._limits(problem, 8), known=np.inf, wanted=wanted)
         return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
 
     def _limits(self, problem: Problem, evaluations: int) -> SolveLimits:
         """Limits of a solve, which ends where there is noise at the change that it explains by itself."""
         noise = NOT_SEEN / problem.independent if self.scene.needs.sampled else 0.0
-        return SolveLimits(evaluations=evaluations, cost_change=max(COST_CHANGE, noise), cost_floor=COST_FLOOR)
+        change = max(COST_CHANGE, noise)
+        return SolveLimits(evaluations=evaluations, cost_change=change, cost_floor=COST_FLOOR, unseen=noise)
 
     def _rival(self, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
         """The best of the other basins on the same problem, if it is clearly better."""

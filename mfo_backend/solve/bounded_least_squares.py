@@ -44,7 +44,8 @@ class SolveLimits:
     `cost_change` is relative, `step` is relative to the width of the box, `cost_floor` is absolute. `damping` is the
     first one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away. `known` and `wanted` are
     costs, of another solution and of one that would be better: a solve that has come below the first, and whose
-    quadratic promises no less than the second, ends there.
+    quadratic promises no less than the second, ends there. `unseen` is the relative change of a cost that noise hides: a
+    solve ends where its undamped quadratic promises less, and by a rejected step that promised or cost less.
     """
 
     evaluations: int = 60
@@ -54,6 +55,7 @@ class SolveLimits:
     damping: float = 1e-2
     known: float = 0.0
     wanted: float = 0.0
+    unseen: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,9 +115,12 @@ def solve_bounded(
             converged = True
             break
         tried = len(costs) >= TRIED and here.cost <= limits.known
-        if tried and here.cost + step_in_box(here, x, lower, upper)[1] > limits.wanted:
-            converged = True
-            break
+        unseen = limits.unseen * here.cost
+        if tried or unseen:
+            rise = step_in_box(here, x, lower, upper)[1]
+            if -rise < unseen or (tried and here.cost + rise > limits.wanted):
+                converged = True
+                break
         trial = residuals(x + step)
         costs.append(trial.cost if trial.finite else np.inf)
         gain = (here.cost - trial.cost) / predicted if trial.finite else -1.0
@@ -128,8 +133,9 @@ def solve_bounded(
                 converged = True
                 break
         else:
+            converged = min(predicted, trial.cost - here.cost) < unseen if trial.finite else False
             damping, growth = damping * growth, growth * 2.0
-            if damping > 1e12:
+            if converged or damping > 1e12:
                 break
     return Solution(x, here, tuple(costs), converged)
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
@@ -131,6 +133,37 @@ def test_a_solve_without_promise_ends(known, wanted, ends_early):
     assert (len(solution.costs) == TRIED) == ends_early
     assert solution.converged
     assert ends_early or solution.equations.cost == whole.equations.cost
+
+
+@pytest.mark.parametrize("unseen", [1e-2, 1e-4])
+def test_a_solve_ends_where_noise_hides_what_is_left(unseen):
+    start, box = np.array([0.3, 0.5, 0.9, 1.2]), np.full(4, 3.0)
+    limits = SolveLimits(evaluations=100, cost_change=1e-12, step=1e-10)
+    whole = solve_bounded(never_below, start, LOWER, box, limits)
+    solution = solve_bounded(never_below, start, LOWER, box, replace(limits, unseen=unseen))
+    assert solution.converged
+    assert len(solution.costs) < len(whole.costs)
+    # the quadratic is only about right, so what is left may be a little more than it says
+    assert solution.equations.cost <= whole.equations.cost * (1.0 + 2.0 * unseen)
+
+
+@pytest.mark.parametrize(
+    ("promised", "rise", "ends"),
+    [(1e-3, 1.0, False), (1e-3, 1e-5, True), (5e-5, 1.0, True)],
+    ids=["uphill", "level", "little promised by a damped step"],
+)
+def test_a_rejected_step_within_the_noise_is_the_last(promised, rise, ends):
+    """A quadratic of the cost 1 at x = 0 whose every trial is higher."""
+    damping = 1e-9 if promised > 1e-4 else 30.0  # a damped step promises little of much
+    curvature = 2e-3
+
+    def uphill(x: np.ndarray) -> NormalEquations:
+        return NormalEquations(1.0 + (rise if x[0] else 0.0), np.array([-curvature]), np.array([[curvature]]))
+
+    limits = SolveLimits(evaluations=6, cost_change=1e-9, damping=damping, unseen=1e-4)
+    solution = solve_bounded(uphill, np.zeros(1), -np.ones(1), 2.0 * np.ones(1), limits)
+    assert solution.x[0] == 0.0
+    assert (len(solution.costs) == 2) == ends
 
 
 @pytest.mark.parametrize("seed", range(4))
