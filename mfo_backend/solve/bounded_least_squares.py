@@ -44,8 +44,8 @@ class SolveLimits:
     `cost_change` is relative, `step` is relative to the width of the box, `cost_floor` is absolute. `damping` is the
     first one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away. `known` and `wanted` are
     costs, of another solution and of one that would be better: a solve that has come below the first, and whose
-    quadratic promises no less than the second, ends there. `unseen` is the relative change of a cost that noise hides: a
-    solve ends where its undamped quadratic promises less, and by a rejected step that promised or cost less.
+    quadratic promises no less than the second, ends there. `unseen` is the relative change of a cost that noise hides:
+    a solve ends where its undamped quadratic promises less, and by a rejected step that promised or cost less.
     """
 
     evaluations: int = 60
@@ -133,7 +133,7 @@ def solve_bounded(
                 converged = True
                 break
         else:
-            converged = min(predicted, trial.cost - here.cost) < unseen if trial.finite else False
+            converged = bool(trial.finite and min(predicted, trial.cost - here.cost) < unseen)
             damping, growth = damping * growth, growth * 2.0
             if converged or damping > 1e12:
                 break
