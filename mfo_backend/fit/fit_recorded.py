@@ -20,7 +20,7 @@ from .displayed_residual import DisplayedResidual
 from .final_result import final_result
 from .finishing import finishing_residuals
 from .fit_material import FitOutcome
-from .kept_values import box_holding, keep_values
+from .kept_values import keep_values
 from .perceptual_stages import perceptual_ends
 from .picture_judge import NOISY, PictureJudge
 from .problem import Problem
@@ -28,6 +28,7 @@ from .recorded_plan import RecordedPlan
 from .recorded_stages import End, MakeResidual, MakeWeighted, RecordedFit
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
+from .unneeded_lobes import box_holding
 from .verification import check_reference, picture_errors
 from .verified_end import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from .weak_combinations import weak_combinations

@@ -13,20 +13,17 @@ from numpy.typing import NDArray
 from ..solve.bounded_least_squares import step_in_box
 from ..types.certainty import Certainty, Level
 from ..types.image import Pixels
-from ..types.parameter import ParameterTable
 from .own_noise import rows_of_samples
 from .problem import Problem, Refined
 from .recorded_stages import RecordedFit, Vector
 from .residuals import RelativeResidual
 from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
+from .unneeded_lobes import SIGNIFICANT, box_holding, moved_to_user, unneeded_lobes
 
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
 HOPELESS = 1.1  # the same, by some of the groups
-# A lobe that the user's material lacks comes in only where the picture asks for it by three standard deviations
-SIGNIFICANT = 9.0
 VISIBLE = 0.002  # mean FLIP; values that the picture does not show change it by less than half of this
-OFF = 2e-3  # of the box: a value this near its lower bound is switched off
 
 
 @dataclass(frozen=True)
@@ -55,8 +52,11 @@ def keep_values(
     found, problem = refined.x, refined.all
     judged, unseen_change = _Judged(fit, problem, weighted), _UnseenChange(fit, refined.x, seen)
     cost, certainty, spread = judged(found)
-    off = unneeded_lobes(problem, found, user, table, 0.0 if weighted else MODEL_ERROR)
-    moved = [name for name in off if not np.allclose(found[table.slice_of(name)], user[table.slice_of(name)])]
+    off = list(refined.off)
+    if not off:
+        least = 0.0 if weighted else MODEL_ERROR
+        off = unneeded_lobes(problem.equations(found), problem.independent, found, user, table, least)
+    moved = moved_to_user(off, found, user, table)
     if moved:
         allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
         simpler = _solve_holding(fit, refined, found, off)
@@ -79,41 +79,6 @@ def keep_values(
 def kept_note(names: Iterable[str]) -> str:
     """The sentence on values that went back to the user's."""
     return f"The picture does not determine {', '.join(names)}: kept as in the scene."
-
-
-def unneeded_lobes(problem: Problem, found: Vector, user: Vector, table: ParameterTable, least: float) -> list[str]:
-    """Names whose user's value is off and whose return to it the picture cannot tell from noise.
-
-    On the quadratic around `found`: with the lobes' weights the picture is nearly linear in them. `least` is the least
-    root mean square of a residual that is no noise.
-    """
-    equations = problem.equations(found)
-    noise = max(2.0 * equations.cost, least**2, 1e-30)
-
-    def change(names: list[str]) -> float:
-        """How much the cost rises with these names at the user's values and all others at their best."""
-        return step_in_box(equations, found, *box_holding(table, user, names))[1]
-
-    return dispensable(values_off(table, user), change, SIGNIFICANT * noise / (2.0 * problem.independent))
-
-
-def values_off(table: ParameterTable, user: Vector) -> list[str]:
-    """Names whose values are off in the user's material."""
-    return [p.name for p in table if np.all((user - table.lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))]
-
-
-def dispensable(names: Iterable[str], cost: Callable[[list[str]], float], limit: float) -> list[str]:
-    """Those of `names` that can be done without, one after another, the cheapest first, for at most `limit` each."""
-    left, without = list(names), []
-    now = cost(without)
-    while left:
-        rise, cheapest = min((cost([*without, name]) - now, name) for name in left)
-        if rise > limit:
-            break
-        without.append(cheapest)
-        left.remove(cheapest)
-        now += rise
-    return without
 
 
 class _Judged:
@@ -149,15 +114,6 @@ class _UnseenChange:
     def _error(self) -> float:
         assert self._seen is not None
         return self._seen(self._fit.picture(self._found))
-
-
-def box_holding(table: ParameterTable, user: Vector, names: Iterable[str]) -> tuple[Vector, Vector]:
-    """The bounds of `table` with these names held at the user's values."""
-    lower, upper = table.lower, table.upper
-    for name in names:
-        part = table.slice_of(name)
-        lower[part] = upper[part] = user[part]
-    return lower, upper
 
 
 def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: list[str]) -> Vector | None:

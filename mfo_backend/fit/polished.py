@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..solve.bounded_least_squares import NormalEquations
 from ..solve.noisy_least_squares import SafeMatrix
 from ..types.parameter import ParameterTable
-from .kept_values import SIGNIFICANT, dispensable, values_off
 from .uncertainty import WEAK_BELOW
+from .unneeded_lobes import SIGNIFICANT, dispensable, values_off
 
 Vector = NDArray[np.float64]
 

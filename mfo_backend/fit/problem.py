@@ -57,8 +57,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class Refined:
-    """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials."""
+    """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials.
+
+    `off` names values that were held at the user's, which are off, because the picture does not ask for them.
+    """
 
     x: Vector
     all: Problem
     few: Problem
+    off: tuple[str, ...] = ()

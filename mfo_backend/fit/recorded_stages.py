@@ -28,6 +28,7 @@ from .race import CLEARLY_LOWER, race
 from .recorded_plan import RecordedPlan
 from .residuals import OneSidedResidual, Residual, WeightedResidual
 from .tile_noise import TileNoise, tile_noise
+from .unneeded_lobes import solve_without_unneeded
 
 Vector = NDArray[np.float64]
 MakeResidual = Callable[[NDArray[np.float32]], Residual]
@@ -198,8 +199,9 @@ class RecordedFit:
     def _limits(self, problem: Problem, evaluations: int) -> SolveLimits:
         """Limits of a solve, which ends where there is noise at the change that it explains by itself."""
         noise = NOT_SEEN / problem.independent if self.scene.needs.sampled else 0.0
+        unseen = 0.0 if problem.near is None else noise  # the search for a start has few and large tiles
         change = max(COST_CHANGE, noise)
-        return SolveLimits(evaluations=evaluations, cost_change=change, cost_floor=COST_FLOOR, unseen=noise)
+        return SolveLimits(evaluations=evaluations, cost_change=change, cost_floor=COST_FLOOR, unseen=unseen)
 
     def _rival(self, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
         """The best of the other basins on the same problem, if it is clearly better."""
@@ -264,7 +266,18 @@ class RecordedFit:
                 del refined
                 self._record(x, grid)
                 refined = self._problems(x, make, weigh, solve_all=True)
-        return replace(refined, x=self._solve(refined.all, x, 12, stage=stage).x)
+        return self._last_steps(stage, replace(refined, x=x), weighted=weigh is not None)
+
+    def _last_steps(self, stage: Stage, refined: Refined, *, weighted: bool) -> Refined:
+        """The solution on all tiles; where residuals are in deviations of the noise, without lobes nobody asks for."""
+        x, problem = refined.x, refined.all
+        if not weighted:
+            return replace(refined, x=self._solve(problem, x, 12, stage=stage).x)
+        x, off = solve_without_unneeded(
+            lambda start, box: self._solve(problem, start, 12, stage=stage, box=box),
+            problem.equations(x), problem.independent, x, self.scene.renderer.start, self.table,
+        )  # fmt: skip
+        return replace(refined, x=x, off=off)
 
     def _recorded_near(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None

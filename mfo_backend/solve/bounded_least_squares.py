@@ -35,6 +35,7 @@ class NormalEquations:
 
 Residuals = Callable[[Vector], NormalEquations]
 TRIED = 3  # evaluations after which the quadratic is believed when it promises little
+FALSE_PROMISE = 10.0  # times what noise hides: a rejected step has shown that the quadratic says no more
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SolveLimits:
     first one; 1e-2 trusts a Gauss-Newton step but keeps weak directions from running away. `known` and `wanted` are
     costs, of another solution and of one that would be better: a solve that has come below the first, and whose
     quadratic promises no less than the second, ends there. `unseen` is the relative change of a cost that noise hides:
-    a solve ends where its undamped quadratic promises less, and by a rejected step that promised or cost less.
+    a solve ends where its undamped quadratic promises less, or `FALSE_PROMISE` times that after a rejected step.
     """
 
     evaluations: int = 60
@@ -96,7 +97,7 @@ def solve_bounded(
     damping, growth = limits.damping, 2.0
     scale = np.zeros_like(x)
     width = np.where(upper > lower, upper - lower, 1.0)  # equal bounds hold a value where it is
-    converged = False
+    converged = rejected = False
     while len(costs) < limits.evaluations and not should_stop():
         diagonal = np.diag(here.hessian)
         # a column without effect still needs a positive entry
@@ -115,7 +116,7 @@ def solve_bounded(
             converged = True
             break
         tried = len(costs) >= TRIED and here.cost <= limits.known
-        unseen = limits.unseen * here.cost
+        unseen = limits.unseen * here.cost * (FALSE_PROMISE if rejected else 1.0)
         if tried or unseen:
             rise = step_in_box(here, x, lower, upper)[1]
             if -rise < unseen or (tried and here.cost + rise > limits.wanted):
@@ -124,7 +125,8 @@ def solve_bounded(
         trial = residuals(x + step)
         costs.append(trial.cost if trial.finite else np.inf)
         gain = (here.cost - trial.cost) / predicted if trial.finite else -1.0
-        if gain > 1e-4:
+        rejected = gain <= 1e-4
+        if not rejected:
             change = here.cost - trial.cost
             x, here = x + step, trial
             damping *= max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0) ** 3)
@@ -133,9 +135,8 @@ def solve_bounded(
                 converged = True
                 break
         else:
-            converged = bool(trial.finite and min(predicted, trial.cost - here.cost) < unseen)
             damping, growth = damping * growth, growth * 2.0
-            if converged or damping > 1e12:
+            if damping > 1e12:
                 break
     return Solution(x, here, tuple(costs), converged)
 

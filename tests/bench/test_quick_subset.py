@@ -3,8 +3,13 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from mfo_backend.bench import fit_runner
 from mfo_backend.bench.assets import Assets
 from mfo_backend.bench.fit_runner import FitRunner
 from mfo_backend.bench.row import Task
@@ -15,22 +20,39 @@ def runner(tmp_path_factory):
     return FitRunner(tmp_path_factory.mktemp("bench"), 32, Assets(None))
 
 
+def _row(runner, monkeypatch, task, number):
+    """The row of a fit with the seed `number` of its scene; the first is the bench's own."""
+    settings_of = fit_runner.method_settings
+
+    def other_seed(method, scenario, scene):
+        return replace(settings_of(method, scenario, scene), seed=scene + 1000 * number)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_runner, "method_settings", other_seed)
+        return runner(task, lambda: False)
+
+
 @pytest.mark.parametrize(
-    ("scenario", "method", "flips", "passes"),
+    ("scenario", "method", "seeds", "flips", "passes"),
     [
-        # FLIP and passes when this was written:
-        ("base", "fast", (0.0006, 0.0008), (113, 130)),
-        ("noise", "fast", (0.041, 0.093), (280, 286)),  # 4 samples a pixel; noise alone is 0.054 and 0.317
-        ("objects", "fast", (0.051, 0.049), (601, 360)),  # 4 samples a pixel; noise alone is 0.116 and 0.175
-        ("relighting", "balanced", (0.012,), (322,)),
+        # mean FLIP and mean passes over the seeds when this was written:
+        ("base", "fast", 1, (0.0006, 0.0008), (113, 130)),
+        # 4 samples a pixel; noise alone is 0.054 and 0.317. One seed says little: 12 of them had 0.024 to 0.071 and
+        # 0.092 to 0.130
+        ("noise", "fast", 4, (0.043, 0.108), (387, 303)),
+        ("objects", "fast", 1, (0.051, 0.049), (601, 360)),  # 4 samples a pixel; noise alone is 0.116 and 0.175
+        ("relighting", "balanced", 1, (0.012,), (322,)),
     ],
 )
-def test_no_scene_gets_worse_or_dearer(runner, scenario, method, flips, passes):
-    rows = [runner(Task(scenario, scene, method), lambda: False) for scene in range(len(flips))]
+def test_no_scene_gets_worse_or_dearer(runner, monkeypatch, scenario, method, seeds, flips, passes):
+    scenes = range(len(flips))
+    rows = [[_row(runner, monkeypatch, Task(scenario, scene, method), k) for k in range(seeds)] for scene in scenes]
     # other compilers and processors round differently, and a fit that takes one step more is no loss
-    assert [row.flip <= 1.25 * flip + 0.002 for row, flip in zip(rows, flips, strict=True)] == [True] * len(flips)
-    assert [row.passes <= 1.3 * limit for row, limit in zip(rows, passes, strict=True)] == [True] * len(flips)
-    for row in rows:
+    found = [np.mean([row.flip for row in of_scene]) for of_scene in rows]
+    assert [value <= 1.25 * flip + 0.002 for value, flip in zip(found, flips, strict=True)] == [True] * len(flips)
+    found = [np.mean([row.passes for row in of_scene]) for of_scene in rows]
+    assert [value <= 1.3 * limit for value, limit in zip(found, passes, strict=True)] == [True] * len(flips)
+    for row in itertools.chain.from_iterable(rows):
         assert row.relit_flips
         assert all(flip < row.start_flip for flip in row.relit_flips)
         assert set(row.certainty) == set(row.recovered)

@@ -32,7 +32,7 @@ def test_the_better_valley_is_gone_on_with(others, expected):
     fit.table = SimpleNamespace(lower=np.array([-3.0]), upper=np.array([3.0]))
     fit.course = SimpleNamespace(should_stop=lambda: False)
     fit.scene = SimpleNamespace(needs=SimpleNamespace(sampled=True))
-    problem = SimpleNamespace(equations=two_valleys, independent=1e6)
+    problem = SimpleNamespace(equations=two_valleys, independent=1e6, near=None)
     left = np.array([-0.995])
     assert two_valleys(left).cost > 0.019
     rival = fit._rival(problem, left, [np.array([x]) for x in others])
