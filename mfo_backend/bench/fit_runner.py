@@ -76,7 +76,8 @@ class FitRunner:
         self._assets = assets
         self._kept_at = pictures
         self._host = host
-        self._warm: set[tuple[str, str]] = set()
+        # scenarios, methods and lights: a light probe of another size needs other kernels
+        self._warm: set[tuple[str, str, str]] = set()
         self._at: tuple[str, int] | None = None
         self._scene: BenchScene
         self._judge: Judge
@@ -86,12 +87,13 @@ class FitRunner:
         self._open(task, pictures)
         settings = method_settings(task.method, self._scene.scenario, task.scene)
         warm_up = 0.0
-        if (task.scenario, task.method) not in self._warm:
+        kind = (task.scenario, task.method, self._scene.light)
+        if kind not in self._warm:
             began = time.monotonic()
             measured = self._fit(task, warm_up_settings(settings), should_stop)
             if measured.outcome.result.status is Status.CANCELLED:
                 return self._row(task, measured, 0.0)
-            self._warm.add((task.scenario, task.method))
+            self._warm.add(kind)
             warm_up = time.monotonic() - began
         return self._row(task, self._fit(task, settings, should_stop), warm_up)
 

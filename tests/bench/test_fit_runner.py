@@ -40,6 +40,14 @@ def test_fast_solves_the_reduced_set(runner):
         assert set(r.parameter_errors) == {"base_color", "roughness", "metallic", "specular"}
 
 
+def test_every_light_is_warmed_up_for(runner):
+    rows = [runner(Task("noise", scene, "balanced"), never) for scene in range(4)]
+    lights = [row.light for row in rows]
+    new = [light not in lights[:number] for number, light in enumerate(lights)]
+    assert sum(new) > 1  # a probe of another size has kernels of its own, which are no part of a fit's time
+    assert [row.warm_up_seconds > 0 for row in rows] == new
+
+
 def test_the_truth_itself_has_no_error(runner):
     runner(Task("parameters", 0, "fast"), never)
     judge = runner._judge
