@@ -18,7 +18,7 @@ COUNT = 400  # independent residuals
 
 
 class Problem:
-    """Linear residuals of unit noise; `bend` times sheen squared is what their derivatives at sheen 0.1 do not know."""
+    """Linear residuals of unit noise; below sheen 0.1 one more grows by `bend`, of which no derivative knows."""
 
     def __init__(self, truth, deviations, *, bend=0.0, seed=0):
         rng = np.random.default_rng(seed)
@@ -32,9 +32,8 @@ class Problem:
     def equations(self, x):
         away = min(x[2] - 0.1, 0.0)
         residual = self._jacobian @ x - self._data + self._bend * away * self._bent
-        jacobian = self._jacobian.copy()
-        gram = jacobian.T @ jacobian / COUNT
-        return NormalEquations(0.5 * float(residual @ residual) / COUNT, jacobian.T @ residual / COUNT, gram)
+        gradient, gram = (self._jacobian.T @ right / COUNT for right in (residual, self._jacobian))
+        return NormalEquations(0.5 * float(residual @ residual) / COUNT, gradient, gram)
 
     def solve(self, start, box):
         self.solved.append(box)
