@@ -220,10 +220,13 @@ def test(arguments: list[str]) -> int:
     if arguments[:1] == ["--bpy"]:
         return test_other_bpy(arguments[1] if len(arguments) > 1 else "", arguments[2:])
     python = str(venv_program("python"))
+    # Two at a time: a test compiles kernels or starts a Blender on one core for about as long as it renders on all. The
+    # tests of a file share fixtures.
+    two_at_a_time = ["-n", "2", "--dist", "loadfile"]
     checks = [["ruff", "check"], ["ruff", "format", "--check"], ["basedpyright"]]
     commands = [] if arguments else [[python, "-m", *check] for check in checks]
     codes = [subprocess.run(command, cwd=ROOT).returncode for command in commands]
-    codes.append(subprocess.run([python, "-m", "pytest", *arguments], cwd=ROOT).returncode)
+    codes.append(subprocess.run([python, "-m", "pytest", *(arguments or two_at_a_time)], cwd=ROOT).returncode)
     return max(codes)
 
 

@@ -34,6 +34,9 @@ class RecordedPlan:
         Those that they and the last stage look at where every light is exact: without noise more say nothing new.
     starts
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
+    same_cost, agreement_evaluations
+        Where light is sampled, two opposite starts get this many evaluations before the scan. It is left out where
+        their costs differ by no more than this factor (0: never).
     trial_evaluations
         After as many only starts within `keep_factor` of the best cost go on.
     seen_rms, solved_rms
@@ -57,6 +60,8 @@ class RecordedPlan:
     exact_start_lanes: int = 20_000
     refine_lanes: int = 80_000
     starts: int = 3
+    same_cost: float = 1.02
+    agreement_evaluations: int = 12
     trial_evaluations: int = 10
     keep_factor: float = 10.0
     seen_rms: float = 5e-3
@@ -73,4 +78,6 @@ class RecordedPlan:
         """
         if preset == "fast":
             return RecordedPlan(grid_last=3, too_noisy=0.1, low_noise=0.08, grid_finest=8)
+        if preset == "best":  # goes on from several solutions
+            return RecordedPlan(same_cost=0.0)
         return RecordedPlan()

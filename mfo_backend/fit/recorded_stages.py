@@ -21,7 +21,7 @@ from .choose_groups import all_groups, detail_grid, fewer_groups
 from .course import Course, Stage
 from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
-from .global_start import different_nodes, scan
+from .global_start import agreeing_ends, best_starts, random_start, scan
 from .picture_judge import PictureJudge
 from .problem import Problem, Refined
 from .race import CLEARLY_LOWER, race
@@ -141,17 +141,20 @@ class RecordedFit:
             groups = all_groups(self.paths, TILE if sampled else 1)
             lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
             few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
-            nodes = []
-            if plan.scan:
+            starts = []
+            if sampled and plan.same_cost:
+                starts = agreeing_ends(
+                    lambda start: self._solve(few, start, plan.agreement_evaluations, stage=stage),
+                    self.table, self.scene.model.scanned, plan.same_cost,
+                )  # fmt: skip
+            if not starts and plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)
-                stage.vector = nodes[0].x
+                starts = best_starts(nodes, plan.starts)
+            stage.vector = starts[0] if starts else None
         with self.course.stage("start") as stage:
             lanes = plan.start_lanes if sampled else plan.exact_start_lanes
             more = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
-            starts = [node.x for node in different_nodes(nodes, plan.starts)]
-            metals = [node for node in nodes if node.metal]
-            starts += [node.x for node in metals[:2] if not any(node.x is x for x in starts)]
-            starts += [renderer.start, _random_start(self.table.lower, self.table.upper, self.seed)]
+            starts += [renderer.start, random_start(self.table, self.seed)]
             basins = self._race(stage, more, starts)
             if not np.isfinite(basins[0].equations.cost):
                 raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
@@ -394,7 +397,3 @@ class RecordedFit:
 def _finer(grid: NDArray[np.int64]) -> NDArray[np.int64]:
     """The grids of a recording at the solution where lights are exact, from those for its pictures' detail."""
     return np.maximum(np.minimum(FINER * grid, FINEST), grid)
-
-
-def _random_start(lower: Vector, upper: Vector, seed: int) -> Vector:
-    return lower + (upper - lower) * np.random.default_rng(seed).uniform(0.1, 0.9, len(lower))
