@@ -22,8 +22,8 @@ SECOND_NODES = (0.3, 0.9)
 # colour or by full metallic, and the two are different basins. So every roughness is solved as a metal once, too.
 METAL = 0.98
 METAL_SECOND_NODES = (0.6,)
-# What wrong solutions mistake for each other. Where fits from both end at the same cost, nodes seldom lead lower: by half
-# a per cent or more in 3 of 61 scenes with noise
+# What wrong solutions mistake for each other. Where fits from both end at the same cost, nodes seldom lead lower: by
+# half a per cent or more in 3 of 61 scenes with noise
 OPPOSITE, OPPOSITE_WIDTH = (1.0 - METAL, METAL), 0.3
 
 

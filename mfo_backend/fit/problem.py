@@ -13,7 +13,7 @@ from ..render.recorded_image import RecordedImage
 from ..render.recorded_paths import LaneGroups
 from ..render.renderer import Vector
 from ..solve.bounded_least_squares import NormalEquations
-from .own_noise import unbiased_equations
+from .own_noise import rows_of_samples, unbiased_equations
 from .residuals import Residual, normal_equations
 
 
@@ -48,6 +48,14 @@ class Problem:
         return float(
             np.sqrt(np.mean(np.square(two.half_difference[:, :, 0] / (radiance + 0.1 * radiance.mean() + 1e-12))))
         )
+
+    def own_share(self, x: Vector) -> float:
+        """Part of the mean square residual at `x` that is the recording's own noise, 0 for one sample of the light."""
+        rows, half_difference = rows_of_samples(self.evaluate.samples(x), self.residual)
+        if half_difference is None:
+            return 0.0
+        own, all_ = (float(np.mean(np.square(values[:, :, 0]))) for values in (half_difference, rows))
+        return min(own / max(all_, 1e-300), 1.0)
 
     @property
     def independent(self) -> float:

@@ -21,6 +21,10 @@ class RecordedPlan:
         Where the noise of the recording at the solution is above the first of these shares of a tile's radiance, as
         that of mirrors under small lights is, it is made anew with as many rays as make it the second, but no more
         than the square of the third.
+    most_own, low_own, clean_lanes
+        The same where the recording's own noise is more than the first of these parts of the mean square residual, as
+        it is under references of little noise: with as many rays as make it the second, while the recording has no more
+        lanes than the third. Values are as exact as all lanes together, so large pictures seldom need it.
     side_last
         Pixels along each side of the tiles of the last stage where light is sampled. Quarters of the tiles of the
         stages before see twice the detail and lose fewer pixels to the silhouette; single pixels see too much of the
@@ -52,6 +56,9 @@ class RecordedPlan:
     too_noisy: float = 0.07
     low_noise: float = 0.06
     grid_finest: int = 16
+    most_own: float = 0.3
+    low_own: float = 0.2
+    clean_lanes: int = 2_000_000
     side_last: int = 2
     first_tiles: int = 1000
     scan_lanes: int = 20_000
@@ -77,7 +84,7 @@ class RecordedPlan:
         time, and more error (docs/recorded_paths.md has both).
         """
         if preset == "fast":
-            return RecordedPlan(grid_last=3, too_noisy=0.1, low_noise=0.08, grid_finest=8)
+            return RecordedPlan(grid_last=3, too_noisy=0.1, low_noise=0.08, grid_finest=8, most_own=1.0)
         if preset == "best":  # goes on from several solutions
             return RecordedPlan(same_cost=0.0)
         return RecordedPlan()

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from ..types.errors import UnrecordableError
 from ..types.image import Pixels
 from .choose_groups import all_groups, detail_grid, fewer_groups
 from .course import Course, Stage
+from .finer_grid import finer_grid
 from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import agreeing_ends, best_starts, random_start, scan
@@ -294,18 +295,12 @@ class RecordedFit:
             x = self._solve(few, start, 12, stage=stage).x
             before, after = few.own_noise(start), few.own_noise(x)
             moved = self._moved(few, start, x) > MOVED or after > NOISIER * before
-            finer = self._finer(grid, after)
+            finest = partial(self.scene.finest_grid, SAMPLES)
+            finer = finer_grid(grid, after, few.own_share(x), self.plan, finest)
             if not (moved or finer > grid) or self.recordings == most or self.course.should_stop():
                 return x, grid
             del few  # and with it the recording
             start, grid = x, finer
-
-    def _finer(self, grid: int, noise: float) -> int:
-        """The grid with which the recording's own noise, `noise` with this one, is low enough."""
-        if noise < self.plan.too_noisy:
-            return grid
-        wanted = math.ceil(grid * noise / self.plan.low_noise)
-        return max(min(wanted, self.plan.grid_finest, self.scene.finest_grid(SAMPLES)), grid)
 
     def _record(self, x: Vector, grid: int | NDArray[np.int64]) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""

@@ -151,9 +151,10 @@ class RecordedScene:
         self.renderer.passes += 1.0
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
-    def finest_grid(self, samples: int) -> int:
-        """The finest grid with which a recording of so many samples of the light still holds every tile."""
-        return int(math.sqrt(MOST_LANES / (2 * samples * self._covered)))
+    def finest_grid(self, samples: int, lanes: float) -> int:
+        """The finest grid with which a recording of so many samples of the light holds every tile in so many lanes, or
+        in those that any recording may have."""
+        return int(math.sqrt(min(lanes, MOST_LANES) / (2 * samples * self._covered)))
 
     def _highlights(self, vector: NDArray[np.float64]) -> Highlights:
         """How finely highlights of the material `vector` are recorded: an anisotropic lobe is narrow along one axis."""

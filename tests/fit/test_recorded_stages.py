@@ -51,7 +51,7 @@ NEVER = float("inf")
 
 
 def test_a_recording_that_is_too_old_is_made_anew(refined):
-    plan = RecordedPlan(too_noisy=NEVER)
+    plan = RecordedPlan(too_noisy=NEVER, most_own=1.0)
     stale, recordings = refined(plan, MOVED=NEVER, NOISIER=NEVER)
     assert recordings == 1
     assert stale > 0.05  # a highlight of roughness 0.12, seen by directions for 0.45
@@ -63,9 +63,11 @@ def test_a_recording_that_is_too_old_is_made_anew(refined):
 
 
 def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):
-    coarse = RecordedPlan(grid_last=2, too_noisy=NEVER)
+    coarse = RecordedPlan(grid_last=2, too_noisy=NEVER, most_own=1.0)
     noisy, recordings = refined(coarse, MOVED=NEVER, NOISIER=NEVER)
     assert recordings == 1
-    error, recordings = refined(replace(coarse, too_noisy=0.07), MOVED=NEVER, NOISIER=NEVER)
-    assert recordings > 1
-    assert error < 0.5 * noisy
+    # noisy to the eye, and noisier than the reference: either guard alone sees it
+    for guard in ({"too_noisy": 0.07}, {"most_own": 0.3}):
+        error, recordings = refined(replace(coarse, **guard), MOVED=NEVER, NOISIER=NEVER)
+        assert recordings > 1, guard
+        assert error < 0.5 * noisy, guard
