@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from ..solve.bounded_least_squares import step_in_box
 from ..types.certainty import Certainty, Level
 from ..types.image import Pixels
+from ..types.parameter import ParameterTable
 from .own_noise import rows_of_samples
 from .problem import Problem, Refined
 from .recorded_stages import RecordedFit, Vector
 from .residuals import RelativeResidual
 from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
-from .unneeded_lobes import SIGNIFICANT, box_holding, moved_to_user, unneeded_lobes
+from .unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
 
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
@@ -68,17 +69,39 @@ def keep_values(
     notes: list[str] = []
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
     if unseen and len(unseen) < len(table):
-        held = [*unseen, *(name for name in off if name not in unseen)]
-        kept = _solve_holding(fit, refined, found, held)
-        if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
-            found, off = kept, held
-            notes.append(kept_note(unseen))
+        for back in _sets_to_return(unseen, off, problem, found, user, table):
+            held = [*back, *(name for name in off if name not in back)]
+            kept = _solve_holding(fit, refined, found, held)
+            if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
+                found, off = kept, held
+                notes.append(kept_note(back))
+                break
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
 
 
 def kept_note(names: Iterable[str]) -> str:
     """The sentence on values that went back to the user's."""
     return f"The picture does not determine {', '.join(names)}: kept as in the scene."
+
+
+def _sets_to_return(
+    unseen: list[str], off: list[str], problem: Problem, found: Vector, user: Vector, table: ParameterTable
+) -> Iterator[list[str]]:
+    """All values the picture does not determine, then those of them that go back without any sign of it.
+
+    One of them alone may be free where all together are not: they trade against each other.
+    """
+    yield unseen
+    equations = problem.equations(found)
+
+    def change(names: list[str]) -> float:
+        return step_in_box(equations, found, *box_holding(table, user, [*names, *off]))[1]
+
+    limit = SIGNIFICANT * equations.cost / problem.independent
+    some = dispensable([name for name in unseen if name not in off], change, limit)
+    while some:
+        yield some
+        some = some[: len(some) // 2]  # the cheapest
 
 
 class _Judged:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,9 @@ from mfo_backend.fit import kept_values
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.render.renderer import load_renderer
+from mfo_backend.solve.bounded_least_squares import NormalEquations
 from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.parameter import Parameter, ParameterTable
 from tests.render.scenes import POINT, write_scene
 
 NAMES = ["base_color", "roughness", "sheen", "sheen_tint"]
@@ -52,3 +56,27 @@ def test_the_error_to_the_eye_may_grow_by_a_trace_only():
     assert unseen(np.array([1.0]))
     assert not unseen(np.array([2.0]))
     assert kept_values._UnseenChange(Fit(), np.array([0.0]), None)(np.array([2.0]))
+
+
+TRADED = ParameterTable([Parameter(name, 1, 0.0, 1.0, 0.5) for name in ("roughness", "sheen", "sheen_tint", "coat")])
+
+
+def test_values_that_trade_go_back_one_by_one_where_all_together_would_be_seen():
+    # the picture shows the sum of sheen and coat, the roughness, and nothing of the tint
+    shown = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    found, user = np.array([0.3, 0.6, 0.9, 0.5]), np.array([0.8, 0.4, 0.5, 0.1])
+
+    def equations(x):
+        residual = shown @ (x - found)
+        return NormalEquations(0.5 * (float(residual @ residual) + 1e-4), shown.T @ residual, shown.T @ shown)
+
+    problem = SimpleNamespace(equations=equations, independent=1000.0)
+    unseen = ["sheen", "sheen_tint", "coat"]
+    sets = list(kept_values._sets_to_return(unseen, [], problem, found, user, TRADED))
+    assert sets[0] == unseen  # the sum would be 0.5 instead of 1.1
+    assert "sheen_tint" in sets[1]
+    assert len(sets[1]) == 2  # and one of the others, which the last one makes up for
+    assert len(sets[2]) == 1
+    # what is off already stays off: then the other one of the two cannot move
+    sets = list(kept_values._sets_to_return(unseen, ["coat"], problem, np.array([0.3, 1.0, 0.9, 0.1]), user, TRADED))
+    assert sets[1:] == [["sheen_tint"]]
