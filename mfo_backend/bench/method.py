@@ -61,6 +61,7 @@ _BALANCED = OUR_METHODS["balanced"].settings
 ABLATIONS = {
     "balanced-no-scan": Method(_BALANCED, RecordedPlan(scan=False, same_cost=0.0), compares_with="balanced"),
     "balanced-full-scan": Method(_BALANCED, RecordedPlan(same_cost=0.0), compares_with="balanced"),
+    "balanced-few-rays": Method(_BALANCED, RecordedPlan(most_own=1.0), compares_with="balanced"),
     "balanced-no-subset": Method(_BALANCED, _EVERYTHING, compares_with="balanced"),
     "mfo-hdr-kept": replace(_paper(("mse", "flip"), "hdr", keep_optimizer_state=True), compares_with="mfo-hdr"),
     "mfo-ldr-kept": replace(_paper(("mse", "flip"), "ldr", keep_optimizer_state=True), compares_with="mfo-ldr"),
