@@ -74,7 +74,7 @@ def agreeing_ends(
 ) -> list[Vector]:
     """Where fits from a dielectric and from a metal in the middle of the box end, the better one first.
 
-    None where the costs differ by more than the factor `same_cost`, or where the material's metallic is given.
+    Empty where the costs differ by more than the factor `same_cost`, or where the material's metallic is given.
     """
     ends = []
     for metallic in OPPOSITE if "metallic" in table.names else ():
