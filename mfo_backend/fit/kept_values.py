@@ -98,7 +98,10 @@ def _sets_to_return(
         return step_in_box(equations, found, *box_holding(table, user, [*names, *off]))[1]
 
     limit = SIGNIFICANT * equations.cost / problem.independent
-    some = dispensable([name for name in unseen if name not in off], change, limit)
+    others = [name for name in unseen if name not in off]
+    some = dispensable(others, change, limit)
+    if len(some) == len(others):  # these have just been tried
+        some = some[: len(some) // 2]
     while some:
         yield some
         some = some[: len(some) // 2]  # the cheapest

@@ -46,8 +46,12 @@ def one_basin(x):
     return x - np.array([0.2, 0.4, 0.6, 0.3, 0.7])
 
 
+def one_noisy_basin(x):
+    return np.concatenate([one_basin(x), [0.1]])  # what no value explains
+
+
 def two_basins(x):
-    """A low end for metals and another, `HIGHER`, for dielectrics."""
+    """A low end for metals and a higher one for dielectrics."""
     m = x[METALLIC][0]
     return np.concatenate([x[:4] - 0.5, [m * (1.0 - m) * 4.0, 0.3 + 0.1 * (1.0 - m)]])
 
@@ -66,8 +70,7 @@ def test_opposite_starts_that_end_in_one_place_agree():
     assert [start[METALLIC][0] for start in starts] == pytest.approx([1 - METAL, METAL])
     assert all(start[ROUGHNESS][0] == OPPOSITE_WIDTH for start in starts)
     assert len(ends) == 0  # noise-free: both costs are near 0, and their ratio says nothing
-    noisy = lambda x: np.concatenate([one_basin(x), [0.1]])  # noqa: E731  what no value explains
-    ends = agreeing_ends(solver(noisy, []), TABLE, SCANNED, 1.02)
+    ends = agreeing_ends(solver(one_noisy_basin, []), TABLE, SCANNED, 1.02)
     assert len(ends) == 2
     for end in ends:  # the solver stops where steps promise a 1e-8 of the cost
         np.testing.assert_allclose(end, [0.2, 0.4, 0.6, 0.3, 0.7], atol=1e-4)

@@ -80,3 +80,17 @@ def test_values_that_trade_go_back_one_by_one_where_all_together_would_be_seen()
     # what is off already stays off: then the other one of the two cannot move
     sets = list(kept_values._sets_to_return(unseen, ["coat"], problem, np.array([0.3, 1.0, 0.9, 0.1]), user, TRADED))
     assert sets[1:] == [["sheen_tint"]]
+
+
+def test_no_set_is_tried_twice():
+    """The quadratic may promise that all can go back where the solve has just said no."""
+
+    def equations(x):
+        return NormalEquations(0.5e-4, np.zeros(4), np.diag([1.0, 0.0, 0.0, 0.0]))
+
+    problem, unseen = SimpleNamespace(equations=equations, independent=1000.0), ["sheen", "sheen_tint", "coat"]
+    for off in ([], ["coat"]):
+        sets = list(kept_values._sets_to_return(unseen, off, problem, np.full(4, 0.3), np.full(4, 0.8), TRADED))
+        held = [frozenset([*names, *off]) for names in sets]
+        assert len(held) == 2
+        assert len(set(held)) == 2
