@@ -20,10 +20,9 @@ import numpy as np
 from ..material.own_memory import own_memory
 
 
-def even_points(dimensions: int, number: mi.UInt32, block: mi.UInt32, seed: int) -> list[mi.Float]:
-    """Coordinates in [0, 1) of points `number` of the sequence, each `block` of them with a shift of its own."""
+def even_points(dimensions: int, number: mi.UInt32, block: mi.UInt32, blocks: int, seed: int) -> list[mi.Float]:
+    """Coordinates in [0, 1) of points `number` of the sequence, each `block` below `blocks` with a shift of its own."""
     rng = np.random.default_rng([seed, dimensions])
-    blocks = 1 + int(dr.max(block)[0])
     shifts = rng.integers(0, 2**32, (dimensions, blocks), dtype=np.uint32)
     # the multiples wrap modulo 2^32, so that no digit is lost
     words = (

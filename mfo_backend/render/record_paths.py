@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,8 +27,6 @@ from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_o
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
 
-NEXT_SAMPLE = 0x0C2B2AE3  # added to the seed for each further sample of the light
-
 
 @dataclass(frozen=True)
 class RecordSettings:
@@ -35,15 +34,15 @@ class RecordSettings:
 
     `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and
     directional lights take one sample for each of them; the other lights one light sample and one sample of the
-    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out, and so does
-    `direct_only`, which needs no other kernels than a recording with that light. `hide_emitters`
+    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
     `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
     are the only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more
     rays start where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many
-    independent `samples`.
+    independent `samples`, or in samples of the same directions if they are `alike`. The first `direct_samples` leave
+    light over other surfaces out and need no other kernels than a recording with it.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -57,13 +56,14 @@ class RecordSettings:
     light_paths: LightPaths | None = None
     pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
-    direct_only: bool = False
     samples: int = 1
+    alike: bool = False
+    direct_samples: int = 0
 
 
 @dataclass
 class _Lanes:
-    """One technique's lanes before they are merged."""
+    """One technique's lanes before they are merged; positions of sample s follow s times the pixels."""
 
     wi: mi.Vector3f
     wo: mi.Vector3f
@@ -74,12 +74,18 @@ class _Lanes:
 
 @dataclass
 class _Hits:
-    """First hits of the camera rays on the target."""
+    """First hits of the camera rays on the target, at positions below `pixels`."""
 
     si: Any
     position: mi.UInt32
     share: mi.Float
     held: tuple[Any, ...]
+    pixels: int
+
+    def of_rays(self, ray: mi.UInt32) -> _Hits:
+        """Those of some rays, which may repeat."""
+        si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
+        return _Hits(si, position, share, tuple(dr.gather(type(a), a, ray) for a in self.held), self.pixels)
 
 
 def record_paths(
@@ -127,12 +133,13 @@ def record_paths(
             values = plugin.values_at(si, mi.Bool(True))
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
         dr.eval(si, position, filter_weight, held)
-        hits = _Hits(si, position, filter_weight, held)
+        pixels = len(rays.pixel)
+        hits = _Hits(si, position, filter_weight, held, pixels)
         exact = _delta_lights(scene, hits)
-        seeds = (settings.seed + sample * NEXT_SAMPLE for sample in range(settings.samples))
-        samples = [exact + _sampled_lights(scene, hits, replace(settings, seed=seed), lamps) for seed in seeds]
+        lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
+        lanes += _sampled_lights(scene, hits, settings, lamps)
 
-        covered, coverage = _coverage(len(rays.pixel), position, filter_weight)
+        covered, coverage = _coverage(pixels, position, filter_weight)
         constant = _background(scene, rays, on_target, covered, settings)
         if glow is not None:
             pixel = rays.pixel[np.array(position)]
@@ -140,7 +147,7 @@ def record_paths(
             dr.eval(glow)
             for channel in range(3):
                 flat[:, channel] += np.bincount(pixel, glow[channel].numpy(), len(flat))
-        merged = _merge(samples, rays, covered, coverage, constant, settings.held)
+        merged = _merge(lanes, settings, rays, covered, coverage, constant)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged
@@ -156,12 +163,18 @@ def indirect_share(
     stride: int = 1,
 ) -> float:
     """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
-    with_others = RecordSettings(grid=1, depth=depth, stride=stride, two_sided=two_sided, light_paths=light_paths)
-    direct_only = replace(with_others, direct_only=True)
+    settings = RecordSettings(
+        grid=1, depth=depth, stride=stride, two_sided=two_sided, light_paths=light_paths,
+        samples=2, alike=True, direct_samples=1,
+    )  # fmt: skip
     with dr.suspend_grad():
-        direct, everything = (record_paths(scene, shape, s, allow_dark=True) for s in (direct_only, with_others))
-        lit = [float(dr.sum(mi.luminance(p.weight) * p.wo.z)[0]) if p.lanes else 0.0 for p in (direct, everything)]
-    return (lit[1] - lit[0]) / max(lit[0], 1e-30)
+        paths = record_paths(scene, shape, settings, allow_dark=True)
+        if not paths.lanes:
+            return 0.0
+        lit = mi.luminance(paths.weight) * paths.wo.z
+        with_others = dr.arange(mi.UInt32, paths.lanes) >= dr.opaque(mi.UInt32, int(paths.first[1, 0]))
+        everything, direct = (float(dr.sum(dr.select(some, lit, 0.0))[0]) for some in (with_others, ~with_others))
+    return (everything - direct) / max(direct, 1e-30)
 
 
 def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:
@@ -207,7 +220,7 @@ def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
 def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
     """One exact sample for each light of no extent."""
     si = hits.si
-    lanes = []
+    started = []
     for emitter in scene.emitters():
         if not mi.has_flag(emitter.flags(), DELTA):
             continue
@@ -215,43 +228,51 @@ def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
         wo = si.to_local(ds.d)
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
-        lanes.append(_compress(hits, wo, value * hits.share, lit))
-    return lanes
+        started.append(_lit(hits, wo, value * hits.share, lit))
+    return [kept() for kept in started]
 
 
 def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps) -> list[_Lanes]:
-    """A light sample and a proposal sample for each camera ray, weighted by the balance heuristic (Veach 1995)."""
-    si, position, share = hits.si, hits.position, hits.share
+    """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
     everywhere = list(scene.emitters())
     extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
     indirect = settings.depth > 2
     if not extended and not indirect:
         return []
-    count = dr.width(position)
-    sampler = fresh_sampler(settings.seed + 0x51ED270, count)
-    number, tile = dr.arange(mi.UInt32, count), position // TILE**2
+    # all samples in one launch: tracing the scene in Python takes longer than to launch it
+    count = dr.width(hits.position)
+    lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
+    sample = lane // rays
+    number = lane - sample * rays
+    hits = hits.of_rays(number)
+    si, share = hits.si, hits.share
+    tiles = hits.pixels // TILE**2 + 1
+    tile = hits.position // TILE**2 + sample * dr.opaque(mi.UInt32, 0 if settings.alike else tiles)
+    tiles *= settings.samples
+    hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
+    sampler = fresh_sampler(settings.seed + 0x51ED270, settings.samples * count)
     proposal = settings.proposal
     front = si.wi.z > 0.0
     # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
     # would be most of the noise, 3 % of a tile for two lights
     choice = 1.0 / max(len(extended), 1)
-    lanes = []
+    started = []
     if extended:
         table = own_memory(np.array(extended), mi.UInt32)
-        turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, 1 + int(dr.max(position)[0])).next_1d() * 65536)
-        pick = (number + dr.gather(mi.UInt32, turns, position)) % len(extended)
+        turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, tiles).next_1d() * 65536)
+        pick = (number + dr.gather(mi.UInt32, turns, tile)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
         # one light's samples follow each other in the sequence
-        u = even_points(2, number // len(extended), tile, settings.seed + 0x51ED270)
+        u = even_points(2, number // len(extended), tile, tiles, settings.seed + 0x51ED270)
         ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         light_density = ds.pdf * choice
         mis = light_density / (light_density + proposal.density(si.wi, wo))
-        lanes.append(_compress(hits, wo, value * (share * mis / choice), lit))
+        started.append(_lit(hits, wo, value * (share * mis / choice), lit))
 
-    lobe, *u = even_points(3, number, tile, settings.seed + 0x51ED270)
+    lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u))
     density = proposal.density(si.wi, wo)
     valid = front & (wo.z > 0.0) & (density > 0.0)
@@ -271,12 +292,12 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         if settings.light_paths is not None:
             value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo, valid)
             before = (likely, value / dr.maximum(likely, 1e-12))
-        traced = valid & far.is_valid() & dr.opaque(mi.Bool, not settings.direct_only)
+        traced = valid & far.is_valid() & (sample >= dr.opaque(mi.UInt32, settings.direct_samples))
         radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, traced, before=before)
         weight += dr.select(traced, dr.maximum(radiance - emission, 0.0) / density, 0.0)
     # the share may be negative, where the pixel filter is
-    lanes.append(_compress(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
-    return lanes
+    started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
+    return [kept() for kept in started]
 
 
 def _traced(
@@ -302,19 +323,24 @@ def _traced(
     return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, active=active, before=before)[0]
 
 
-def _compress(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> _Lanes:
+def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], _Lanes]:
+    """Start to compute lanes; returns what waits for those to keep, while the next technique is traced in Python."""
     weight = mi.Color3f(weight)
     keep = keep & dr.all(dr.isfinite(weight))
     wi = hits.si.wi
     dr.eval(wi, wo, weight, keep)
-    index = dr.compress(keep)
-    return _Lanes(
-        dr.gather(mi.Vector3f, wi, index),
-        dr.gather(mi.Vector3f, wo, index),
-        dr.gather(mi.Color3f, weight, index),
-        dr.gather(mi.UInt32, hits.position, index),
-        tuple(dr.gather(type(value), value, index) for value in hits.held),
-    )
+
+    def kept() -> _Lanes:
+        index = dr.compress(keep)
+        return _Lanes(
+            dr.gather(mi.Vector3f, wi, index),
+            dr.gather(mi.Vector3f, wo, index),
+            dr.gather(mi.Color3f, weight, index),
+            dr.gather(mi.UInt32, hits.position, index),
+            tuple(dr.gather(type(value), value, index) for value in hits.held),
+        )
+
+    return kept
 
 
 def _coverage(pixels: int, position: mi.UInt32, share: mi.Float) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
@@ -348,18 +374,15 @@ def _background(
 
 
 def _merge(
-    samples: list[list[_Lanes]],
+    lanes: list[_Lanes],
+    settings: RecordSettings,
     rays: PrimaryRays,
     covered: NDArray[np.int64],
     coverage: NDArray[np.float32],
     constant: NDArray[np.float32],
-    names: tuple[str, ...],
 ) -> RecordedPaths:
     """One lane array, ordered by sample, tile and pixel."""
-    lanes = [part for sample in samples for part in sample]
-    pixels = len(rays.pixel)
-    position = [np.array(part.position) + s * pixels for s, sample in enumerate(samples) for part in sample]
-    position = np.concatenate(position or [np.zeros(0, np.uint32)])
+    position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
     rank = np.empty(len(position), np.uint32)
     rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
     wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
@@ -374,8 +397,9 @@ def _merge(
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
         begin = end
     dr.eval(wi, wo, weight, held)
-    count = np.bincount(position, minlength=len(samples) * pixels).reshape(-1, pixels)[:, covered]
-    first = np.concatenate([np.zeros((len(samples), 1), int), np.cumsum(count, axis=1)], axis=1)
+    samples, pixels = settings.samples, len(rays.pixel)
+    count = np.bincount(position, minlength=samples * pixels).reshape(samples, pixels)[:, covered]
+    first = np.concatenate([np.zeros((samples, 1), int), np.cumsum(count, axis=1)], axis=1)
     first[1:] += np.cumsum(first[:-1, -1])[:, None]
-    values = dict(zip(names, held, strict=False))
+    values = dict(zip(settings.held, held, strict=False))
     return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant, values)

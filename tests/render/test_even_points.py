@@ -24,7 +24,8 @@ def even_points():
 
     def points(dimensions, first, block, seed):
         number = mi.UInt32(np.arange(first, first + COUNT, dtype=np.uint32))
-        return np.array([np.array(u) for u in even_points(dimensions, number, mi.UInt32(block) + 0 * number, seed)])
+        found = even_points(dimensions, number, mi.UInt32(block) + 0 * number, 8, seed)
+        return np.array([np.array(u) for u in found])
 
     return points
 

@@ -69,11 +69,11 @@ def test_direct_light_alone_is_the_same_with_and_without_the_kernels_of_other_li
     renderer, _ = recorded_scene(tmp_path, AREA + FLOOR, depth=5)
     from mfo_backend.render.record_paths import RecordSettings, record_paths  # needs the variant
 
-    settings = RecordSettings(grid=3, seed=4, depth=5, direct_only=True)
+    settings = RecordSettings(grid=3, seed=4, depth=5, direct_samples=1)
     some, without = (record_paths(renderer.scene, renderer.shape, s) for s in (settings, replace(settings, depth=2)))
     assert some.lanes == without.lanes
     np.testing.assert_allclose(np.array(some.weight), np.array(without.weight), rtol=1e-5)
-    everything = record_paths(renderer.scene, renderer.shape, replace(settings, direct_only=False))
+    everything = record_paths(renderer.scene, renderer.shape, replace(settings, direct_samples=0))
     assert np.array(everything.weight).sum() > 1.02 * np.array(some.weight).sum()
 
 
