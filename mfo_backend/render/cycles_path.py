@@ -50,9 +50,13 @@ class CyclesPath(RBIntegrator):
         state_in: Any = None,
         active: Any = True,
         before: tuple[Any, Any] | None = None,
+        met: Any = None,
         **_: Any,
     ) -> tuple[Any, Any, list[Any], Any]:
-        """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it."""
+        """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it.
+
+        What `ray` has `met`, if that is known, is not looked for again, and its emission is left out.
+        """
         primal = mode == dr.ADMode.Primal
         lamps = SceneLamps(scene)
         context = mi.BSDFContext()
@@ -70,10 +74,14 @@ class CyclesPath(RBIntegrator):
         delta = mi.Bool(True)
         active = mi.Bool(active)
         valid = mi.Bool(False)
+        known = met is not None
         hidden = self.hide_emitters and before is None
 
         while dr.hint(active, label=f"cycles_path ({mode.name})"):
-            si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=bounce == 0, active=active)
+            if dr.hint(known, mode="scalar"):
+                si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
+            else:
+                si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=bounce == 0, active=active)
             if dr.hint(hidden, mode="scalar"):
                 skip = active & (bounce == 0) & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711
                 further = self.skip_area_emitters(scene, si.spawn_ray(ray.d), True, skip)
@@ -85,15 +93,16 @@ class CyclesPath(RBIntegrator):
 
             # light that the last direction meets
             ds = mi.DirectionSample3f(scene, si, previous)
-            seen = active & ~((bounce == 0) & hidden & ~si.is_valid())
+            beyond = active & (left < self.max_depth) if known else active
+            seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
-            met = throughput * ds.emitter.eval(si, seen) * share(delta, density, light_density)
-            met *= clamp_factor(self.clamp_indirect, first * met, bounce >= 2)
+            shown = throughput * ds.emitter.eval(si, seen) * share(delta, density, light_density)
+            shown *= clamp_factor(self.clamp_indirect, first * shown, bounce >= 2)
             if dr.hint(lamps, mode="scalar"):
                 straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
                 likely = dr.select(delta, CERTAIN, density)
-                shine = throughput * lamps.met(ray, si, active, density=likely, camera=straight)
-                met += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
+                shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight)
+                shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
             ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, goes_on)
@@ -109,12 +118,12 @@ class CyclesPath(RBIntegrator):
             goes_on &= dr.any(throughput * ratio != 0)
 
             if dr.hint(primal, mode="scalar"):
-                radiance += met + direct
+                radiance += shown + direct
             else:
-                radiance -= met + dr.detach(direct)
+                radiance -= shown + dr.detach(direct)
                 with dr.resume_grad():
                     again = bsdf.eval(context, si, si.to_local(onward.d), goes_on)
-                    out = met + direct + radiance * dr.relative_grad(again)
+                    out = shown + direct + radiance * dr.relative_grad(again)
                     if dr.hint(mode == dr.ADMode.Backward, mode="scalar"):
                         dr.backward_from(change * out)
                     else:
@@ -137,6 +146,8 @@ class CyclesPath(RBIntegrator):
             previous = mi.Interaction3f(si)
             ray = mi.Ray3f(onward)
             active = goes_on
+            if dr.hint(known, mode="scalar"):
+                met = scene.ray_intersect_preliminary(ray, active=active)
 
         return radiance if primal else change, valid, [], radiance
 

@@ -244,13 +244,12 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
     sample = lane // rays
     number = lane - sample * rays
-    hits = hits.of_rays(number)
+    first, hits = hits, hits.of_rays(number)
     si, share = hits.si, hits.share
     tiles = hits.pixels // TILE**2 + 1
     tile = hits.position // TILE**2 + sample * dr.opaque(mi.UInt32, 0 if settings.alike else tiles)
     tiles *= settings.samples
     hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
-    sampler = fresh_sampler(settings.seed + 0x51ED270, settings.samples * count)
     proposal = settings.proposal
     front = si.wi.z > 0.0
     # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
@@ -277,7 +276,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     density = proposal.density(si.wi, wo)
     valid = front & (wo.z > 0.0) & (density > 0.0)
     ray = si.spawn_ray(si.to_world(wo))
-    far = scene.ray_intersect(ray, valid)
+    met = scene.ray_intersect_preliminary(ray, active=valid)
+    far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
     emitter = far.emitter(scene, valid)
     emission = emitter.eval(far, valid)
     ds = mi.DirectionSample3f(scene, far, si)
@@ -285,19 +285,40 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     weight = emission / (light_density + density)
     if lamps:
         weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
-        emission += lamps.met(ray, far, valid)
     if indirect:
-        # a path tracer's radiance along the ray, less what the ray meets directly
-        before = None
-        if settings.light_paths is not None:
-            value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo, valid)
-            before = (likely, value / dr.maximum(likely, 1e-12))
-        traced = valid & far.is_valid() & (sample >= dr.opaque(mi.UInt32, settings.direct_samples))
-        radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, traced, before=before)
-        weight += dr.select(traced, dr.maximum(radiance - emission, 0.0) / density, 0.0)
+        traced = met.is_valid() & (sample >= dr.opaque(mi.UInt32, settings.direct_samples))
+        dr.eval(traced, met, wo, weight, valid)
+        index = dr.compress(traced)
+        if dr.width(index) > 0:
+            some = first.of_rays(index - index // rays * rays)
+            met, towards = (dr.gather(type(a), a, index) for a in (met, wo))
+            sum_ = dr.gather(mi.Color3f, weight, index) + _over_others(scene, some, met, towards, settings)
+            dr.scatter(weight, sum_, index, mode=dr.ReduceMode.Permute)
     # the share may be negative, where the pixel filter is
     started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
     return [kept() for kept in started]
+
+
+def _over_others(
+    scene: mi.Scene,
+    hits: _Hits,
+    met: mi.PreliminaryIntersection3f,
+    wo: mi.Vector3f,
+    settings: RecordSettings,
+) -> mi.Color3f:
+    """Radiance over the surfaces that rays from the target have `met`, but their own emission, by the rays' density.
+
+    Few rays of most scenes meet something: they are traced on from there side by side.
+    """
+    si = hits.si
+    before = None
+    if settings.light_paths is not None:
+        value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo)
+        before = (likely, value / dr.maximum(likely, 1e-12))
+    sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
+    ray = si.spawn_ray(si.to_world(wo))
+    radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, before=before, met=met)
+    return radiance / settings.proposal.density(si.wi, wo)
 
 
 def _traced(
@@ -306,21 +327,18 @@ def _traced(
     ray: mi.Ray3f,
     settings: RecordSettings,
     depth: int,
-    active: mi.Bool,
     *,
     hide: bool = False,
     before: tuple[mi.Float, mi.Color3f] | None = None,
+    met: mi.PreliminaryIntersection3f | None = None,
 ) -> mi.Color3f:
-    """Radiance along `ray` by a path tracer of the settings' kind, after a bounce of `before`: density and weight."""
-    properties: dict[str, Any] = {"max_depth": depth, "hide_emitters": hide}
-    if settings.light_paths is None:
-        integrator = mi.load_dict({"type": "path", **properties})
-        return integrator.sample(scene, sampler, mi.RayDifferential3f(ray), None, active)[0]
+    """Radiance along `ray`, after a bounce of `before`: density and weight; less the emission of what it has `met`."""
     from .cycles_path import PLUGIN_NAME, light_path_properties, register  # can be imported when a variant is set
 
     register()
-    integrator = mi.load_dict({"type": PLUGIN_NAME, **properties, **light_path_properties(settings.light_paths)})
-    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, active=active, before=before)[0]
+    properties = light_path_properties(settings.light_paths or LightPaths())
+    integrator = mi.load_dict({"type": PLUGIN_NAME, "max_depth": depth, "hide_emitters": hide, **properties})
+    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, before=before, met=met)[0]
 
 
 def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], _Lanes]:
@@ -364,7 +382,7 @@ def _background(
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
         ray = dr.gather(mi.Ray3f, rays.ray, index)
         depth, hide = max(settings.depth, 2), settings.hide_emitters
-        radiance = _traced(scene, sampler, ray, settings, depth, mi.Bool(True), hide=hide)
+        radiance = _traced(scene, sampler, ray, settings, depth, hide=hide)
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
         dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
         flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
