@@ -8,8 +8,6 @@ Andersson et al., "Visualizing Errors in Rendered High Dynamic Range Images", Eu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +16,7 @@ from .flip import pixels_of, planes_of
 from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
 from .flip_reference import FlipComparison, FlipReference
 from .pixel_check import check_finite, check_pair
+from .side_by_side import side_by_side
 from .tone_curve import ToneCurve
 
 Array = NDArray[np.floating]
@@ -68,8 +67,8 @@ class HdrFlip:
         """The error map (height, width) in [0, 1] of linear pixels (height, width, 3); negative values count as 0."""
         planes = planes_of(test.astype(self.dtype, copy=False))
         error = np.zeros(planes.shape[1:], self.dtype)
-        for _, comparison in self._compare(planes):
-            np.maximum(error, comparison.error, out=error)
+        for of_one in side_by_side(lambda index: self._compare_at(index, planes).error, range(self.exposures.count)):
+            np.maximum(error, of_one, out=error)
         return error
 
     def map_and_pullback(self, test: Array, weight: Array | float) -> tuple[Array, Array]:
@@ -82,7 +81,8 @@ class HdrFlip:
         winner = np.full(error.shape, -1, np.int16)
         keep = error.size * self.exposures.count <= _KEPT
         comparisons: dict[int, FlipComparison] = {}
-        for index, comparison in self._compare(planes):
+        compared = side_by_side(lambda index: self._compare_at(index, planes), range(self.exposures.count))
+        for index, comparison in enumerate(compared):
             larger = comparison.error > error
             if larger.any():
                 np.copyto(error, comparison.error, where=larger)
@@ -90,18 +90,15 @@ class HdrFlip:
                 if keep:
                     comparisons[index] = comparison
 
-        gradient = np.zeros_like(planes)
-        for index, ev in enumerate(self.exposures.values):
-            won = winner == index
-            if won.any():
-                comparison = comparisons.pop(index, None) or self._compare_at(index, planes)
-                shown = comparison.pullback((won * weight).astype(self.dtype, copy=False))
-                gradient += self._curve.pullback(planes, ev, shown)
-        return error, pixels_of(gradient)
+        def gradient_at(index: int) -> Array:
+            comparison = comparisons.pop(index, None) or self._compare_at(index, planes)
+            shown = comparison.pullback(((winner == index) * weight).astype(self.dtype, copy=False))
+            return self._curve.pullback(planes, self.exposures.values[index], shown)
 
-    def _compare(self, planes: Array) -> Iterator[tuple[int, FlipComparison]]:
-        for index in range(self.exposures.count):
-            yield index, self._compare_at(index, planes)
+        gradient = np.zeros_like(planes)
+        for of_one in side_by_side(gradient_at, [index for index in np.unique(winner).tolist() if index >= 0]):
+            gradient += of_one
+        return error, pixels_of(gradient)
 
     def _compare_at(self, index: int, planes: Array) -> FlipComparison:
         return self._references[index].compare(self._curve.apply(planes, self.exposures.values[index]))

@@ -37,10 +37,10 @@ MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every s
 SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 # Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
 MOST_RAYS = 12_000_000
-BYTES_PER_RAY = 272
-BYTES_PER_SAMPLE = 130  # of each further sample of the light
+BYTES_PER_RAY = 340
+BYTES_PER_SAMPLE = 180  # of each further sample of the light
 # Bytes that are mapped beyond those: Dr.Jit rounds sizes up to powers of two and keeps what is freed by its size
-MAPPED_PER_RAY = 340
+MAPPED_PER_RAY = 420
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
 DEEPEST = 16  # path length of a scene without a limit
 
