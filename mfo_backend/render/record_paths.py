@@ -26,6 +26,7 @@ from .pixel_cells import PixelCells
 from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_order
 from .proposal import DefensiveProposal
 from .recorded_paths import RecordedPaths
+from .traced_radiance import traced_radiance
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,9 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
-    `light_paths` light over other surfaces is traced as Cycles does, else as Mitsuba's `path`. `pixels` (height, width)
-    are the only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more
-    rays start where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many
+    `light_paths` light over other surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the
+    only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more rays start
+    where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many
     independent `samples`, or in samples of the same directions if they are `alike`. The first `direct_samples` leave
     light over other surfaces out and need no other kernels than a recording with it.
     """
@@ -74,7 +75,7 @@ class _Lanes:
 
 @dataclass
 class _Hits:
-    """First hits of the camera rays on the target, at positions below `pixels`."""
+    """First hits of the camera rays on the target, and the number of `pixels`."""
 
     si: Any
     position: mi.UInt32
@@ -105,7 +106,9 @@ def record_paths(
     with dr.suspend_grad():
         lamps = SceneLamps(scene)
         if lamps and settings.light_paths is None:
-            settings = replace(settings, light_paths=LightPaths())  # Mitsuba's own integrators do not meet lamps
+            settings = replace(
+                settings, light_paths=LightPaths()
+            )  # so that paths over other surfaces know they are no camera's
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
@@ -151,30 +154,6 @@ def record_paths(
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged
-
-
-def indirect_share(
-    scene: mi.Scene,
-    shape: mi.Shape,
-    depth: int,
-    two_sided: bool,
-    light_paths: LightPaths | None = None,
-    *,
-    stride: int = 1,
-) -> float:
-    """Irradiance of the visible target over other surfaces, relative to its irradiance from lights; one ray a pixel."""
-    settings = RecordSettings(
-        grid=1, depth=depth, stride=stride, two_sided=two_sided, light_paths=light_paths,
-        samples=2, alike=True, direct_samples=1,
-    )  # fmt: skip
-    with dr.suspend_grad():
-        paths = record_paths(scene, shape, settings, allow_dark=True)
-        if not paths.lanes:
-            return 0.0
-        lit = mi.luminance(paths.weight) * paths.wo.z
-        with_others = dr.arange(mi.UInt32, paths.lanes) >= dr.opaque(mi.UInt32, int(paths.first[1, 0]))
-        everything, direct = (float(dr.sum(dr.select(some, lit, 0.0))[0]) for some in (with_others, ~with_others))
-    return (everything - direct) / max(direct, 1e-30)
 
 
 def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:
@@ -292,8 +271,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         if dr.width(index) > 0:
             some = first.of_rays(index - index // rays * rays)
             met, towards = (dr.gather(type(a), a, index) for a in (met, wo))
-            sum_ = dr.gather(mi.Color3f, weight, index) + _over_others(scene, some, met, towards, settings)
-            dr.scatter(weight, sum_, index, mode=dr.ReduceMode.Permute)
+            total = dr.gather(mi.Color3f, weight, index) + _over_others(scene, some, met, towards, settings)
+            dr.scatter(weight, total, index, mode=dr.ReduceMode.Permute)
     # the share may be negative, where the pixel filter is
     started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
     return [kept() for kept in started]
@@ -317,28 +296,8 @@ def _over_others(
         before = (likely, value / dr.maximum(likely, 1e-12))
     sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
     ray = si.spawn_ray(si.to_world(wo))
-    radiance = _traced(scene, sampler, ray, settings, settings.depth - 1, before=before, met=met)
+    radiance = traced_radiance(scene, sampler, ray, settings.light_paths, settings.depth - 1, before=before, met=met)
     return radiance / settings.proposal.density(si.wi, wo)
-
-
-def _traced(
-    scene: mi.Scene,
-    sampler: mi.Sampler,
-    ray: mi.Ray3f,
-    settings: RecordSettings,
-    depth: int,
-    *,
-    hide: bool = False,
-    before: tuple[mi.Float, mi.Color3f] | None = None,
-    met: mi.PreliminaryIntersection3f | None = None,
-) -> mi.Color3f:
-    """Radiance along `ray`, after a bounce of `before`: density and weight; less the emission of what it has `met`."""
-    from .cycles_path import PLUGIN_NAME, light_path_properties, register  # can be imported when a variant is set
-
-    register()
-    properties = light_path_properties(settings.light_paths or LightPaths())
-    integrator = mi.load_dict({"type": PLUGIN_NAME, "max_depth": depth, "hide_emitters": hide, **properties})
-    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, before=before, met=met)[0]
 
 
 def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], _Lanes]:
@@ -382,7 +341,7 @@ def _background(
         sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
         ray = dr.gather(mi.Ray3f, rays.ray, index)
         depth, hide = max(settings.depth, 2), settings.hide_emitters
-        radiance = _traced(scene, sampler, ray, settings, depth, hide=hide)
+        radiance = traced_radiance(scene, sampler, ray, settings.light_paths, depth, hide=hide)
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
         dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
         flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]

@@ -20,11 +20,12 @@ from ..material.recorded_models import RecordedModel, recorded_model
 from ..types.errors import UnrecordableError
 from ..types.parameter import Value
 from .highlight_cells import Highlights
+from .indirect_share import indirect_share
 from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import tile_order, widened
 from .proposal import DefensiveProposal
-from .record_paths import DELTA, RecordSettings, indirect_share, record_paths
+from .record_paths import DELTA, RecordSettings, record_paths
 from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths

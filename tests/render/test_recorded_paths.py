@@ -77,6 +77,35 @@ def test_direct_light_alone_is_the_same_with_and_without_the_kernels_of_other_li
     assert np.array(everything.weight).sum() > 1.02 * np.array(some.weight).sum()
 
 
+@pytest.mark.parametrize("alike", [True, False])
+def test_samples_of_the_light_are_alike_or_have_directions_of_their_own(tmp_path, alike):
+    renderer, _ = recorded_scene(tmp_path, SKY)
+    from mfo_backend.render.record_paths import RecordSettings, record_paths  # needs the variant
+
+    settings = RecordSettings(grid=2, seed=4, samples=2, alike=alike)
+    paths = record_paths(renderer.scene, renderer.shape, settings)
+    one, other = (np.array(paths.wo)[:, first[0] : first[-1]] for first in paths.first)
+    assert (one.shape == other.shape and np.array_equal(one, other)) == alike
+
+
+def test_all_samples_of_the_light_are_one_launch(tmp_path):
+    renderer, scene = recorded_scene(tmp_path, SKY + FLOOR, depth=4)
+    import drjit as dr
+
+    def large_kernels(samples: int) -> list[int]:
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            scene.record(renderer.start, grid=2, seed=1, near=True, samples=samples)
+            return sorted(
+                k["operation_count"] for k in dr.kernel_history([dr.KernelType.JIT]) if k["operation_count"] > 300
+            )
+
+    scene.record(renderer.start, grid=2, seed=1, near=True)  # finds what the scene needs
+    once = large_kernels(1)
+    assert len(once) >= 3  # lights, proposal, what its rays meet
+    assert large_kernels(2) == once
+
+
 def test_the_proposal_near_a_material_is_as_unbiased(tmp_path):
     renderer, scene = recorded_scene(tmp_path, AREA + SKY)
     x = renderer.table.pack({**VALUES, "roughness": 0.12})
