@@ -139,6 +139,7 @@ def record_paths(
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels)
         exact = _delta_lights(scene, hits)
+        exact = [part for part in exact if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         lanes += _sampled_lights(scene, hits, settings, lamps)
 
@@ -225,9 +226,12 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     number = lane - sample * rays
     first, hits = hits, hits.of_rays(number)
     si, share = hits.si, hits.share
-    tiles = hits.pixels // TILE**2 + 1
-    tile = hits.position // TILE**2 + sample * dr.opaque(mi.UInt32, 0 if settings.alike else tiles)
-    tiles *= settings.samples
+    pixels, tiles = hits.pixels, hits.pixels // TILE**2 + 1
+    pixel, tile = (
+        hits.position // each + sample * dr.opaque(mi.UInt32, 0 if settings.alike else apart)
+        for each, apart in ((1, pixels), (TILE**2, tiles))
+    )
+    pixels, tiles = pixels * settings.samples, tiles * settings.samples
     hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
     proposal = settings.proposal
     front = si.wi.z > 0.0
@@ -237,8 +241,8 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     started = []
     if extended:
         table = own_memory(np.array(extended), mi.UInt32)
-        turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, tiles).next_1d() * 65536)
-        pick = (number + dr.gather(mi.UInt32, turns, tile)) % len(extended)
+        turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, pixels).next_1d() * 65536)
+        pick = (number + dr.gather(mi.UInt32, turns, pixel)) % len(extended)
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
         # one light's samples follow each other in the sequence
         u = even_points(2, number // len(extended), tile, tiles, settings.seed + 0x51ED270)
