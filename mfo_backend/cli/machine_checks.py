@@ -18,6 +18,7 @@ from ..render.cache_folder import cache_folder
 from ..render.llvm import find_llvm, library_cure, llvm_cure, missing_system_library, needs_llvm, require_mitsuba
 from ..render.memory import memory_left
 from ..types.errors import SetupError
+from ..types.processors import processors
 from .check import Check
 from .optional_checks import check_optional
 
@@ -105,9 +106,7 @@ def _gpu() -> Check:
 
 
 def _threads() -> Check:
-    affinity = getattr(os, "sched_getaffinity", None)
-    count = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
-    return Check("threads", "ok", str(count))
+    return Check("threads", "ok", str(processors()))
 
 
 def _memory() -> Check:

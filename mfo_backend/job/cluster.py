@@ -7,7 +7,6 @@ Dask's messages hold pickles: a scheduler trusts everyone who can reach it.
 from __future__ import annotations
 
 import logging
-import os
 import queue
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -15,6 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ..types.errors import BadInputError, SetupError
+from ..types.processors import processors
 
 RETRIES = 2  # of work that raises; a lost worker's work goes to another one without counting here
 POLL_SECONDS = 0.2
@@ -22,14 +22,9 @@ NO_WORKER_SECONDS = 120.0  # a cluster may take this long to replace one
 _CONNECT_SECONDS = 15
 
 
-def cores() -> int:
-    """Processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def threads_each(workers: int) -> int:
     """Threads of each of some workers on one machine."""
-    return max(1, cores() // workers)
+    return max(1, processors() // workers)
 
 
 @contextmanager

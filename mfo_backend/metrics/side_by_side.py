@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import TypeVar
+
+from ..types.processors import processors, threads_wanted
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -18,19 +19,12 @@ def side_by_side(function: Callable[[Item], Result], items: Sequence[Item]) -> I
 
     No more results are held than are computed at a time. The first error is raised.
     """
-    threads = _threads()
+    threads = threads_wanted() or processors()
     if threads == 1 or len(items) < 2:
         yield from map(function, items)
         return
     for begin in range(0, len(items), threads):
         yield from _pool(threads).map(function, items[begin : begin + threads])
-
-
-def _threads() -> int:
-    wanted = os.environ.get("MFO_THREADS", "")  # several processes share this machine
-    if wanted.isdecimal():
-        return max(1, int(wanted))
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache

@@ -106,9 +106,8 @@ def record_paths(
     with dr.suspend_grad():
         lamps = SceneLamps(scene)
         if lamps and settings.light_paths is None:
-            settings = replace(
-                settings, light_paths=LightPaths()
-            )  # so that paths over other surfaces know they are no camera's
+            # so that paths over other surfaces know they are no camera's
+            settings = replace(settings, light_paths=LightPaths())
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
@@ -138,8 +137,7 @@ def record_paths(
         dr.eval(si, position, filter_weight, held)
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels)
-        exact = _delta_lights(scene, hits)
-        exact = [part for part in exact if dr.width(part.position) > 0]
+        exact = [part for part in _delta_lights(scene, hits) if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         lanes += _sampled_lights(scene, hits, settings, lamps)
 
@@ -226,12 +224,11 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     number = lane - sample * rays
     first, hits = hits, hits.of_rays(number)
     si, share = hits.si, hits.share
-    pixels, tiles = hits.pixels, hits.pixels // TILE**2 + 1
-    pixel, tile = (
-        hits.position // each + sample * dr.opaque(mi.UInt32, 0 if settings.alike else apart)
-        for each, apart in ((1, pixels), (TILE**2, tiles))
-    )
-    pixels, tiles = pixels * settings.samples, tiles * settings.samples
+    # what has random numbers of its own: pixels and tiles of each sample, or of all if they are alike
+    tiles, own = hits.pixels // TILE**2 + 1, sample * dr.opaque(mi.UInt32, 0 if settings.alike else 1)
+    pixel = hits.position + own * dr.opaque(mi.UInt32, hits.pixels)
+    tile = hits.position // TILE**2 + own * dr.opaque(mi.UInt32, tiles)
+    pixels, tiles = hits.pixels * settings.samples, tiles * settings.samples
     hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
     proposal = settings.proposal
     front = si.wi.z > 0.0

@@ -36,7 +36,8 @@ NEGLIGIBLE_INDIRECT = 0.005
 MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
 # How finely highlights are recorded (`Highlights.share`): 0.3 % and 0.1 % of the picture at roughness 0.05
 SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
-# Camera rays of one recording, those that miss the target included. Measured while they are traced: 272 bytes each
+# Camera rays of one recording, those that miss the target included. About as many bytes each
+# as memory rises by while they are traced
 MOST_RAYS = 12_000_000
 BYTES_PER_RAY = 340
 BYTES_PER_SAMPLE = 180  # of each further sample of the light

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import os
 import sys
 
 from ..types.errors import SetupError
+from ..types.processors import threads_wanted
 from .plugins import trust_only_mitsuba
 
 CANDIDATES = ("llvm_ad_rgb", "metal_ad_rgb") if sys.platform != "darwin" else ("metal_ad_rgb", "llvm_ad_rgb")
@@ -43,8 +43,8 @@ def load_variant(name: str | None = None) -> str:
         except (ImportError, AttributeError, RuntimeError) as error:
             reasons.append(f"{candidate}: {str(error).splitlines()[0]}")
         else:
-            if os.environ.get("MFO_THREADS", "").isdecimal():  # several processes share this machine
-                use_threads(max(1, int(os.environ["MFO_THREADS"])))
+            if threads := threads_wanted():
+                use_threads(threads)
             return candidate
     raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")
 

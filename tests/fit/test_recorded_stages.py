@@ -53,19 +53,18 @@ NEVER = float("inf")
 def test_a_recording_that_is_too_old_is_made_anew(refined):
     plan = RecordedPlan(too_noisy=NEVER, most_own=1.0)
 
-    def errors_and_recordings(**guards):
+    def error_and_recordings(**guards):
         found = [refined(plan, seed, **guards) for seed in range(24)]
-        return np.median([error for error, _ in found]), [recordings for _, recordings in found]
+        return np.median(found, axis=0)
 
-    stale, recordings = errors_and_recordings(MOVED=NEVER, NOISIER=NEVER)
-    assert set(recordings) == {1}
+    stale, recordings = error_and_recordings(MOVED=NEVER, NOISIER=NEVER)
+    assert recordings == 1
     assert stale > 0.05  # a highlight of roughness 0.12, seen by directions for 0.45
-    # either guard alone sees it, the second in three of four seeds (60 were looked at), and both what one leaves
-    for guards, least in (({"MOVED": 0.15, "NOISIER": NEVER}, 24), ({"MOVED": NEVER, "NOISIER": 1.25}, 13)):
-        _, recordings = errors_and_recordings(**guards)
-        assert sum(np.array(recordings) > 1) >= least, guards
-    error, _ = errors_and_recordings(MOVED=0.15, NOISIER=1.25)
-    assert error < 0.3 * stale
+    # either guard alone sees it, with most seeds
+    for guards in ({"MOVED": 0.15, "NOISIER": NEVER}, {"MOVED": NEVER, "NOISIER": 1.25}):
+        error, recordings = error_and_recordings(**guards)
+        assert recordings > 1, guards
+        assert error < 0.3 * stale, guards
 
 
 def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):
