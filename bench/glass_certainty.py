@@ -2,10 +2,11 @@
 """Scenes of glass fitted to several references each: errors of the values, and whether their certainties are true.
 
     python bench/glass_certainty.py [--scenario transparency] [--scenes 0 4 7] [--references 4] [--all-values]
-        [--size 128] [--preset balanced] [--out rows.jsonl]
+        [--size 128] [--preset balanced] [--with coat_weight=0.5 coat_roughness=0.3] [--out rows.jsonl]
 
 Scenes are those of `mfo bench`, references have random numbers that no bench and no fit uses. `--all-values` frees all
-of the material's values, as the panel does, and not the scenario's. An error is in parts of a value's range. A value is
+of the material's values, as the panel does, and not the scenario's; `--with` gives the truth values that the scenario
+does not draw (the start has them off). An error is in parts of a value's range. A value is
 inside where the truth lies within 1.96 of its deviations; those that the picture does not show are not counted. One is
 wrong that is called determined and is off by more than three deviations and by more than 0.02.
 """
@@ -18,6 +19,7 @@ import os
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +82,11 @@ def summary(rows: list[dict[str, Any]]) -> str:
     )
 
 
+def _value(text: str) -> tuple[str, float]:
+    name, _, number = text.partition("=")
+    return name, float(number)
+
+
 def main() -> None:
     """Fit scene after scene and print what each gives."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -89,12 +96,14 @@ def main() -> None:
     parser.add_argument("--all-values", action="store_true")
     parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--preset", default="balanced")
+    parser.add_argument("--with", dest="truth", type=_value, nargs="+", default=[], metavar="NAME=VALUE")
     parser.add_argument("--out", type=Path, help="also append a JSON line for each fit")
     chosen = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory(prefix="mfo-certainty-") as folder:
         for number in chosen.scenes:
             scene = write_bench_scene(chosen.scenario, number, chosen.size, Path(folder) / str(number))
+            scene = replace(scene, truth={**scene.truth, **dict(chosen.truth)})
             for reference in range(chosen.references):
                 row = measure(scene, reference, chosen)
                 rows.append(row)

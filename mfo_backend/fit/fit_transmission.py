@@ -80,6 +80,8 @@ def fit_transmission(
 
     certainty: dict[str, Certainty] = {}
     ends: list[Polished] = []
+    notes: list[str] = []
+    freest = 0
     nodes = fit.scan()
     found = [fit.race(nodes) if not should_stop() else nodes[0][1]]
     if not should_stop():
@@ -88,9 +90,10 @@ def fit_transmission(
         chosen = fit.choose(candidates)
         ends = ends[: max(len(ends) - chosen, 1)]
         found = [candidates[chosen]]
-        if chosen == 0 and not ends[-1].is_whole:
+        freest = int(np.argmin([end.kept.sum() for end in ends]))
+        if chosen == 0 and freest < len(ends) - 1:
             # values may go back to the user's by the noisy squares and not by the eye
-            found += [end.x for end in ends if end.is_whole]
+            found.append(ends[freest].x)
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
@@ -104,10 +107,11 @@ def fit_transmission(
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
     if ends:
-        shown = ends if kept or len(found) == 1 else [end for end in ends if end.is_whole]
+        shown = ends if kept or len(found) == 1 else ends[: freest + 1]
         certainty = _certainty(shown, renderer.table)
-    unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
-    notes = [kept_note(unseen)] if kept and best else []
+        back = [name for name in certainty if shown[-1].kept[renderer.table.slice_of(name)].all()]
+        unseen = [name for name in back if certainty[name].level is Level.NOT_VISIBLE]
+        notes = [kept_note(unseen)] if unseen and best else []
     counts = fit.pictures.counts
     if counts is not None:
         notes.append(

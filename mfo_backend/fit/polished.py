@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.blender_selection import AMOUNT_OF
 from ..solve.bounded_least_squares import NormalEquations
 from ..solve.noisy_least_squares import SafeMatrix
 from ..types.parameter import ParameterTable
@@ -41,15 +42,11 @@ class Polished:
     equations: NormalEquations | None
     noise: Vector
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether all values were free."""
-        return not self.kept.any()
-
-    def undetermined(self, table: ParameterTable) -> NDArray[np.bool_]:
+    def undetermined(self, table: ParameterTable, user: Vector) -> NDArray[np.bool_]:
         """Further values that are not determined: the least sure one is taken for known until the rest is sure.
 
-        Values of the glass itself are none as long as others go back.
+        Values of the glass itself are none as long as others go back, and none is whose return to the user's the
+        picture tells from noise: a lobe may be surely there, and nobody knows how much of it.
         """
         held = self.kept.copy()
         if self.equations is None:
@@ -70,22 +67,38 @@ class Polished:
             worst = min(unsure, key=lambda name: (name in CORE, name in AMOUNTS, -widest[name]))
             if worst in CORE and np.any(held & ~self.kept):
                 break  # it may be sure once the others are as in the scene
-            held[table.slice_of(worst)] = True
             names.remove(worst)
+            more = held | table.mask_of([worst])
+            if self._distance(more, user) <= self._distance(held, user) + SIGNIFICANT:
+                held = more
         return held & ~self.kept
 
-    def unneeded(self, table: ParameterTable, user: Vector) -> NDArray[np.bool_]:
+    def unneeded(
+        self, table: ParameterTable, user: Vector, unseen: NDArray[np.bool_], surer_than: float = np.inf
+    ) -> NDArray[np.bool_]:
         """Further values that are off in the user's material and not further from that than three standard deviations.
 
-        The distance of several together is theirs by the covariance (A. Wald 1943), and each may add as much as it
-        could alone.
+        Those of `unseen` go back anyway: with a coat's details known, more is known of how much there is of it. Only
+        values whose own deviation is below `surer_than`, in parts of the range, are asked for. The distance of several
+        together is theirs by the covariance (A. Wald 1943), and each may add as much as it could alone.
         """
-        kept = self.kept
+        sure = np.diag(self.covariance) < (surer_than * (table.upper - table.lower)) ** 2
+        free = ~self.kept & ~unseen & ~table.mask_of([name for name in table.names if name in CORE]) & sure
+        names = [name for name in values_off(table, user) if free[table.slice_of(name)].all()]
 
         def distance(held: list[str]) -> float:
-            away = table.mask_of(held)
-            step = (self.x - user)[away]
-            return float(step @ np.linalg.lstsq(self.covariance[np.ix_(away, away)], step, rcond=None)[0])
+            return self._distance(unseen | table.mask_of(held), user)
 
-        names = [n for n in values_off(table, user) if n not in CORE and not kept[table.slice_of(n)].any()]
         return table.mask_of(dispensable(names, distance, SIGNIFICANT))
+
+    def _distance(self, held: NDArray[np.bool_], user: Vector) -> float:
+        """The squared distance of the user's values of those `held` that were free, by the covariance."""
+        away = held & ~self.kept
+        step = (self.x - user)[away]
+        return float(step @ np.linalg.lstsq(self.covariance[np.ix_(away, away)], step, rcond=None)[0])
+
+
+def without_lobe(kept: NDArray[np.bool_], table: ParameterTable, user: Vector) -> NDArray[np.bool_]:
+    """Details of lobes whose `kept` amount is off in the user's material: they are without effect."""
+    off = [name for name in values_off(table, user) if kept[table.slice_of(name)].all()]
+    return table.mask_of([name for name in table.names if AMOUNT_OF.get(name) in off]) & ~kept

@@ -25,6 +25,7 @@ class TransmissionPlan:
     race_pixels: int = 1500
     race_samples: int = 8
     race_steps: int = 7
+    coat_pixels: int = 4000
     polish_pixels: int = 16_000
     polish_paths: int = 20_000
     polish_steps: int = 32

@@ -15,11 +15,12 @@ from ..solve.noisy_least_squares import cautious_step
 from ..types.image import Pixels
 from .course import Course, Stage
 from .equal_counts import MOST_COUNT
-from .polished import AMOUNTS, CORE, Polished
+from .polished import AMOUNTS, CORE, Polished, without_lobe
 from .tile_pools import TilePools
 from .traced_tiles import GEOMETRIC, SECANT_BELOW, TracedTiles
 from .transmission_plan import TransmissionPlan
 from .two_halves import is_unsure, two_half_equations
+from .unneeded_lobes import values_off
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ..render.traced_paths import TracedPaths
@@ -28,6 +29,9 @@ Vector = NDArray[np.float64]
 
 ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
+COAT_NODES = (0.1, 0.3, 0.6)  # roughness, besides the scene's
+COAT = 0.3  # weight they start from
+SURELY_OFF = 0.05  # of the range: standard deviation of an amount that can be told from none
 TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
 GUARD_PARTS = 4
@@ -175,24 +179,30 @@ class TransmissionFit:
     def polish(self, start: Vector) -> list[Polished]:
         """Stage `polish`: Gauss-Newton steps on all samples so far, each with new random numbers.
 
-        Where lobes are free, the first end has their details as in the scene; another has all values free. Where the
-        picture does not determine some of these or does not need some lobes, an end with those as in the scene follows,
-        and one more where that leaves further values without effect.
+        Where lobes are free, the first end has their details as in the scene; another has all values free but those of
+        lobes that the first did not need. Where the picture does not determine some of these or does not need some
+        lobes, an end with those as in the scene follows, and one more where that leaves further values without effect.
         """
         with self.course.stage("polish") as stage:
-            x, ends = self._counted(stage, start), []
+            x, user, ends = self._counted(stage, start), self.table.clip(self.start), []
+            off = useless = np.zeros(self.table.length, bool)
             if self._extras.any():
                 x = self._pool(stage, x, self._extras, stream=50).x
                 amounts = self.table.mask_of(AMOUNTS)
                 details = self._extras & ~amounts
                 if amounts.any() and details.any():
                     # how much there is of a lobe before its details: together they may trade places with the glass
+                    x = self._coated(stage, x)
                     ends.append(replace(self._pool(stage, x, details, stream=70), unseen=details))
-                    x = ends[-1].x
-            ends.append(self._pool(stage, x, np.zeros(self.table.length, bool), stream=10))
+                    off = ends[-1].unneeded(self.table, user, useless, SURELY_OFF)
+                    useless = without_lobe(off, self.table, user)
+                    x = np.where(off, user, ends[-1].x)
+            ends.append(replace(self._pool(stage, x, off | useless, stream=10), unseen=useless))
             for turn in range(MOST_RETURNS):
-                last, user = ends[-1], self.table.clip(self.start)
-                unseen, unneeded = last.undetermined(self.table), last.unneeded(self.table, user)
+                last = ends[-1]
+                unseen = last.undetermined(self.table, user)
+                unneeded = last.unneeded(self.table, user, unseen)
+                unseen |= without_lobe(last.kept | unseen | unneeded, self.table, user)
                 kept = last.kept | unseen | unneeded
                 if not np.any(unseen | unneeded) or kept.all() or self.course.should_stop():
                     break
@@ -200,6 +210,30 @@ class TransmissionFit:
                 ends.append(replace(end, unseen=last.unseen | unseen))
             stage.vector = ends[-1].x
         return ends
+
+    def _coated(self, stage: Stage, x: Vector) -> Vector:
+        """The point with the coat that explains most, of one roughness each, where the scene's material has none.
+
+        Its roughness is nobody's choice then, and from a sharp coat a polish finds no way to a rough one. Nor does a
+        glass that has taken a coat's reflections for those of a higher index find back.
+        """
+        plan, table, lobe = self.plan, self.table, ("coat_weight", "coat_roughness")
+        if not set(lobe) <= set(table.names) or lobe[0] not in values_off(table, table.clip(self.start)):
+            return x
+        weight, roughness = (table.slice_of(name) for name in lobe)
+        xs = np.tile(x, (1 + len(COAT_NODES), 1))
+        xs[1:, roughness] = np.reshape(COAT_NODES, (-1, 1))
+        xs[:, weight] = COAT
+        frozen = self._extras & ~table.mask_of(lobe[:1])
+        tiles, best = self.pictures.tiles(4, plan.coat_pixels), x
+        for _ in range(plan.scan_steps + 1):
+            rows = self.pictures.halves(tiles, xs, seed=self._seed(40), samples=plan.race_samples)
+            if self.course.should_stop():
+                return x
+            equations = [two_half_equations(*pair) for pair in rows]
+            best = xs[int(np.argmin([e.cost for e in equations]))]
+            xs = np.array([y + self._step(e, y, 0.02, 0.25, frozen) for e, y in zip(equations, xs, strict=True)])
+        return best
 
     def _counted(self, stage: Stage, x: Vector) -> Vector:
         """Find out how noisy the reference is and so how it is compared from now on; returns a point nearer to it.

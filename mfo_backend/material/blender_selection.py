@@ -19,7 +19,8 @@ _WITH = {
     "thin_film_thickness": ("thin_film_thickness", "thin_film_ior"),
     "diffuse_roughness": ("diffuse_roughness",),
 }
-_NEEDS = {
+# Without an amount of the second the first has no effect
+AMOUNT_OF = {
     "coat_roughness": "coat_weight",
     "coat_ior": "coat_weight",
     "coat_tint": "coat_weight",
@@ -65,6 +66,8 @@ def select_blender_parameters(
             raise BadInputError(f"Parameter {name!r} cannot be fitted: emission is a light; choose among {names}.")
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")
-        if name in _NEEDS and _NEEDS[name] not in {*present, *linked, *table.names}:
-            raise BadInputError(f"Parameter {name!r} has no effect while {_NEEDS[name]!r} is 0: add {_NEEDS[name]!r}.")
+        if name in AMOUNT_OF and AMOUNT_OF[name] not in {*present, *linked, *table.names}:
+            raise BadInputError(
+                f"Parameter {name!r} has no effect while {AMOUNT_OF[name]!r} is 0: add {AMOUNT_OF[name]!r}."
+            )
     return table
