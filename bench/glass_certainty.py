@@ -43,6 +43,8 @@ def measure(scene: Any, number: int, arguments: argparse.Namespace) -> dict[str,
 
     renderer, settings = open_bench_scene(scene, arguments.preset, all_values=arguments.all_values)
     table, truth = renderer.table, true_vector(scene, renderer)
+    if arguments.truth:
+        table.select(name for name, _ in arguments.truth)  # refuses what the fit holds: it would change nothing
     reference = reference_of(scene, renderer, REFERENCE_STREAM + 1000 * number + scene.number)
     renderer.passes, began = 0.0, time.process_time()
     result = fit_to(renderer, reference, settings)

@@ -83,7 +83,7 @@ class Polished:
         together is theirs by the covariance (A. Wald 1943), and each may add as much as it could alone.
         """
         sure = np.diag(self.covariance) < (surer_than * (table.upper - table.lower)) ** 2
-        free = ~self.kept & ~unseen & ~table.mask_of([name for name in table.names if name in CORE]) & sure
+        free = ~self.kept & ~unseen & ~table.mask_of(CORE) & sure
         names = [name for name in values_off(table, user) if free[table.slice_of(name)].all()]
 
         def distance(held: list[str]) -> float:
