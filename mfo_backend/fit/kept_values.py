@@ -18,7 +18,7 @@ from .own_noise import rows_of_samples
 from .problem import Problem, Refined
 from .recorded_stages import RecordedFit, Vector
 from .residuals import RelativeResidual
-from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations
+from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations, with_rivals
 from .unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
 
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
@@ -51,7 +51,7 @@ def keep_values(
     """
     table, user = fit.table, fit.scene.renderer.start
     found, problem = refined.x, refined.all
-    judged, unseen_change = _Judged(fit, problem, weighted), _UnseenChange(fit, refined.x, seen)
+    judged, unseen_change = _Judged(fit, refined, weighted), _UnseenChange(fit, refined.x, seen)
     cost, certainty, spread = judged(found)
     off = list(refined.off)
     if not off:
@@ -110,8 +110,8 @@ def _sets_to_return(
 class _Judged:
     """Mean square residual, certainty and covariance at a vector."""
 
-    def __init__(self, fit: RecordedFit, problem: Problem, weighted: bool) -> None:
-        self._fit, self._problem, self._weighted = fit, problem, weighted
+    def __init__(self, fit: RecordedFit, refined: Refined, weighted: bool) -> None:
+        self._fit, self._problem, self._weighted, self._rivals = fit, refined.all, weighted, refined.rivals
 
     def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
         problem, table = self._problem, self._fit.table
@@ -120,6 +120,7 @@ class _Judged:
             residual = RelativeResidual(problem.groups.average(self._fit.reference))
         rows, own = rows_of_samples(problem.evaluate.samples(x), residual)
         spread = covariance(rows, own, table, model_error=0.0 if self._weighted else MODEL_ERROR)
+        spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
         return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table), spread
 
     def noise(self, cost: float) -> float:

@@ -64,13 +64,23 @@ class Problem:
 
 
 @dataclass(frozen=True)
+class Rival:
+    """Another material that explains the picture about as well, and its share of the probability."""
+
+    x: Vector
+    share: float
+
+
+@dataclass(frozen=True)
 class Refined:
     """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials.
 
-    `off` names values that were held at the user's, which are off, because the picture does not ask for them.
+    `off` names values that were held at the user's, which are off, because the picture does not ask for them; `rivals`
+    are other materials that explain it about as well.
     """
 
     x: Vector
     all: Problem
     few: Problem
     off: tuple[str, ...] = ()
+    rivals: tuple[Rival, ...] = ()

@@ -28,8 +28,9 @@ from .problem import Problem, Refined
 from .race import CLEARLY_LOWER, race
 from .recorded_plan import RecordedPlan
 from .residuals import OneSidedResidual, Residual, WeightedResidual
+from .simplest_end import OtherEnds, SimplestEnd
 from .tile_noise import TileNoise, tile_noise
-from .unneeded_lobes import solve_without_unneeded
+from .unneeded_lobes import Box, solve_without_unneeded
 
 Vector = NDArray[np.float64]
 MakeResidual = Callable[[NDArray[np.float32]], Residual]
@@ -175,16 +176,17 @@ class RecordedFit:
         evaluations: int,
         *,
         stage: Stage | None = None,
-        box: tuple[Vector, Vector] | None = None,
+        box: Box | None = None,
         known: float = 0.0,
+        wanted: float | None = None,
     ) -> Solution:
         """A bounded solve whose evaluations are noted in `stage`; any other solution is better than one not finite.
 
-        With the cost of a `known` solution it ends where it is nearly as good and promises nothing clearly better.
+        With the cost of a `known` solution it ends where it is nearly as good and promises nothing clearly better; with
+        a `wanted` cost, where it promises no less than that.
         """
-        limits = replace(
-            self._limits(problem, evaluations), known=self.plan.basin_factor * known, wanted=CLEARLY_LOWER * known
-        )
+        below, wanted = (self.plan.basin_factor * known, CLEARLY_LOWER * known) if wanted is None else (np.inf, wanted)
+        limits = replace(self._limits(problem, evaluations), known=below, wanted=wanted)
         lower, upper = box or (self.table.lower, self.table.upper)
         equations = problem.equations if stage is None else self.course.watch(stage, problem.equations)
         try:
@@ -277,11 +279,14 @@ class RecordedFit:
         x, problem = refined.x, refined.all
         if not weighted:
             return replace(refined, x=self._solve(problem, x, 12, stage=stage).x)
-        x, off = solve_without_unneeded(
+        user = self.scene.renderer.start
+        found, off = solve_without_unneeded(
             lambda start, box: self._solve(problem, start, 12, stage=stage, box=box),
-            problem.equations(x), problem.independent, x, self.scene.renderer.start, self.table,
+            problem.equations(x), problem.independent, x, user, self.table,
         )  # fmt: skip
-        return replace(refined, x=x, off=off)
+        others = OtherEnds(refined, partial(self._solve, stage=stage), user, self.table)
+        last = others.simplest(SimplestEnd(found, off))
+        return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals)
 
     def _recorded_near(
         self, stage: Stage, start: Vector, make: MakeResidual, weigh: MakeWeighted | None

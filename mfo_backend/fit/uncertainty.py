@@ -8,12 +8,15 @@ pixels or channels share their noise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..types.certainty import Certainty, Level
 from ..types.parameter import ParameterTable
 from .own_noise import without_own_noise
+from .problem import Rival
 
 Vector = NDArray[np.float64]
 
@@ -48,6 +51,14 @@ def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_er
     inverse = np.linalg.inv(gram + prior * np.eye(k))
     found = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
     return inflation**2 * g / max(g - k / 3, 1) * found
+
+
+def with_rivals(spread: Vector, x: Vector, rivals: Sequence[Rival], width: Vector) -> Vector:
+    """A covariance (k, k) in widths of the box around `x`, with those materials that it might be instead."""
+    for rival in rivals:
+        away = (rival.x - x) / width
+        spread = spread + rival.share * np.outer(away, away)
+    return spread
 
 
 def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:

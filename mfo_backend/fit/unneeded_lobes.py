@@ -26,7 +26,7 @@ def solve_without_unneeded(
     x: Vector,
     user: Vector,
     table: ParameterTable,
-) -> tuple[Vector, tuple[str, ...]]:
+) -> tuple[Solution, tuple[str, ...]]:
     """The end of `solve` from `x` without the lobes that the quadratic `around` it can do without, and their names.
 
     Where that costs more than the quadratic promises to the whole box and noise explains, the end in the whole box.
@@ -38,8 +38,8 @@ def solve_without_unneeded(
         simpler = solve(np.clip(x, lower, upper), (lower, upper))
         free = around.cost + step_in_box(around, x, table.lower, table.upper)[1]
         if simpler.equations.cost <= free + SIGNIFICANT * len(moved) * around.cost / independent:
-            return simpler.x, tuple(names)
-    return solve(x, (table.lower, table.upper)).x, ()
+            return simpler, tuple(names)
+    return solve(x, (table.lower, table.upper)), ()
 
 
 def moved_to_user(names: Iterable[str], x: Vector, user: Vector, table: ParameterTable) -> list[str]:

@@ -76,3 +76,45 @@ def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):
         error, recordings = refined(replace(coarse, **guard), MOVED=NEVER, NOISIER=NEVER)
         assert recordings > 1, guard
         assert error < 0.5 * noisy, guard
+
+
+PAINT = ("base_color", "roughness", "specular_ior_level", "coat_weight", "coat_roughness")
+GLOSSY = dict(zip(PAINT, ((0.3, 0.2, 0.1), 0.25, 0.5, 0.0, 0.1), strict=True))
+COATED = dict(zip(PAINT, ((0.3, 0.2, 0.1), 0.5, 0.05, 0.8, 0.25), strict=True))
+
+
+@pytest.mark.parametrize("looked_at", [False, True])
+def test_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp_path, monkeypatch, looked_at):
+    from mfo_backend.fit import recorded_stages
+    from mfo_backend.fit.course import Course
+    from mfo_backend.fit.residuals import RelativeResidual, WeightedResidual
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    if not looked_at:
+        monkeypatch.setattr(recorded_stages.OtherEnds, "simplest", lambda self, found: found)
+    renderer = load_renderer(
+        write_scene(tmp_path, AREA + SKY, size=40),
+        "target",
+        model="blender_principled",
+        parameters=PAINT,
+        materials={"target_bsdf": {"name": "Paint", "distribution": "MULTI_GGX", "sockets": {}}},
+    )
+    table, mask = renderer.table, renderer.target_mask()
+    renderer.start = table.pack({**GLOSSY, "base_color": (0.5, 0.5, 0.5), "roughness": 0.6})
+    reference = renderer.image(table.pack(GLOSSY), seed=5, spp=64)
+    for seed in range(3):
+        course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
+        scene = RecordedScene(renderer, int(mask.sum()))
+        fit = recorded_stages.RecordedFit(scene, reference, mask, PLAN, seed, course)
+        fit.paths = None
+        refined = fit.refine(table.pack(COATED), RelativeResidual, WeightedResidual)
+        found = table.unpack(refined.x)
+        if not looked_at:  # the picture is explained as well
+            assert found["coat_weight"] > 0.8
+            continue
+        assert found["coat_weight"] == 0.0
+        assert refined.off == ("coat_weight",)
+        # three deviations of 12 fits that a reference of 64 samples was made for
+        assert found["roughness"] == pytest.approx(GLOSSY["roughness"], abs=0.03)
+        assert found["specular_ior_level"] == pytest.approx(GLOSSY["specular_ior_level"], abs=0.08)
+        assert 0.0 < sum(rival.share for rival in refined.rivals) < 0.05

@@ -49,7 +49,8 @@ class Problem:
 
 
 def end_of(problem, x):
-    return solve_without_unneeded(problem.solve, problem.equations(x), COUNT, x, USER, TABLE)
+    end, off = solve_without_unneeded(problem.solve, problem.equations(x), COUNT, x, USER, TABLE)
+    return end.x, off
 
 
 @pytest.mark.parametrize(
