@@ -18,6 +18,7 @@ from .own_noise import rows_of_samples
 from .problem import Problem, Refined
 from .recorded_stages import RecordedFit, Vector
 from .residuals import RelativeResidual
+from .rival_notes import rival_notes
 from .uncertainty import MODEL_ERROR, certainties, covariance, standard_deviations, with_rivals
 from .unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
 
@@ -76,6 +77,7 @@ def keep_values(
                 found, off = kept, held
                 notes.append(kept_note(back))
                 break
+    notes += rival_notes(refined.rivals, found, table)
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
 
 

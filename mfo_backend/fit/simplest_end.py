@@ -18,7 +18,7 @@ from ..solve.bounded_least_squares import Solution
 from ..types.parameter import ParameterTable
 from .problem import Problem, Refined, Rival
 from .told_apart import compare
-from .unneeded_lobes import OFF, SIGNIFICANT, Box, box_holding, values_off
+from .unneeded_lobes import SIGNIFICANT, Box, box_holding, is_off, values_off
 
 Vector = NDArray[np.float64]
 
@@ -60,14 +60,14 @@ class OtherEnds:
     def _exchanged(self, found: SimplestEnd) -> SimplestEnd:
         """With the highlights of base and coat exchanged, where that is better, or as good and nearer to the user's."""
         x, table = found.end.x, self._table
-        if not _exchangeable(table) or COAT[0] in found.off or _is_off(COAT[0], x, table):
+        if not _exchangeable(table) or COAT[0] in found.off or is_off(COAT[0], x, table):
             return found
         box = box_holding(table, self._user, found.off)
         end = self._attempt(found.end, np.clip(exchanged(x, table), *box), box)
         width = table.upper - table.lower
         if end is None or np.max(np.abs(end.x - x) / width) < APART:
             return found
-        if _is_off(COAT[0], end.x, table) and COAT[0] in values_off(table, self._user):
+        if is_off(COAT[0], end.x, table) and COAT[0] in values_off(table, self._user):
             return found  # which is simpler: `_without_lobes` comes there, too
         it = compare(self._all, x, end.x)
         nearer = np.linalg.norm((end.x - self._user) / width) < np.linalg.norm((x - self._user) / width)
@@ -81,7 +81,7 @@ class OtherEnds:
         Each of them counts three standard deviations against a material: what it would need to come in alone.
         """
         x, table = found.end.x, self._table
-        lobes = [n for n in values_off(table, self._user) if n not in found.off and not _is_off(n, x, table)]
+        lobes = [n for n in values_off(table, self._user) if n not in found.off and not is_off(n, x, table)]
         if not lobes:
             return found
         off, price = (*found.off, *lobes), SIGNIFICANT * len(lobes)
@@ -144,8 +144,3 @@ def _with(x: Vector, table: ParameterTable, *values: float) -> Vector:
 
 def _exchangeable(table: ParameterTable) -> bool:
     return all(name in table.names for name in (*BASE, *COAT))
-
-
-def _is_off(name: str, x: Vector, table: ParameterTable) -> bool:
-    part = table.slice_of(name)
-    return bool(np.all((x - table.lower)[part] <= OFF * (table.upper - table.lower)[part]))

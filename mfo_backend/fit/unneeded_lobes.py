@@ -71,7 +71,13 @@ def unneeded_lobes(
 
 def values_off(table: ParameterTable, user: Vector) -> list[str]:
     """Names whose values are off in the user's material."""
-    return [p.name for p in table if np.all((user - table.lower)[table.slice_of(p.name)] <= OFF * (p.upper - p.lower))]
+    return [name for name in table.names if is_off(name, user, table)]
+
+
+def is_off(name: str, x: Vector, table: ParameterTable) -> bool:
+    """Whether a value in `x` is so near its lower bound that it counts as none."""
+    part = table.slice_of(name)
+    return bool(np.all((x - table.lower)[part] <= OFF * (table.upper - table.lower)[part]))
 
 
 def dispensable(names: Iterable[str], cost: Callable[[list[str]], float], limit: float) -> list[str]:
