@@ -3,19 +3,23 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mfo_backend.fit import kept_values
+from mfo_backend.fit.problem import Rival
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.solve.bounded_least_squares import NormalEquations
+from mfo_backend.types.certainty import Level
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.parameter import Parameter, ParameterTable
-from tests.render.scenes import POINT, write_scene
+from tests.render.scenes import AREA, POINT, SKY, write_scene
 
 NAMES = ["base_color", "roughness", "sheen", "sheen_tint"]
 TRUTH = {"base_color": (0.7, 0.2, 0.1), "roughness": 0.35, "sheen": 0.001, "sheen_tint": 0.001}
@@ -94,3 +98,36 @@ def test_no_set_is_tried_twice():
         held = [frozenset([*names, *off]) for names in sets]
         assert len(held) == 2
         assert len(set(held)) == 2
+
+
+def test_another_material_that_is_as_likely_is_named_and_makes_values_unsure(tmp_path):
+    from mfo_backend.fit.course import Course
+    from mfo_backend.fit.recorded_plan import RecordedPlan
+    from mfo_backend.fit.recorded_stages import RecordedFit
+    from mfo_backend.fit.residuals import RelativeResidual, WeightedResidual
+    from mfo_backend.render.recorded_scene import RecordedScene
+
+    renderer = load_renderer(
+        write_scene(tmp_path, SKY + AREA, size=32), "target", model="mitsuba_principled", parameters=NAMES[:2]
+    )
+    table, mask = renderer.table, renderer.target_mask()
+    truth = table.pack({name: TRUTH[name] for name in NAMES[:2]})
+    course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
+    scene = RecordedScene(renderer, int(mask.sum()))
+    fit = RecordedFit(scene, renderer.image(truth, seed=5, spp=64), mask, RecordedPlan(), 1, course)
+    fit.paths = None
+    refined = fit.refine(truth, RelativeResidual, WeightedResidual)
+    alone = kept_values.keep_values(fit, refined, weighted=True)
+    assert alone.notes == ()
+    assert alone.certainty["roughness"].level is Level.DETERMINED
+
+    other = refined.x.copy()
+    other[table.slice_of("roughness")] += 0.2
+    doubted = kept_values.keep_values(fit, replace(refined, rivals=(Rival(other, 0.25),)), weighted=True)
+    here = float(refined.x[table.slice_of("roughness")][0])
+    assert doubted.notes == (
+        f"With a probability of 25 % it is another material: roughness {here + 0.2:.2g} (not {here:.2g}).",
+    )
+    assert doubted.certainty["roughness"].sd[0] == pytest.approx(0.1, rel=0.05)  # half of 0.2: the root of the share
+    assert doubted.certainty["roughness"].level is Level.WEAK
+    assert doubted.certainty["base_color"] == alone.certainty["base_color"]
