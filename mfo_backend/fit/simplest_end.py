@@ -27,7 +27,7 @@ SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the
 EVALUATIONS = 12
 APART = 0.02  # of the box, in some value: another material
 # More chi squared is not looked at: in ten scenes that Cycles had rendered, such differences were 2.3 to 17 standard
-# deviations by the scatter between tiles, smaller ones at most 1.3 where the other material was the true one
+# deviations by the scatter between tiles, and smaller ones at most 1.3
 HOPELESS = 60.0
 
 
