@@ -72,7 +72,7 @@ class OtherEnds:
             return found  # which is simpler: `_without_lobes` comes there, too
         it = compare(self._all, x, end.x)
         nearer = np.linalg.norm((end.x - self._user) / width) < np.linalg.norm((x - self._user) / width)
-        if it.more < (SIGNIFICANT if nearer else -SIGNIFICANT):
+        if it.more / it.inflation < -SIGNIFICANT or (nearer and it.more < SIGNIFICANT):
             return replace(found, end=end, rivals=(*found.rivals, Rival(x, 1.0 - it.better)))
         return replace(found, rivals=(*found.rivals, Rival(end.x, it.better)))
 

@@ -11,9 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit import simplest_end
 from mfo_backend.fit.problem import Refined, Rival
 from mfo_backend.fit.residuals import normal_equations
 from mfo_backend.fit.simplest_end import OtherEnds, SimplestEnd, coat_to_base, exchanged
+from mfo_backend.fit.told_apart import Comparison
 from mfo_backend.fit.uncertainty import with_rivals
 from mfo_backend.render.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import SolveLimits, solve_bounded
@@ -134,3 +136,13 @@ def test_doubts_widen_a_covariance_by_their_share():
     rivals = (Rival(np.array([0.4, 1.0]), 0.25), Rival(np.array([0.0, 0.0]), 0.0))
     spread = with_rivals(np.eye(2), np.array([0.2, 0.0]), rivals, width)
     np.testing.assert_allclose(spread, np.eye(2) + 0.25 * np.array([[0.04, 0.1], [0.1, 0.25]]))
+
+
+@pytest.mark.parametrize(("distance", "taken"), [(4.9, False), (100.0, True)], ids=["scatter", "noise alone"])
+def test_an_exchange_that_the_user_s_material_speaks_against_has_to_be_clearly_better(monkeypatch, distance, taken):
+    # 12 less of chi squared, which scatter between tiles explains where it is larger than the pictures' distance allows
+    monkeypatch.setattr(simplest_end, "compare", lambda *_: Comparison(-12.0, 8.3, distance))
+    swapped = (0.6, 0.25, 0.12, 0.6, 0.6)
+    found, last = simplest_from(swapped, BOTH, TABLE.pack(dict(zip(NAMES, swapped, strict=True))))
+    np.testing.assert_allclose(last.end.x, BOTH if taken else found.x, atol=0.04)
+    assert len(last.rivals) == 1
