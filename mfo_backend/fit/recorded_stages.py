@@ -199,8 +199,7 @@ class RecordedFit:
         self, problem: Problem, start: Vector, lower: Vector, upper: Vector, *, wanted: float = np.inf
     ) -> Vector:
         """A few steps with other bounds from another solution, given up where they promise no less than `wanted`."""
-        limits = replace(self._limits(problem, 8), known=np.inf, wanted=wanted)
-        return solve_bounded(problem.equations, start, lower, upper, limits, self.course.should_stop).x
+        return self._solve(problem, start, 8, box=(lower, upper), wanted=wanted).x
 
     def _limits(self, problem: Problem, evaluations: int) -> SolveLimits:
         """Limits of a solve, which ends where there is noise at the change that it explains by itself."""

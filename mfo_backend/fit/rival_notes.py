@@ -23,9 +23,8 @@ def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: Paramete
     notes = []
     for rival in sorted(rivals, key=lambda rival: -rival.share):
         away = np.abs(rival.x - x) / (table.upper - table.lower)
-        change = {
-            p.name: float(away[table.slice_of(p.name)].max()) for p in table if _matters(p.name, x, rival.x, table)
-        }
+        names = [name for name in table.names if _matters(name, x, rival.x, table)]
+        change = {name: float(away[table.slice_of(name)].max()) for name in names}
         told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > SEEN_CHANGE][:MOST_VALUES]
         if rival.share < TOLD_FROM or not told:
             continue

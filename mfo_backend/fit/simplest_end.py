@@ -26,8 +26,8 @@ BASE, COAT = ("specular_ior_level", "roughness"), ("coat_weight", "coat_roughnes
 SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the same index does (Blender 4.0)
 EVALUATIONS = 12
 APART = 0.02  # of the box, in some value: another material
-# More chi squared is not looked at: in ten scenes that Cycles had rendered, such differences were 2.3 to 17 standard
-# deviations by the scatter between tiles, and smaller ones at most 1.3
+# More chi squared is not looked at: in nine scenes that Cycles had rendered, such differences were 2.6 to 17 standard
+# deviations by the scatter between tiles, and smaller ones at most 2.3
 HOPELESS = 60.0
 
 

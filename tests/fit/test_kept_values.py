@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +11,7 @@ import pytest
 
 from mfo_backend.fit import kept_values
 from mfo_backend.fit.problem import Rival
+from mfo_backend.fit.recorded_plan import RecordedPlan
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.render.renderer import load_renderer
@@ -19,6 +19,7 @@ from mfo_backend.solve.bounded_least_squares import NormalEquations
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.parameter import Parameter, ParameterTable
+from tests.fit.one_refine import refine
 from tests.render.scenes import AREA, POINT, SKY, write_scene
 
 NAMES = ["base_color", "roughness", "sheen", "sheen_tint"]
@@ -101,22 +102,12 @@ def test_no_set_is_tried_twice():
 
 
 def test_another_material_that_is_as_likely_is_named_and_makes_values_unsure(tmp_path):
-    from mfo_backend.fit.course import Course
-    from mfo_backend.fit.recorded_plan import RecordedPlan
-    from mfo_backend.fit.recorded_stages import RecordedFit
-    from mfo_backend.fit.residuals import RelativeResidual, WeightedResidual
-    from mfo_backend.render.recorded_scene import RecordedScene
-
     renderer = load_renderer(
         write_scene(tmp_path, SKY + AREA, size=32), "target", model="mitsuba_principled", parameters=NAMES[:2]
     )
-    table, mask = renderer.table, renderer.target_mask()
+    table = renderer.table
     truth = table.pack({name: TRUTH[name] for name in NAMES[:2]})
-    course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
-    scene = RecordedScene(renderer, int(mask.sum()))
-    fit = RecordedFit(scene, renderer.image(truth, seed=5, spp=64), mask, RecordedPlan(), 1, course)
-    fit.paths = None
-    refined = fit.refine(truth, RelativeResidual, WeightedResidual)
+    fit, refined = refine(renderer, renderer.image(truth, seed=5, spp=64), truth, RecordedPlan(), 1)
     alone = kept_values.keep_values(fit, refined, weighted=True)
     assert alone.notes == ()
     assert alone.certainty["roughness"].level is Level.DETERMINED

@@ -17,7 +17,7 @@ PICTURES = 200
 
 
 def picture(rng, truth, materials, *, structure=0.0, own=0.0):
-    """A problem with unit noise in each tile; its `structure` is an error that pairs of tiles share."""
+    """A problem with unit noise in each tile; its `structure` is noise that the channels share."""
     noise = rng.normal(size=(TILES, 3)) + structure * rng.normal(size=(TILES, 1))
     data = truth[:, None] + noise
     rows = {}
