@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the rows say beyond error and time: calibration, ablations, where time goes, what each stage gains."""
+"""What the rows say beyond error and time: kept promises, ablations, where time goes, what each stage gains."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .method import METHODS
+from ..types.certainty import Level
+from .method import METHODS, OUR_METHODS, PAPER_METHODS
+from .promise import inside, is_wrongly_determined, miss
 from .row import Row
+from .scenario import SCENARIOS
+from .scene import TABLES
 from .stopwatch import PARTS
-from .summary import SOLVED_FLIP, error_of, quantile
+from .summary import SOLVED_FLIP, comparable_seconds, error_of, grouped, is_at_noise, quantile
 from .table import Table, number
 
 # a normal error is inside 1, 2 and 3 standard deviations in these shares
@@ -40,13 +44,69 @@ def calibration(rows: Sequence[Row]) -> Table | None:
     return Table(heads, lines)
 
 
+def promises(rows: Sequence[Row]) -> Table | None:
+    """How many values the presets call determined, how many of those are wrong, and whether intervals hold the truth.
+
+    The 95 % intervals are those of determined and weak values, each component of a colour counted.
+    """
+    lines = []
+    known = (row for row in rows if row.scenario in SCENARIOS and row.method in OUR_METHODS and row.truth)
+    for (scenario, method), mine in grouped(known).items():
+        determined = wrong = held = shown = 0
+        for row in mine:
+            for name, said in row.certainty.items():
+                parameter = TABLES[SCENARIOS[scenario].model][name]
+                missed = miss(row.recovered[name], row.truth[name], parameter)
+                if said["level"] == Level.DETERMINED.value:
+                    determined += 1
+                    wrong += is_wrongly_determined(missed, said["sd"], parameter)
+                if said["level"] != Level.NOT_VISIBLE.value:
+                    shown += missed.size
+                    held += inside(missed, said["sd"])
+        if shown:
+            share = f"{held / shown:.0%}"
+            counts = (len(mine), determined, wrong, shown)
+            lines.append((scenario, method, *map(str, counts), share))
+    heads = ("scenario", "method", "runs", "called determined", "of these wrong", "determined and weak", "inside 95 %")
+    return Table(heads, lines) if lines else None
+
+
+def against_the_loop(rows: Sequence[Row]) -> Table | None:
+    """Each loss of the paper's loop beside the default preset, on the scenes that both have.
+
+    Nearer: scenes in which the loop's result has the smaller FLIP. Times longer: median ratio of `comparable_seconds`.
+    """
+    _, seconds_of = comparable_seconds(rows)
+    lines = []
+    groups = grouped(rows)
+    for (scenario, method), theirs in groups.items():
+        ours = {row.scene: row for row in groups.get((scenario, "balanced"), ())}
+        both = [(ours[row.scene], row) for row in theirs if method in PAPER_METHODS and row.scene in ours]
+        if not both:
+            continue
+        cells = []
+        for side in zip(*both, strict=True):
+            mean = np.mean([error_of(row.flip) for row in side])
+            cells += [f"{sum(map(is_at_noise, side))} of {len(both)}", number(float(mean))]
+        nearer = sum(error_of(its.flip) < error_of(own.flip) for own, its in both)
+        times = [(seconds_of(own), seconds_of(its)) for own, its in both]
+        ratio = quantile([long / short for short, long in times if short and long], 0.5)
+        lines.append((scenario, method, *cells, str(nearer), number(ratio)))
+    heads = (
+        "scenario", "loop with", "`balanced`: at the noise", "mean FLIP", "loop: at the noise", "mean FLIP",
+        "loop nearer", "times longer",
+    )  # fmt: skip
+    return Table(heads, lines) if lines else None
+
+
 def ablations(rows: Sequence[Row]) -> Table | None:
     """Each ablation against the whole method, on the scenes that both have."""
     lines = []
+    groups = grouped(rows)
     for name, method in METHODS.items():
         for scenario in dict.fromkeys(row.scenario for row in rows):
-            less = {row.scene: row for row in rows if (row.scenario, row.method) == (scenario, name)}
-            whole = {row.scene: row for row in rows if (row.scenario, row.method) == (scenario, method.compares_with)}
+            less = {row.scene: row for row in groups.get((scenario, name), ())}
+            whole = {row.scene: row for row in groups.get((scenario, method.compares_with), ())}
             scenes = sorted(set(less) & set(whole))
             if not scenes:
                 continue
@@ -64,8 +124,8 @@ def ablations(rows: Sequence[Row]) -> Table | None:
 def time_parts(rows: Sequence[Row]) -> Table | None:
     """Median seconds of loading and of the parts of a fit, and what a process costs once: imports and kernels."""
     lines = []
-    for scenario, method in dict.fromkeys((row.scenario, row.method) for row in rows):
-        mine = [row for row in rows if (row.scenario, row.method) == (scenario, method) and row.parts]
+    for (scenario, method), group in grouped(rows).items():
+        mine = [row for row in group if row.parts]
         if not mine:
             continue
         warm = [
@@ -91,8 +151,8 @@ def time_parts(rows: Sequence[Row]) -> Table | None:
 def stage_gains(rows: Sequence[Row]) -> Table | None:
     """Median FLIP and passes at the end of every stage."""
     lines = []
-    for scenario, method in dict.fromkeys((row.scenario, row.method) for row in rows):
-        mine = [row for row in rows if (row.scenario, row.method) == (scenario, method) and row.stages]
+    for (scenario, method), group in grouped(rows).items():
+        mine = [row for row in group if row.stages]
         names = dict.fromkeys(stage["name"] for row in mine for stage in row.stages)
         for name in names:
             ends = [stage for row in mine for stage in row.stages if stage["name"] == name]

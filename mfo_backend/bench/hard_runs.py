@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ..fit.choose_groups import detail_grid
 from ..fit.recover_material import recover_material
 from ..fit.settings import FitSettings
-from ..fit.uncertainty import DETERMINED_BELOW
 from ..metrics.compare import compare_images
 from ..metrics.tone_mapping import DisplayView
 from ..render.highlight_cells import Highlights
@@ -26,6 +25,7 @@ from ..types.parameter import ParameterTable, Value
 from ..types.result import FitResult
 from .hard_cases import HardCase, HardScene, write_hard_scene
 from .judge import relative_rmse
+from .promise import is_wrongly_determined, miss
 from .scene import SHAPE
 
 _REFERENCE_SEED, _JUDGE_SEED = 0x4A2D0000, 0x4A2D8000
@@ -103,10 +103,8 @@ def wrongly_determined(result: FitResult, truth: Mapping[str, Value], table: Par
     more than "determined" promises."""
     wrong = []
     for name, certainty in result.certainty.items():
-        parameter = table[name]
-        miss = np.abs(np.subtract(result.recovered[name], np.clip(truth[name], parameter.lower, parameter.upper)))
-        least = DETERMINED_BELOW * (parameter.upper - parameter.lower)
-        if certainty.level is Level.DETERMINED and np.any(miss > np.maximum(3.0 * np.array(certainty.sd), least)):
+        missed = miss(result.recovered[name], truth[name], table[name])
+        if certainty.level is Level.DETERMINED and is_wrongly_determined(missed, certainty.sd, table[name]):
             wrong.append(name)
     return tuple(wrong)
 

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The short table of a bench for pages that name its figures, such as the README, so that nobody types them."""
+"""Tables of a bench for pages that name its figures, such as the README, so that nobody types them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
 
+from .findings import against_the_loop, promises
 from .row import Row
 from .summary import SOLVED_FLIP, comparable_seconds, quantile, summaries
 from .table import Table, number
 
 OURS, PAPERS = "balanced", "mfo-hdr"
-_BLOCK = re.compile(r"<!-- bench -->\n.*?<!-- end -->", re.DOTALL)
+_BLOCK = re.compile(r"(<!-- (bench|bench loop|bench promises) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def headline(rows: Sequence[Row]) -> Table:
@@ -42,14 +43,31 @@ def headline(rows: Sequence[Row]) -> Table:
     return Table(["scenes", *heads, "times longer"], lines)
 
 
+def has_block(page: str) -> bool:
+    """Whether `fill` would find something to fill."""
+    return bool(_BLOCK.search(page))
+
+
 def fill(page: str, rows: Sequence[Row]) -> str:
-    """The page with everything between ``<!-- bench -->`` and ``<!-- end -->`` made anew; unchanged without them."""
-    text = (
-        f"{chr(10).join(headline(rows).markdown())}\n\n"
-        f"Solved: mean FLIP over the object of at most {SOLVED_FLIP:g}; at the noise: the result is at most "
-        f"{SOLVED_FLIP:g} further from the reference than the truth is. FLIP and time are medians.\n"
-    )
-    return _BLOCK.sub(lambda _: f"<!-- bench -->\n{text}<!-- end -->", page)
+    """The page with everything in its blocks made anew; unchanged without them.
+
+    A block goes from ``<!-- bench -->`` to ``<!-- end -->`` and has the short table; from ``<!-- bench loop -->`` it
+    has `against_the_loop`, from ``<!-- bench promises -->`` what `promises` says of the default preset.
+    """
+    return _BLOCK.sub(lambda found: f"{found[1]}{_text(found[2], rows)}{found[3]}", page)
+
+
+def _text(name: str, rows: Sequence[Row]) -> str:
+    if name == "bench":
+        table: Table | None = headline(rows)
+        below = (
+            f"\nSolved: mean FLIP over the object of at most {SOLVED_FLIP:g}; at the noise: the result is at most "
+            f"{SOLVED_FLIP:g} further from the reference than the truth is. FLIP and time are medians.\n"
+        )
+    else:
+        table = against_the_loop(rows) if name == "bench loop" else promises([r for r in rows if r.method == OURS])
+        below = ""
+    return "".join(f"{line}\n" for line in table.markdown()) + below if table else ""
 
 
 def _ratios(rows: Sequence[Row], seconds_of: Callable[[Row], float | None]) -> list[float]:

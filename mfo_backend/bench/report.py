@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 
 from ..job.atomic_file import write_atomically
-from .findings import ablations, calibration, stage_gains, time_parts
+from .findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
 from .gallery import gallery
 from .hard_section import hard_section
 from .method import METHODS
@@ -82,6 +82,8 @@ def write_report(folder: Path, *, notes: Sequence[str] = ()) -> str:
     sections = [_scenario(folder, rows, name) for name in dict.fromkeys(row.scenario for row in comparable_order(rows))]
     sections += [Section(title, tables=[table]) for title, table in paper_tables(rows)]
     for title, table in (
+        ("The paper's loop against `balanced`", against_the_loop(rows)),
+        ("How far certainties can be trusted", promises(rows)),
         ("What each stage gains", stage_gains(rows)),
         ("Ablations", ablations(rows)),
         ("Hard cases", hard_section(folder)),

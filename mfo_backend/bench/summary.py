@@ -69,11 +69,16 @@ def summaries(rows: Iterable[Row]) -> list[Summary]:
     """One summary per scenario and method, in the order of the tables."""
     rows = list(rows)
     _, seconds_of = comparable_seconds(rows)
+    return [_summary(scenario, method, mine, seconds_of) for (scenario, method), mine in grouped(rows).items()]
+
+
+def grouped(rows: Iterable[Row]) -> dict[tuple[str, str], list[Row]]:
+    """The rows of each scenario and method, in the order of the tables."""
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.scenario, row.method), []).append(row)
     order = sorted(groups, key=lambda g: (_place(g[0], tuple(SCENARIOS)), _place(g[1], tuple(METHODS))))
-    return [_summary(scenario, method, groups[scenario, method], seconds_of) for scenario, method in order]
+    return {group: groups[group] for group in order}
 
 
 def comparable_seconds(rows: Iterable[Row]) -> tuple[str, Callable[[Row], float | None]]:
@@ -104,6 +109,13 @@ def error_of(value: float | None) -> float:
     return math.inf if value is None or math.isnan(value) else value
 
 
+def is_at_noise(row: Row) -> bool:
+    """Whether the result is at most 0.02 further from the reference, in FLIP, than the true picture is."""
+    if row.reference_flip is None or row.floor_flip is None:
+        return False
+    return error_of(row.reference_flip) - row.floor_flip <= SOLVED_FLIP
+
+
 def _summary(scenario: str, method: str, rows: Sequence[Row], seconds_of: Callable[[Row], float | None]) -> Summary:
     seconds = [row.seconds for row in rows if row.seconds is not None]
     flips = [error_of(row.flip) for row in rows]
@@ -116,7 +128,7 @@ def _summary(scenario: str, method: str, rows: Sequence[Row], seconds_of: Callab
         raised=sum(bool(row.error) for row in rows),
         solved=solved,
         close=sum(flip <= 0.05 for flip in flips),
-        at_noise=sum(_above_noise(row) <= SOLVED_FLIP for row in rows),
+        at_noise=sum(map(is_at_noise, rows)),
         seconds=(quantile(seconds, 0.5), quantile(seconds, 0.9)),
         processor_seconds=quantile([r.processor_seconds for r in rows if r.processor_seconds is not None], 0.5),
         seconds_per_solved=sum(seconds_of(row) or 0.0 for row in rows) / solved if solved else math.inf,
@@ -127,12 +139,6 @@ def _summary(scenario: str, method: str, rows: Sequence[Row], seconds_of: Callab
         relit_flip=quantile([flip for row in rows for flip in (row.relit_flips or [math.inf])], 0.5),
         jod=(sum(jods) / len(jods), min(jods)) if jods else (math.nan, math.nan),
     )
-
-
-def _above_noise(row: Row) -> float:
-    if row.reference_flip is None or row.floor_flip is None:
-        return math.inf
-    return error_of(row.reference_flip) - row.floor_flip
 
 
 def _place(name: str, order: Sequence[str]) -> int:

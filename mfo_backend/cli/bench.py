@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from ..bench.assets import Assets
-from ..bench.headline import fill
+from ..bench.headline import fill, has_block
 from ..bench.method import DEFAULT_METHODS, METHODS, missing_for
 from ..bench.report import write_report
 from ..bench.row import Row
@@ -147,7 +147,7 @@ def _page_text(page: Path) -> str:
         text = page.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise BadInputError(f"The page {page} cannot be read ({error}): give a Markdown file.") from None
-    if "<!-- bench -->" not in text:
+    if not has_block(text):
         raise BadInputError(
             f"{page} has no block from `<!-- bench -->` to `<!-- end -->`: write one where the table is to be."
         )

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from mfo_backend.bench.findings import ablations, calibration, stage_gains, time_parts
+from mfo_backend.bench.findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
 from mfo_backend.bench.hard_section import hard_section
 from mfo_backend.bench.paper_figures import PAPER_NAMES, paper_figure
 from mfo_backend.bench.paper_tables import paper_tables
@@ -33,6 +33,32 @@ def test_coverage_counts_every_component():
     assert cells["determined"] == ("2", "50%", "50%", "100%")  # errors of 0.5 and 2.5 sd
     assert cells["weak"] == ("6", "67%", "83%", "83%")  # 0, 1.5, 4, 0.5, 0, 0
     assert calibration([row(Task("noise", 0, "mfo-hdr"))]) is None
+
+
+def test_promises_are_counted_by_value_and_intervals_by_component():
+    table = promises([fitted(0, 0.525, [0.5, 0.65, 0.9]), fitted(1, 0.535, [0.45, 0.5, 0.5])])
+    assert table is not None
+    # roughness is off by 0.025 and 0.035 with 0.01: outside both intervals, wrong from 0.03 on; of the colour's six
+    # components one is off by 4 deviations, all others by at most 1.5
+    assert table.rows == [("noise", "balanced", "2", "2", "1", "8", "62%")]
+    unseen = {"roughness": {"sd": [0.3], "level": "not_visible"}}
+    hidden = row(Task("noise", 0, "balanced"), certainty=unseen, truth=TRUTH, recovered={"roughness": 0.5})
+    assert promises([hidden]) is None
+    assert promises([row(Task("noise", 0, "mfo-hdr"))]) is None
+
+
+def test_the_loop_is_held_against_ours_on_common_scenes():
+    ours = [row(Task("noise", n, "balanced"), flip=0.02, processor_seconds=2.0) for n in range(3)]
+    loop = [
+        row(Task("noise", 1, "mse-ldr"), flip=0.01, processor_seconds=40.0),
+        row(Task("noise", 2, "mse-ldr"), flip=0.05, processor_seconds=20.0, reference_flip=0.03),
+        row(Task("noise", 7, "mse-ldr"), flip=0.9, processor_seconds=1.0),
+        row(Task("noise", 1, "mfo-hdr-kept"), flip=0.01, processor_seconds=1.0),
+    ]
+    table = against_the_loop([*ours, *loop])
+    assert table is not None
+    assert table.rows == [("noise", "mse-ldr", "2 of 2", "0.02", "1 of 2", "0.03", "1", "15")]
+    assert against_the_loop(loop) is None
 
 
 def test_an_ablation_is_compared_on_common_scenes():

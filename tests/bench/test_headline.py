@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mfo_backend.bench.headline import fill, headline
+from mfo_backend.bench.headline import fill, has_block, headline
 from mfo_backend.bench.row import Task
 from mfo_backend.bench.row_file import RowFile
 from mfo_backend.cli.main import main
@@ -40,6 +40,25 @@ def test_only_the_block_changes() -> None:
     assert "old" not in page
     assert fill(page, ROWS) == page
     assert fill("no block", ROWS) == "no block"
+
+
+def test_a_page_may_have_several_blocks() -> None:
+    sure = {"roughness": {"sd": [0.01], "level": "determined"}}
+    values = {
+        "truth": {"roughness": 0.5},
+        "recovered": {"roughness": 0.505},
+        "certainty": sure,
+        "processor_seconds": 2.0,
+    }
+    rows = [*ROWS, row(Task("noise", 1, "balanced"), **values), row(Task("noise", 1, "best"), **values)]
+    page = fill("<!-- bench loop -->\n<!-- end -->\n<!-- bench promises -->\nold\n<!-- end -->\n<!-- bench -->", rows)
+    assert "| base | mfo-hdr | 2 of 2 | 0.01 | 2 of 2 | 0.255 | 0 | 25 |" in page
+    assert "| noise | balanced | 1 | 1 | 0 | 1 | 100% |" in page
+    assert "| noise | best |" not in page
+    assert "old" not in page
+    assert page.endswith("<!-- bench -->")
+    assert has_block(page)
+    assert not has_block("<!-- bench -->")
 
 
 def test_the_command_fills_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
