@@ -2,11 +2,11 @@
 """What an evaluation with all derivatives costs against pixels, samples, parameters and triangles, and a fit against
 pixels.
 
-    python bench/scaling.py [--only pixels ...] [--repeat 15] [--doc docs/bench/scaling]
+    python bench/scaling.py [--only pixels ... | --doc docs/bench/scaling] [--repeat 15]
 
 Prints a line for each point, the median of CPU seconds on all cores, and the fitted exponents of each series. The
 recording, which is what triangles cost, is measured apart from the evaluations. Fits are of `mfo bench`'s first scenes.
-`--doc` gets a page with tables and plots.
+`--doc` gets a page with tables and plots of all series.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from bench.scene_fit import fit_to, open_bench_scene, true_vector, write_bench_scene  # noqa: E402
+from bench.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene  # noqa: E402
 from mfo_backend.bench.scene import materials_of  # noqa: E402
 from mfo_backend.bench.svg_axes import COLOURS, SvgAxes, around  # noqa: E402
 from mfo_backend.bench.table import Table, number  # noqa: E402
@@ -67,6 +67,8 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=15)
     parser.add_argument("--doc", type=Path, metavar="FOLDER")
     arguments = parser.parse_args()
+    if arguments.doc and set(arguments.only) != set(SERIES):
+        parser.error("--doc writes the whole page: leave --only out")
     from mfo_backend.render.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
@@ -151,7 +153,7 @@ def fits(scenario: str) -> Callable[[int], list[Point]]:
 
 
 _AT = "128 x 128 pixels, 16 rays each, a point light, 20 values of Blender's Principled BSDF with coat and sheen"
-_FITS = f"64 to 1024 squared, 11 values of Mitsuba's `principled`, `balanced`, median of {SCENES} scenes"
+_FITS = f"64 to 1024 squared, all 13 values of Mitsuba's `principled`, `balanced`, median of {SCENES} scenes"
 SERIES = {
     "pixels": Series(
         "pixels", "light paths", f"{_AT.replace('128 x 128 pixels, 16', '64 to 1024 squared, 4')}.", pixels
@@ -201,12 +203,11 @@ def cost(x: int, repeat: int, *, size: int = 128, grid: int = 4, names: Sequence
 
 def _fits(scenario: str, size: int) -> Point:
     seconds, passes = [], []
-    for number_ in range(SCENES):
+    for scene_number in range(SCENES):
         with tempfile.TemporaryDirectory() as folder:
-            scene = write_bench_scene(scenario, number_, size, Path(folder))
+            scene = write_bench_scene(scenario, scene_number, size, Path(folder))
             renderer, settings = open_bench_scene(scene, "balanced")
-            spp = min(scene.scenario.reference_spp, MOST_SAMPLES)
-            reference = renderer.image(true_vector(scene, renderer), seed=REFERENCE_STREAM + number_, spp=spp)
+            reference = reference_of(scene, renderer, REFERENCE_STREAM + scene_number, most_spp=MOST_SAMPLES)
             for _ in range(1 if seconds else 2):  # the first compiles
                 renderer.passes, began = 0.0, time.process_time()
                 result = fit_to(renderer, reference, settings)

@@ -44,9 +44,10 @@ def true_vector(scene: Any, renderer: Any) -> NDArray[np.float64]:
     return renderer.table.pack({**renderer.table.unpack(renderer.start), **scene.truth})
 
 
-def reference_of(scene: Any, renderer: Any, seed: int) -> NDArray[np.float32]:
-    """A picture of the true values with the scenario's samples."""
-    return renderer.image(true_vector(scene, renderer), seed=seed, spp=scene.scenario.reference_spp)
+def reference_of(scene: Any, renderer: Any, seed: int, *, most_spp: int = 1 << 30) -> NDArray[np.float32]:
+    """A picture of the true values with the scenario's samples, or at most `most_spp`."""
+    spp = min(scene.scenario.reference_spp, most_spp)
+    return renderer.image(true_vector(scene, renderer), seed=seed, spp=spp)
 
 
 def fit_to(renderer: Any, reference: NDArray[np.float32], settings: Any) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The own solver stays while it needs no more evaluations than SciPy's: a count, which no load of a machine changes."""
+"""With six values the own solver needs fewer evaluations than SciPy's: a count, which no load of a machine changes."""
 
 from __future__ import annotations
 
