@@ -13,6 +13,7 @@ from ..types.status import Status
 from .stages import Candidate
 
 START_KEPT = "Nothing was better than the start, so the start was kept."
+SQUARES_KEPT = "No perceptual stage was better in a picture of its own, so the end of {stage!r} was kept."
 
 
 def final_result(

@@ -17,7 +17,7 @@ from ..types.image import Encoding, Image, Pixels
 from ..types.status import Status
 from .course import Course
 from .displayed_residual import DisplayedResidual
-from .final_result import final_result
+from .final_result import SQUARES_KEPT, final_result
 from .finishing import finishing_residuals
 from .fit_material import FitOutcome
 from .kept_values import keep_values
@@ -142,7 +142,7 @@ def fit_recorded(
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     if best == 1 and len(ends) > 2:
-        notes.append("No perceptual stage was better in a picture of its own, so the end of 'refine' was kept.")
+        notes.append(SQUARES_KEPT.format(stage="refine"))
     result = final_result(
         renderer,
         pictures,

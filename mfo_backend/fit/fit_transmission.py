@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The presets `fast` and `balanced` for materials whose light passes through them: least squares on traced paths."""
+"""The presets for materials whose light passes through them: least squares on traced paths, then FLIP."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from ..types.image import Encoding, Image, Pixels
 from ..types.parameter import ParameterTable
 from ..types.status import Status
 from .course import Course
-from .final_result import final_result
+from .final_result import SQUARES_KEPT, final_result
 from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
 from .kept_values import VISIBLE, kept_note
+from .picture_judge import PictureJudge
 from .polished import CORE, Polished
 from .settings import FitSettings
+from .traced_flip import FLIP, lower_traced_flip
 from .transmission_plan import TransmissionPlan
 from .transmission_stages import TransmissionFit
 from .uncertainty import WEAK_BELOW, certainties
@@ -72,8 +74,9 @@ def fit_transmission(
     scene_view = DisplayView.for_scene(reference.pixels, mask) if reference.encoding is Encoding.LINEAR else None
     view = scene_view or display or DisplayView()
     paths = TracedPaths(renderer)
-    listener(Started(stages=STAGES, parameters=renderer.table.names, seconds=time.monotonic() - began))
-    course = Course(renderer, STAGES, listener, should_stop, began)
+    stages = (*STAGES, FLIP) if settings.preset == "best" else STAGES
+    listener(Started(stages=stages, parameters=renderer.table.names, seconds=time.monotonic() - began))
+    course = Course(renderer, stages, listener, should_stop, began)
     light, clipped = linear_pixels(reference, view), clipped_pixels(reference, view)
     course.picture = lambda x: _preview(paths, x, mask.shape, settings.seed ^ VERIFY_STREAM)
     fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
@@ -94,16 +97,27 @@ def fit_transmission(
         if chosen == 0 and freest < len(ends) - 1:
             # values may go back to the user's by the noisy squares and not by the eye
             found.append(ends[freest].x)
+    name = "flip-ldr" if ldr else "flip-hdr"
+    judge = PictureJudge(name, reference, light, mask, settings, view, blurred=reference.encoding is Encoding.LINEAR)
+    flipped: list[Vector] = []
+    if FLIP in stages and ends and not should_stop():
+        flipped = lower_traced_flip(
+            fit.pictures, judge, reference, view, found[0], ends[-1].kept, course, settings.seed
+        )
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
     )
-    pictures = verification.pictures(verification.begin(renderer.start), found)
-    name = "flip-ldr" if ldr else "flip-hdr"
+    pictures = verification.pictures(verification.begin(renderer.start), [*found, *flipped])
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
     seen = [loss.value(picture.image) for picture in pictures]
     kept = len(found) == 2 and seen[1] <= seen[2] + VISIBLE
     best = 1 if kept else len(found)
+    if flipped and best == 1:
+        if judge.value(pictures[-1].image) < judge.value(pictures[1].image):
+            best = len(pictures) - 1
+        else:
+            notes.append(SQUARES_KEPT.format(stage="polish"))
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
     if ends:
@@ -111,7 +125,7 @@ def fit_transmission(
         certainty = _certainty(shown, renderer.table)
         back = [name for name in certainty if shown[-1].kept[renderer.table.slice_of(name)].all()]
         unseen = [name for name in back if certainty[name].level is Level.NOT_VISIBLE]
-        notes = [kept_note(unseen)] if unseen and best else []
+        notes += [kept_note(unseen)] if unseen and best else []
     counts = fit.pictures.counts
     if counts is not None:
         notes.append(
