@@ -23,7 +23,7 @@ MOST_PIXELS = 1 << 16  # FLIP needs whole pictures; of more pixels one takes too
 HALF_PATHS = 1 << 19  # of a half of a picture; a quarter, and two of ten results were worse for the noise
 HALF_SAMPLES = (4, 32)  # of a pixel, at least and at most
 REACH = 0.1  # of the range: as far as one linear picture is trusted
-ROUNDS = 2  # linear pictures; a third gained less than a hundredth
+ROUNDS = 2  # linear pictures; a third gained about a hundredth at most
 STILL = 0.01  # of the range: a shorter way needs no other picture
 
 Vector = NDArray[np.float64]
