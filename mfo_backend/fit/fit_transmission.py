@@ -98,9 +98,10 @@ def fit_transmission(
             # values may go back to the user's by the noisy squares and not by the eye
             found.append(ends[freest].x)
     name = "flip-ldr" if ldr else "flip-hdr"
-    judge = PictureJudge(name, reference, light, mask, settings, view, blurred=reference.encoding is Encoding.LINEAR)
-    flipped: list[Vector] = []
+    judge, flipped = None, []
     if FLIP in stages and ends and not should_stop():
+        blurred = reference.encoding is Encoding.LINEAR
+        judge = PictureJudge(name, reference, light, mask, settings, view, blurred=blurred)
         flipped = lower_traced_flip(
             fit.pictures, judge, reference, view, found[0], ends[-1].kept, course, settings.seed
         )
@@ -113,13 +114,12 @@ def fit_transmission(
     seen = [loss.value(picture.image) for picture in pictures]
     kept = len(found) == 2 and seen[1] <= seen[2] + VISIBLE
     best = 1 if kept else len(found)
-    if flipped and best == 1:
-        if judge.value(pictures[-1].image) < judge.value(pictures[1].image):
-            best = len(pictures) - 1
-        else:
-            notes.append(SQUARES_KEPT.format(stage="polish"))
+    if judge and flipped and best == 1 and judge.value(pictures[-1].image) < judge.value(pictures[1].image):
+        best = len(pictures) - 1
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
+    if flipped and best == 1:
+        notes.append(SQUARES_KEPT.format(stage="polish"))
     if ends:
         shown = ends if kept or len(found) == 1 else ends[: freest + 1]
         certainty = _certainty(shown, renderer.table)

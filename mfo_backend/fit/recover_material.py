@@ -14,10 +14,8 @@ from ..types.event import Listener
 from ..types.image import Image
 from .fit_material import FitOutcome, fit_material
 from .fit_recorded import fit_recorded
-from .fit_transmission import STAGES, fit_transmission
+from .fit_transmission import fit_transmission
 from .settings import FitSettings
-
-_TRACED = ", ".join(map(repr, STAGES))
 
 
 def recover_material(
@@ -29,7 +27,7 @@ def recover_material(
     listener: Listener,
     should_stop: Callable[[], bool],
 ) -> FitOutcome:
-    """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`).
+    """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`, `best`).
 
     A material that recorded paths cannot hold, such as glass, is fitted by `fit_transmission`; where that cannot do it
     either, by `fit_material` whatever the preset. The last of the result's notes says which and why.
@@ -50,7 +48,8 @@ def recover_material(
             except UnrecordableError as error:
                 reason = f"{reason} {error}"
             else:
-                return _noted(outcome, f"{reason} So whole light paths were traced, by the stages {_TRACED}.")
+                stages = ", ".join(repr(stage.name) for stage in outcome.result.stages)
+                return _noted(outcome, f"{reason} So whole light paths were traced, by the stages {stages}.")
         else:
             reason += " The stages on whole light paths know no losses of the user's choice."
         reason += f" So the preset 'paper' was used instead of {settings.preset!r}."

@@ -20,10 +20,10 @@ FLIP = "flip"
 STREAM = 0x6F000000  # random numbers of no other stage
 WORTH = 0.02  # relative difference of blocks of pixels that noise does not explain; less is hard to see
 MOST_PIXELS = 1 << 16  # FLIP needs whole pictures; of more pixels one takes too long
-HALF_PATHS = 1 << 19  # of a half of a picture; a quarter, and two of ten results were worse for the noise
+HALF_PATHS = 1 << 19  # of a half of a picture; with fewer, noise decides some results (docs/glass.md)
 HALF_SAMPLES = (4, 32)  # of a pixel, at least and at most
 REACH = 0.1  # of the range: as far as one linear picture is trusted
-ROUNDS = 2  # linear pictures; a third gained about a hundredth at most
+ROUNDS = 2  # linear pictures; a third changed nothing
 STILL = 0.01  # of the range: a shorter way needs no other picture
 
 Vector = NDArray[np.float64]
@@ -41,11 +41,14 @@ def lower_traced_flip(
 ) -> list[Vector]:
     """The point of lower FLIP by `judge`, seen from `start`, with the values of `kept` as they are.
 
-    There is none where the picture at `start` differs from the reference by less than noise explains or an eye sees,
-    where the reference is compared at equal counts (its noise is all there is to see) and for too large a target.
+    There is none where nothing was better, where the picture at `start` differs from the reference by less than noise
+    explains or an eye sees, where the reference is compared at equal counts (its noise is all there is to see) and for
+    too large a target.
 
     Noise is no part of the search: a picture and its derivatives are traced once, many paths a pixel, and FLIP is
-    minimised over the linear picture y + J (x - start) within `REACH`; then once more from there.
+    minimised over the linear picture y + J (x - start) within `REACH`; then once more from there. The search is in
+    units of that small box and ends early: one in units of the whole range follows the reference's noise further
+    (docs/glass.md).
     """
     mask, table = pictures.mask, pictures.paths.table
     pixels = np.flatnonzero(mask)
@@ -78,7 +81,7 @@ def lower_traced_flip(
                 break
             new, _ = minimise_flip(
                 judge,
-                _LinearPicture(rows, x, kept, whole, mask),
+                _LinearPicture(rows, x, whole, mask),
                 x,
                 np.maximum(table.lower, x - reach),
                 np.minimum(table.upper, x + reach),
@@ -89,7 +92,7 @@ def lower_traced_flip(
             x = stage.vector = new
             if moved < STILL:
                 break
-    return [x]
+    return [] if np.array_equal(x, start) else [x]
 
 
 class _LinearPicture:
@@ -99,11 +102,10 @@ class _LinearPicture:
         self,
         rows: NDArray[np.float32],
         at: Vector,
-        kept: NDArray[np.bool_],
         whole: Callable[[NDArray[np.floating]], Pixels],
         mask: NDArray[np.bool_],
     ) -> None:
-        self._image, self._jacobian = rows[..., 0], np.where(kept, np.float32(0.0), rows[..., 1:])
+        self._image, self._jacobian = rows[..., 0], rows[..., 1:]
         self._at, self._whole, self._mask = at, whole, mask
 
     def __call__(self, x: Vector) -> tuple[Pixels, Callable[[Pixels], Vector]]:

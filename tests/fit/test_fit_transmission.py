@@ -12,40 +12,17 @@ from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.tile_pools import TilePools
 from mfo_backend.fit.transmission_stages import MOST_SAMPLES, TransmissionFit
-from mfo_backend.render.renderer import load_renderer
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.event import Preview, Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
+from tests.fit.glass import NAMES, TRUTH, fit, load
 from tests.fit.stage_ends import assert_stages_leave_their_values
-from tests.render.scenes import AREA, FLOOR, SKY, write_scene
-
-NAMES = ["base_color", "roughness", "ior", "transmission_weight"]
-TRUTH = {"base_color": (0.9, 0.6, 0.3), "roughness": 0.35, "ior": 1.4, "transmission_weight": 0.9}
-
+from tests.render.scenes import FLOOR, SKY
 
 # few paths through the glass find it
 SMALL_LAMP = """<shape type="sphere"><point name="center" x="1" y="-2" z="3"/><float name="radius" value="0.1"/>
 <emitter type="area"><rgb name="radiance" value="3000, 2800, 2400"/></emitter></shape>"""
-
-
-def load(folder, names=NAMES, sockets=None, lights=SKY + AREA + FLOOR, **options):
-    sockets = {"Transmission Weight": {"value": 0.5, "linked": False}} if sockets is None else sockets
-    materials = {"target_bsdf": {"name": "Glass", "distribution": "MULTI_GGX", "sockets": sockets}}
-    path = write_scene(folder, lights, depth=8, **options)
-    return load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
-
-
-def fit(renderer, reference, *, preset="fast", stop=lambda: False):
-    events = []
-    outcome = recover_material(
-        renderer,
-        Image(reference, Encoding.LINEAR),
-        FitSettings(model="blender_principled", preset=preset, verify_spp=32),
-        listener=events.append,
-        should_stop=stop,
-    )
-    return outcome.result, events
 
 
 def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
