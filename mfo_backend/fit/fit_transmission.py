@@ -91,12 +91,15 @@ def fit_transmission(
         ends = fit.polish(found[0])
         candidates = [end.x for end in reversed(ends)] + found
         chosen = fit.choose(candidates)
-        ends = ends[: max(len(ends) - chosen, 1)]
+        raced = chosen == len(ends)
         found = [candidates[chosen]]
+        ends = ends if raced else ends[: len(ends) - chosen]
         freest = int(np.argmin([end.kept.sum() for end in ends]))
-        if chosen == 0 and freest < len(ends) - 1:
-            # values may go back to the user's by the noisy squares and not by the eye
+        if raced or (chosen == 0 and freest < len(ends) - 1):
+            # by the noisy squares values may go back to the user's, and a race look better, where no eye agrees
             found.append(ends[freest].x)
+        if raced:
+            ends = ends[: freest + 1]
     name = "flip-ldr" if ldr else "flip-hdr"
     judge, flipped = None, []
     if FLIP in stages and ends and not should_stop():

@@ -31,8 +31,12 @@ class LobeChoice:
         return self.probability.get(name)
 
 
-def lobe_choice(layers: Layers, with_transparency: bool) -> LobeChoice:
-    """Probabilities from the weights of the layers, normalised over reflection, transmission and, if asked, alpha."""
+def lobe_choice(layers: Layers, with_transparency: bool, least_diffuse: float = 0.0) -> LobeChoice:
+    """Probabilities from the weights of the layers, normalised over reflection, transmission and, if asked, alpha.
+
+    Under glass the diffuse lobe gets at least `least_diffuse`: derivatives by its weight and colour need its
+    directions also where it shows nothing itself, and a tiny probability makes them rare and huge.
+    """
     mu = layers.wi.z
     strength: dict[str, Any] = {}
     if with_transparency:
@@ -54,7 +58,12 @@ def lobe_choice(layers: Layers, with_transparency: bool) -> LobeChoice:
     last = "diffuse" if "diffuse" in strength else next(reversed(strength))
     strength[last] += 1e-6
     scale = dr.rcp(sum(strength.values()))
-    return LobeChoice({name: strength[name] * scale for name in NAMES if name in strength})
+    probability = {name: strength[name] * scale for name in NAMES if name in strength}
+    if least_diffuse > 0.0 and "glass" in probability and "diffuse" in probability:
+        diffuse = dr.maximum(probability["diffuse"], least_diffuse)
+        others = (1 - diffuse) / dr.maximum(1 - probability["diffuse"], 1e-6)
+        probability = {name: diffuse if name == "diffuse" else p * others for name, p in probability.items()}
+    return LobeChoice(probability)
 
 
 def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = False) -> Any:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -39,6 +40,7 @@ _DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmi
 _TRANSMITS = (
     int(mi.BSDFFlags.GlossyTransmission) | int(mi.BSDFFlags.DeltaTransmission) | int(mi.BSDFFlags.DiffuseTransmission)
 )
+LEAST_DIFFUSE = 0.02  # probability, under glass: more takes paths from the glass
 DEEPEST = 32  # path length of a scene without a limit
 
 
@@ -259,7 +261,9 @@ class TracedPaths:
             new = [beta[0] * f_next[0] * inverse]
             for k in range(directions):
                 new.append((beta[1 + k] * f_next[0] + beta[0] * f_next[1 + k]) * inverse)
-            active = usable & (dr.max(new[0]) > 1e-5)
+            # a path that shows nothing itself may have derivatives
+            strongest = reduce(dr.maximum, (dr.max(dr.abs(c)) for c in new))
+            active = usable & (strongest > 1e-5)
             after = {
                 "ray": si.spawn_ray(si.to_world(local)),
                 "beta": new,
@@ -330,7 +334,7 @@ class TracedPaths:
         layers = layer_stack(parameters, si.wi, plugin.lobes, plugin.model)
         if plugin.filtered:
             layers = layers.blurred(si.duv_dx.x)
-        choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha)
+        choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha, least_diffuse=LEAST_DIFFUSE)
         only = plugin.reachable_only
         drawn, lobe, valid = sample(layers, choice, u1, u2)
         towards = dr.detach(layers.to_frame(wo))

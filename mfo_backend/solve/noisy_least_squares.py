@@ -128,7 +128,7 @@ class SafeMatrix:
     """The matrix of noisy equations with its eigenvalues raised, so that it can be inverted.
 
     `width` scales the unknowns. After scaling by the diagonal no eigenvalue is below `FLOOR`; a column whose product
-    with itself is negative counts as one without effect (`blind`).
+    with itself is negative counts as one without effect (`blind`), so its products with others are noise, too.
     """
 
     FLOOR = 0.03
@@ -140,7 +140,9 @@ class SafeMatrix:
         self.blind = diagonal <= 1e-6 * max(float(diagonal.max()), 1e-12)
         self._width = width
         self.scale: Vector = np.sqrt(np.maximum(diagonal, 1e-4 * max(float(diagonal.max()), 1e-12))) / width
-        self._raw, self.vectors = np.linalg.eigh(equations.hessian / np.outer(self.scale, self.scale))
+        scaled = equations.hessian / np.outer(self.scale, self.scale)
+        scaled[self.blind] = scaled[:, self.blind] = 0.0
+        self._raw, self.vectors = np.linalg.eigh(scaled)
         self.values: Vector = np.maximum(self._raw, self.FLOOR)
 
     def covariance(self, noise: Vector, floor: float = SURE) -> Vector:
@@ -186,13 +188,14 @@ def cautious_step(
     """The step within lower <= s <= upper (0 inside) that minimises the damped quadratic of the safe matrix.
 
     Along each eigenvector the gradient is shrunk by 1 - 1 / z^2, z its size in standard deviations by its covariance
-    `noise`: what noise alone explains moves nothing.
+    `noise`: what noise alone explains moves nothing. Nor does a column without effect.
     """
     safe = SafeMatrix(equations, width)
     matrix = (safe.vectors * safe.values) @ safe.vectors.T + damping * np.eye(len(width))
-    gradient = equations.gradient / safe.scale
+    gradient = np.where(safe.blind, 0.0, equations.gradient / safe.scale)
     if noise is not None:
         along = safe.vectors.T @ gradient
         spread = np.diag(safe.vectors.T @ (noise / np.outer(safe.scale, safe.scale)) @ safe.vectors)
-        gradient = safe.vectors @ (along * np.maximum(1.0 - spread / np.maximum(along**2, 1e-300), 0.0))
+        share = np.divide(spread, along**2, out=np.ones_like(along), where=along**2 > spread)
+        gradient = safe.vectors @ (along * (1.0 - share))
     return minimise_in_box(matrix, gradient, lower * safe.scale, upper * safe.scale) / safe.scale

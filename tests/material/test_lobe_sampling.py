@@ -109,3 +109,32 @@ def test_white_furnace_loses_little(metallic: float, roughness: float, angle: in
     weights = np.array(dr.select(valid & (density > 0), evaluate(layers, drawn) / density, 0))
     # A white metal returns everything; the plastic's layering is approximate in Cycles too, the tables within 1 %
     assert weights.mean() == pytest.approx(1.0, abs=0.01 if metallic else 0.03)
+
+
+@pytest.mark.parametrize("view", VIEWS, ids=["steep", "flat", "behind"])
+@pytest.mark.parametrize(
+    "sockets", [{"transmission_weight": 1.0}, {"transmission_weight": 0.9, "base_color": (0.0,) * 3}]
+)
+def test_under_glass_the_diffuse_lobe_keeps_a_probability(
+    sockets: dict[str, Any], view: tuple[float, float, float]
+) -> None:
+    lobes = needed_lobes({"transmission_weight": 0.5})
+    layers = layer_stack(sockets, mi.Vector3f(*view), lobes, BLENDER_5_0)
+    own, floored = (lobe_choice(layers, with_transparency=False, least_diffuse=least) for least in (0.0, 0.02))
+    assert float(own["diffuse"][0]) < 1e-4
+    assert float(floored["diffuse"][0]) == pytest.approx(0.02)
+    assert sum(float(p[0]) for p in floored.probability.values()) == pytest.approx(1.0)
+    # the others share what is left as before
+    left = {name: float(p[0]) for name, p in own.probability.items() if name != "diffuse"}
+    assert {name: float(floored[name][0]) for name in left} == pytest.approx(
+        {n: 0.98 * p for n, p in left.items()}, rel=1e-4
+    )
+
+
+def test_a_diffuse_lobe_that_is_likely_or_alone_stays_as_it_is() -> None:
+    for sockets in ({"transmission_weight": 0.5}, {}):
+        layers, own = stack(sockets, VIEWS[0])
+        floored = lobe_choice(layers, with_transparency=False, least_diffuse=0.02)
+        assert {k: float(p[0]) for k, p in floored.probability.items()} == pytest.approx(
+            {k: float(p[0]) for k, p in own.probability.items()}
+        )

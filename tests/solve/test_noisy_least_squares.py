@@ -98,6 +98,17 @@ def test_an_indefinite_matrix_gives_a_bounded_step_downhill():
     assert step @ gram[0, 1:] < 0.0
 
 
+def test_a_column_of_noise_moves_nothing_and_spoils_no_other():
+    # its product with itself is negative, so those with others are noise: without bound where the scale is small
+    gram = np.array([[1.0, 0.2, 0.3], [0.2, 1.0, 0.4], [0.3, 0.4, -0.01]])
+    equations = cross_equations(gram)
+    one = np.ones(2)
+    step = cautious_step(equations, -one, one, one, 0.0)
+    np.testing.assert_allclose(step, [-0.2, 0.0])
+    covariance = SafeMatrix(equations, one).covariance(np.diag([1e-4, 1.0]))
+    np.testing.assert_allclose(covariance, np.diag([1e-4, 1.0]))
+
+
 def test_the_covariance_covers_the_scatter_of_solutions(problem):
     rng, jacobian = problem
     found, stated = [], []
