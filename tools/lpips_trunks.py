@@ -33,7 +33,8 @@ WEIGHTS = {
 
 def trunk_states(pickled: bytes, net: str) -> dict[str, Any]:
     """The state of the trunk `net` from float32 kernels (height, width, inputs, outputs) and biases, layer by layer."""
-    arrays = (argument for op, argument, _ in pickletools.genops(pickled) if op.name == "BINBYTES")
+    arguments = (argument for _, argument, _ in pickletools.genops(pickled))
+    arrays = (argument for argument in arguments if isinstance(argument, bytes) and argument != b"b")  # NumPy's own
     states = {}
     for name, value in Trunk(net).state_dict().items():
         flat = np.frombuffer(next(arrays), "<f4")
