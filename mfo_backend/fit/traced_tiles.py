@@ -90,12 +90,7 @@ class TracedTiles:
         return tables
 
     def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable) -> None:
-        """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers.
-
-        What roughness shows is the width alpha = roughness^2 of the reflection, so its secant is one over alpha, times
-        2 roughness: over roughness itself it is up to twice too steep, as if the picture told a sharp one from a
-        sharper one far better than it does.
-        """
+        """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
         moved, where = [], []
         for i, x in enumerate(xs):
             if self.paths.roughness(x) >= SECANT_BELOW:
@@ -109,11 +104,11 @@ class TracedTiles:
                 trial = x.copy()
                 trial[k] += h
                 moved.append(trial)
-                where.append((i, k, h * (1.0 + h / (2.0 * x[k])) if name == "roughness" else h))
+                where.append((i, k, h))
         if moved:
             images = trace(np.array(moved), False)[..., 0]
-            for image, (i, k, length) in zip(images, where, strict=True):
-                tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / length
+            for image, (i, k, h) in zip(images, where, strict=True):
+                tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
 
     def count_samples(self, x: Vector, most: int, seed: int) -> EqualCounts | None:
         """Compare from now on as the reference's noise asks for, judged by pictures of `x` in about `most` pixels."""

@@ -292,7 +292,7 @@ class TransmissionFit:
             equations, noise, size = pools.best(self._width)
             self._note(stage, x, equations.cost)
             step = self._step(equations, x, 1e-3, 0.1, frozen, noise)
-            moved = self._moved(x, step)
+            moved = self._moved(step)
             x = x + step
             pools.shifted(step)
             stage.vector = x
@@ -317,20 +317,16 @@ class TransmissionFit:
         covariance, noise = pools.covariance(equations, size, self._width)
         return Polished(x, covariance, frozen, none, equations, noise)
 
-    def _moved(self, x: Vector, step: Vector) -> float:
-        """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear.
-
-        Paths of a sharp material move with its alpha = roughness^2.
-        """
+    def _moved(self, step: Vector) -> float:
+        """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""
         parts = [self.table.slice_of(name) for name in GEOMETRIC if name in self.table.names]
-        moved = np.abs(step) / self._width
-        if "roughness" in self.table.names:
-            k = self.table.slice_of("roughness").start
-            moved[k] *= min((x[k] + 0.5 * step[k]) / SECANT_BELOW, 1.0)
-        return max((float(np.max(moved[part])) for part in parts), default=0.0)
+        return max((float(np.max(np.abs(step[part]) / self._width[part])) for part in parts), default=0.0)
 
     def choose(self, candidates: list[Vector]) -> int:
-        """The first candidate, unless another is better by two standard errors on paths that none has seen."""
+        """The first candidate, unless a later one is better by two standard errors on paths that none has seen.
+
+        Nor does a third take the place of that one unless it is better than it by as much.
+        """
         if len(candidates) == 1:
             return 0
         xs, samples, most = np.array(candidates), self.plan.guard_samples, self.plan.polish_pixels
@@ -339,20 +335,24 @@ class TransmissionFit:
             samples = counts.count
             most = min(most, self.plan.counted_paths // (len(candidates) * samples))
         tiles = self.pictures.tiles(4, most)
-        gains: list[Vector] = []
-        mean = error = np.zeros(len(xs))
+        parts: list[Vector] = []
+        chosen = 0
         for part in range(GUARD_PARTS):
             rows = self.pictures.halves(tiles, xs, seed=self._seed(999 + part), samples=samples, jacobian=False)
             if self.course.should_stop():
                 return 0
-            costs = np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])
-            gains.append(costs[0] - costs)
-            gain = np.mean(gains, axis=0)
-            mean, error = gain.mean(axis=1), gain.std(axis=1) / np.sqrt(gain.shape[1])
+            parts.append(
+                np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])
+            )
+            costs, chosen = np.mean(parts, axis=0), 0
+            for other in range(1, len(xs)):
+                mean, error = _gain(costs[chosen], costs[other])
+                chosen = other if mean > 2.0 * error else chosen
             # more paths only where another looks better and it is not sure
-            if not np.any((mean > error) & (mean <= 2.0 * error)):
+            left = [_gain(costs[chosen], cost) for cost in costs]
+            if not any(error < mean <= 2.0 * error for mean, error in left):
                 break
-        return int(np.argmax(np.where(mean > 2.0 * error, mean, 0.0)))
+        return chosen
 
     def _step(
         self,
@@ -383,3 +383,9 @@ class TransmissionFit:
 
     def _note(self, stage: Stage, x: Vector, cost: float) -> None:
         self.course.reached(stage, x, float(np.sqrt(max(2.0 * cost, 0.0))))
+
+
+def _gain(costs: Vector, other: Vector) -> tuple[float, float]:
+    """How much less the `other` costs in the mean of the tiles, and the standard error of that."""
+    gain = costs - other
+    return float(gain.mean()), float(gain.std() / np.sqrt(len(gain)))
