@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .cycles_model import CyclesModel
 from .diffuse import lambert, oren_nayar
 from .fresnel import dielectric
@@ -51,9 +50,9 @@ def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     """f_r |cos| of the stack for light from `wo` in the frame of the layers; `reachable_only` as in `refracted`."""
     wi = layers.wi
     above = wo.z > 0
-    h = dr.normalize(wi + type(wi)(wo.x, wo.y, dr.abs(wo.z)))
+    h = dr.normalize(wi + dr.kind_of(wi)(wo.x, wo.y, dr.abs(wo.z)))
     c = dr.minimum(dr.dot(wi, h), 1)
-    up = type(wo)(wo.x, wo.y, dr.maximum(wo.z, 1e-7))
+    up = dr.kind_of(wo)(wo.x, wo.y, dr.maximum(wo.z, 1e-7))
     value: Any = 0
     if layers.metal is not None or layers.specular is not None:
         fresnel: Any = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
+from . import dual as dr
 
 
 def saturate(x: Any) -> Any:

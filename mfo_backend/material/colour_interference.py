@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from importlib import resources
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from . import dual as dr
 from .clamp import saturate
 from .own_memory import own_memory
 
@@ -59,9 +60,9 @@ def _packed(float_type: type) -> Any:
     return own_memory(np.concatenate([rows[:, :3], zeros, rows[:, 3:], zeros], axis=1).ravel(), float_type)
 
 
-def fourier_response(path_nm: Any, colour: type) -> tuple[Any, Any]:
+def fourier_response(path_nm: Any, colour: Callable[..., Any]) -> tuple[Any, Any]:
     """Real and imaginary part, RGB, at a path difference in nanometres (Blender 5.0 on)."""
-    float_type = type(path_nm)
+    float_type = dr.array_type(path_nm)
     buffer = _packed(float_type)
     last = len(buffer) // 8 - 1
     place = saturate(path_nm / LONGEST_PATH_NM) * last
@@ -71,15 +72,15 @@ def fourier_response(path_nm: Any, colour: type) -> tuple[Any, Any]:
     parts = []
     for part in (0, 4):
         values = [
-            dr.gather(float_type, buffer, node * 8 + (part + k)) * (1 - t)
-            + dr.gather(float_type, buffer, node * 8 + (8 + part + k)) * t
+            (1 - t) * dr.gather(float_type, buffer, node * 8 + (part + k))
+            + t * dr.gather(float_type, buffer, node * 8 + (8 + part + k))
             for k in range(3)
         ]
         parts.append(colour(*values))
     return parts[0], parts[1]
 
 
-def gaussian_response(path_nm: Any, colour: type) -> tuple[Any, Any]:
+def gaussian_response(path_nm: Any, colour: Callable[..., Any]) -> tuple[Any, Any]:
     """Real part in XYZ, and zero, at a path difference in nanometres (Blender 4.2 to 4.5)."""
     phase = path_nm * (2 * np.pi * 1e-9)
     parts = [
@@ -94,4 +95,4 @@ def gaussian_response(path_nm: Any, colour: type) -> tuple[Any, Any]:
 def xyz_response_to_rgb(value: Any) -> Any:
     """RGB of an XYZ reflectance under equal energy, adapted by scaling with the white of D65 as Cycles does."""
     x, y, z = (value[k] * WHITE_XYZ[k] for k in range(3))
-    return type(value)(*(float(row[0]) * x + float(row[1]) * y + float(row[2]) * z for row in XYZ_TO_RGB))
+    return dr.kind_of(value)(*(float(row[0]) * x + float(row[1]) * y + float(row[2]) * z for row in XYZ_TO_RGB))

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .clamp import saturate
 
 _SLOPE = dr.pi / 2 - 2 / 3

@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .fresnel import table_place
 from .grid_table import cycles_table
 

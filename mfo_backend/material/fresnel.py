@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .clamp import at_least, root, saturate
 
 

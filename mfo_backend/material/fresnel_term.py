@@ -6,8 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .clamp import saturate
 from .fresnel import f82, normal_incidence, schlick_blend
 from .thin_film import ThinFilm
@@ -45,7 +44,7 @@ class DielectricTerm:
         if self.film is None:
             return plain
         bare = normal_incidence(self.n)
-        coated = self.film.on_dielectric(c, self.n, type(self.f0))
+        coated = self.film.on_dielectric(c, self.n, dr.kind_of(self.f0))
         # The tint acts on the part of the coated reflectance that stems from normal incidence
         tinted = coated * (
             1 + (self.f0 / dr.maximum(bare, 1e-5) - 1) * saturate((coated - 1) / dr.minimum(bare - 1, -1e-5))

@@ -9,10 +9,10 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from . import dual as dr
 from .clamp import saturate
 from .own_memory import own_memory
 
@@ -54,7 +54,7 @@ class GridTable:
 
     def __call__(self, *places: Any, choice: Any = None) -> Any:
         """The value at `places`, one array in [0, 1] per axis; differentiable in them, constant outside."""
-        float_type = type(places[0])
+        float_type = dr.array_type(places[0])
         fixed = _literal(places[-1]) if self.dimensions > 1 else None
         if fixed is not None and (fixed in self._slices or len(self._slices) < MOST_SLICES):
             return self._slice(fixed)(*places[:-1], choice=choice)
@@ -70,7 +70,7 @@ class GridTable:
             index += choice * self.cells
         values = self._corners_at(index, float_type)
         for fraction in reversed(fractions):
-            values = [a + (b - a) * fraction for a, b in zip(values[::2], values[1::2], strict=True)]
+            values = [fraction * (b - a) + a for a, b in zip(values[::2], values[1::2], strict=True)]
         return values[0]
 
     def _slice(self, place: float) -> GridTable:
@@ -95,8 +95,9 @@ class GridTable:
 
 def _literal(place: Any) -> float | None:
     """The value of `place` where the compiler knows it and nothing differentiates it."""
-    known = dr.is_jit_v(place) and place.state == dr.VarState.Literal and not dr.grad_enabled(place)
-    return float(place[0]) if known and dr.width(place) == 1 else None
+    array = dr.value_of(place)
+    known = dr.is_jit_v(array) and array.state == dr.VarState.Literal and not dr.varies(place)
+    return float(array[0]) if known and dr.width(array) == 1 else None
 
 
 def loaded_buffers() -> list[Any]:

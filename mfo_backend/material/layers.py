@@ -12,8 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .clamp import at_least, largest, root, saturate
 from .cycles_model import CyclesModel
 from .energy import NO_COMPENSATION, Compensation, compensation, glass_albedo, reflection_albedo, schlick_albedo
@@ -73,14 +72,14 @@ class Layers:
         z = dr.mulsign(direction.z, self.flip)
         x = self.cos_rotation * direction.x + self.sin_rotation * direction.y
         y = self.cos_rotation * direction.y - self.sin_rotation * direction.x
-        return type(direction)(x, y, z)
+        return dr.kind_of(direction)(x, y, z)
 
     def from_frame(self, direction: Any) -> Any:
         """The inverse of `to_frame`."""
         z = dr.mulsign(direction.z, self.flip)
         x = self.cos_rotation * direction.x - self.sin_rotation * direction.y
         y = self.cos_rotation * direction.y + self.sin_rotation * direction.x
-        return type(direction)(x, y, z)
+        return dr.kind_of(direction)(x, y, z)
 
     def blurred(self, least: Any) -> Layers:
         """These layers with microfacet lobes of alpha `least` or more; albedos stay, as with Cycles' Filter Glossy."""
@@ -94,8 +93,8 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
 
     Values are numbers, tuples or Dr.Jit arrays of the float type of `wi`; missing ones are Blender's defaults.
     """
-    number = type(wi.z)
-    colour = next((type(v) for k, v in parameters.items() if _is_colour(k) and dr.is_array_v(v)), type(wi))
+    number = dr.kind_of(wi.z)
+    colour = next((dr.kind_of(v) for k, v in parameters.items() if _is_colour(k) and dr.is_array_v(v)), dr.kind_of(wi))
     p = {
         item.name: (colour if item.size == 3 else number)(parameters.get(item.name, item.default))
         for item in BLENDER_PRINCIPLED
@@ -106,7 +105,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
     sine, cosine = dr.sincos(dr.mulsign(angle, wi.z)) if lobes.anisotropic else (number(0), number(1))
     stack |= {"cos_rotation": cosine, "sin_rotation": sine}
     z = dr.abs(wi.z)
-    view = type(wi)(cosine * wi.x + sine * wi.y, cosine * wi.y - sine * wi.x, z)
+    view = dr.kind_of(wi)(cosine * wi.x + sine * wi.y, cosine * wi.y - sine * wi.x, z)
     mu = dr.maximum(z, 1e-7)
     stack["wi"] = view
 

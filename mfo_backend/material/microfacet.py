@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
+from . import dual as dr
 
 
 def density(h: Any, ax: Any, ay: Any) -> Any:

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable, Value
+from . import dual as dr
 from .mitsuba_parameters import MITSUBA_PRINCIPLED
 
 Scalar = Any  # mi.Float or a Python float; a float of exactly 0 leaves its lobe out of the kernel
@@ -87,7 +87,7 @@ class MitsubaPrincipled:
             Unit directions in the shading frame, towards camera and light.
         """
         p = parameters
-        base = mi.Color3f(p["base_color"])
+        base = dr.cast(mi.Color3f, p["base_color"])
         metallic = p["metallic"]
         dielectric = 1.0 - metallic
         cos_i, cos_o = wi.z, wo.z
@@ -109,24 +109,24 @@ class MitsubaPrincipled:
 
     @staticmethod
     def _tint(base: mi.Color3f) -> mi.Color3f:
-        luminance = mi.luminance(base)
+        luminance = dr.luminance(base)
         return dr.select(luminance > 0.0, base / luminance, 1.0)
 
     @staticmethod
     def _specular(p: Mapping, base: Any, tint: Any, dielectric: Any, wi: Any, wo: Any, half: Any, cos_d: Any, w: Any):
         # eta(specular) has normal reflectance 0.08 * specular (`principled.cpp`)
-        eta = p["eta"] if "eta" in p else 2.0 / (1.0 - dr.sqrt(0.08 * mi.Float(p["specular"]))) - 1.0
-        fresnel = mi.Color3f(dielectric * (1.0 - p["spec_tint"]) * _fresnel_dielectric(cos_d, eta))
+        eta = p["eta"] if "eta" in p else 2.0 / (1.0 - dr.sqrt(0.08 * p["specular"])) - 1.0
+        fresnel = dr.cast(mi.Color3f, dielectric * (1.0 - p["spec_tint"]) * _fresnel_dielectric(cos_d, eta))
         if not _is_zero(p["metallic"]):
             fresnel += p["metallic"] * dr.lerp(base, mi.Color3f(1.0), w)
         if not _is_zero(p["spec_tint"]):
             f0 = tint * ((eta - 1.0) / (eta + 1.0)) ** 2
             fresnel += dielectric * p["spec_tint"] * dr.lerp(f0, mi.Color3f(1.0), w)
-        alpha = dr.square(mi.Float(p["roughness"]))
+        alpha = dr.square(p["roughness"])
         if _is_zero(p["anisotropic"]):
             alpha_x = alpha_y = dr.maximum(0.001, alpha)
         else:
-            aspect = dr.sqrt(1.0 - 0.9 * mi.Float(p["anisotropic"]))
+            aspect = dr.sqrt(1.0 - 0.9 * p["anisotropic"])
             alpha_x, alpha_y = dr.maximum(0.001, alpha / aspect), dr.maximum(0.001, alpha * aspect)
         slope = dr.square(half.x / alpha_x) + dr.square(half.y / alpha_y) + dr.square(half.z)
         D = 1.0 / (dr.pi * alpha_x * alpha_y * dr.square(slope))
@@ -148,7 +148,7 @@ class MitsubaPrincipled:
     @staticmethod
     def _clearcoat(gloss: Scalar, wi: Any, wo: Any, half: Any, weight: Any) -> Any:
         """A quarter of GTR1 (alpha 0.1 to 0.001) with normal reflectance 0.04 and fixed shadowing (alpha 0.25)."""
-        alpha2 = dr.square(0.1 + (0.001 - 0.1) * mi.Float(gloss))
+        alpha2 = dr.square(0.1 + (0.001 - 0.1) * gloss)
         D = (alpha2 - 1.0) / (dr.pi * dr.log(alpha2) * (1.0 + (alpha2 - 1.0) * dr.square(half.z)))
         G = _smith_ggx(wi, 0.25, 0.25) * _smith_ggx(wo, 0.25, 0.25)
         return 0.25 * (0.04 + 0.96 * weight) * D * G * wo.z

@@ -6,8 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .grid_table import cycles_table
 
 

@@ -8,11 +8,11 @@ either interface taken as 1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import drjit as dr
-
+from . import dual as dr
 from .clamp import root, saturate
 from .colour_interference import fourier_response, gaussian_response, xyz_response_to_rgb
 from .cycles_model import CyclesModel
@@ -50,7 +50,7 @@ class ThinFilm:
         """The film as glass of index `substrate` shows it where `inside` holds."""
         return replace(self, ior=dr.select(inside, self.ior / substrate, self.ior))
 
-    def on_dielectric(self, c: Any, n: Any, colour: type) -> Any:
+    def on_dielectric(self, c: Any, n: Any, colour: Callable[..., Any]) -> Any:
         """Reflectance over a dielectric of index `n`, RGB."""
         film = self._blended_index()
         top = dielectric_interface(c, film)
@@ -63,13 +63,13 @@ class ThinFilm:
         film = self._blended_index()
         top = dielectric_interface(c, film)
         bottom = metal_interface(top.cos_transmitted, film, f0, f82(1 / 7, f0, slope))
-        return dr.select(top.total, 1, self._interference(top, bottom, film, type(f0)))
+        return dr.select(top.total, 1, self._interference(top, bottom, film, dr.kind_of(f0)))
 
     def _blended_index(self) -> Any:
         t = saturate(self.thickness / (1.0 if self.model.film_fourier else 30.0))
         return 1 + (self.ior - 1) * (dr.square(t) * (3 - 2 * t))
 
-    def _interference(self, top: Interface, bottom: Interface, film: Any, colour: type) -> Any:
+    def _interference(self, top: Interface, bottom: Interface, film: Any, colour: Callable[..., Any]) -> Any:
         path = 2 * film * self.thickness * top.cos_transmitted
         response = fourier_response if self.model.film_fourier else gaussian_response
         responses = [response(path * order, colour) for order in _ORDERS]
@@ -85,7 +85,7 @@ def airy_sum(
     upper_phase: tuple[Any, Any],
     lower_phase: tuple[Any, Any],
     responses: list[tuple[Any, Any]],
-    colour: type,
+    colour: Callable[..., Any],
 ) -> Any:
     """Reflectance of one polarisation from those of the interfaces and the colour responses of each order."""
     lower = dr.minimum(lower, 0.9999)
@@ -93,7 +93,7 @@ def airy_sum(
     both = upper * lower
     bounce = root(both)
     inner = dr.square(transmitted) * lower / (1 - both)
-    real, imaginary = -upper_phase[0] * lower_phase[0], -upper_phase[0] * lower_phase[1]
+    real, imaginary = (-(part * upper_phase[0]) for part in lower_phase)
     total = colour(upper + inner)
     amplitude, power = inner - transmitted, (real, imaginary)
     for cosine, sine in responses:

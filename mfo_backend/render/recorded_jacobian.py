@@ -17,10 +17,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material.dual import Dual, cast
 from ..material.own_memory import own_memory
 from ..material.recorded_models import RecordedModel
 from ..types.parameter import ParameterTable, Value
-from .recorded_paths import LaneGroups, RecordedPaths
+from .packed_lanes import Lanes
+from .recorded_paths import LaneGroups
 
 
 @contextmanager
@@ -84,56 +86,52 @@ class RecordedJacobian:
         frozen = dr.freeze(auto_opaque=False, warn_after=1000, state_fn=lambda *_: model.buffers())
         self._launch = frozen(self._kernel)
 
-    def __call__(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
-        """Mean radiance of the groups without the constant part, then its derivatives: (samples, g, 3, 1 + K)."""
+    def __call__(self, vector: NDArray[np.float64], lanes: Lanes, groups: LaneGroups) -> NDArray[np.float32]:
+        """Mean radiance of the groups, whose `lanes` these are, without the constant part, then its derivatives:
+        (samples, g, 3, 1 + K)."""
         width = self._width
         theta = own_memory(vector, mi.Float)
-        start, stop, scale = groups.parts
-        out = dr.zeros(mi.Float, dr.width(start) * 3 * width)
+        *_, scale = groups.parts
+        out = dr.zeros(mi.Float, dr.width(scale) * 3 * width)
         dr.eval(theta, out)
-        held = [paths.held[p.name] for p in self._held]
         with _no_garbage_collection():
-            self._launch(theta, self._constants, paths.wi, paths.wo, paths.weight, held, start, stop, scale, out)
+            self._launch(theta, self._constants, lanes, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
-    def _kernel(self, theta, constants, wi, wo, weight, held, start, stop, scale, out):
+    def _kernel(self, theta, constants, lanes, scale, out):
         width = self._width
+        arrays = (lanes.wi, lanes.wo, mi.Color3f(lanes.weight), *lanes.held)
 
         def body(lane, stop, sums):
-            wi_, wo_, weight_, *values = (dr.gather(type(a), a, lane) for a in (wi, wo, mi.Color3f(weight), *held))
-            columns = self._columns(theta, constants, wi_, wo_, weight_, values)
+            wi, wo, weight, *held = (dr.gather(type(array), array, lane) for array in arrays)
+            columns = self._columns(theta, constants, wi, wo, weight, held)
             return (
-                lane + 1,
+                lane + lanes.step,
                 stop,
                 [s + c[k] for k in range(3) for s, c in zip(sums[k * width :], columns, strict=False)],
             )
 
         sums = [mi.Float(0.0) for _ in range(3 * width)]
         _, _, sums = dr.while_loop(
-            (mi.UInt32(start), mi.UInt32(stop), sums),
+            (mi.UInt32(lanes.start), mi.UInt32(lanes.stop), sums),
             lambda lane, stop, sums: lane < stop,
             body,
             label="recorded paths",
         )
-        row = dr.arange(mi.UInt32, dr.width(start)) * (3 * width)
+        row = dr.arange(mi.UInt32, dr.width(scale)) * (3 * width)
         for column, total in enumerate(sums):
             dr.scatter(out, total * scale, row + column, mode=dr.ReduceMode.Permute)
 
     def _columns(self, theta, constants, wi, wo, weight, held) -> list[mi.Color3f]:
         """The weighted BSDF value and its derivative by each free value."""
-        values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
-        if self._derivatives:
-            dr.enable_grad(*values)
+        values: list[Any] = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
+        if not self._derivatives:
+            return [mi.Color3f(self._evaluate(self._parameters(values, constants, held), wi, wo) * weight)]
+        values = [Dual(value, {k: mi.Float(1.0)}) for k, value in enumerate(values)]
+        wi, wo, *held = (Dual(array) for array in (wi, wo, *held))
         result = self._evaluate(self._parameters(values, constants, held), wi, wo) * weight
-        columns = [mi.Color3f(dr.detach(result))]
-        for value in values if self._derivatives else []:
-            dr.set_grad(value, 1.0)
-            dr.enqueue(dr.ADMode.Forward, value)
-            dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
-            columns.append(mi.Color3f(dr.grad(result)))
-            dr.clear_grad(result)
-        return columns
+        return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(len(values))))]
 
     def _warm_up(self) -> None:
         """Let the model load its tables: a frozen launch cannot."""
@@ -147,7 +145,11 @@ class RecordedJacobian:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)
         parameters |= {p.name: value for p, value in zip(self._held, held, strict=True)}
         rest = [dr.gather(mi.Float, constants, mi.UInt32(k)) for k in range(sum(p.size for p in self._fixed_table))]
+        if values and isinstance(values[0], Dual):
+            rest = [Dual(value) for value in rest]
         for table, entries in ((self.table, iter(values)), (self._fixed_table, iter(rest))):
             for p in table:
-                parameters[p.name] = next(entries) if p.size == 1 else mi.Color3f(*(next(entries) for _ in range(3)))
+                parameters[p.name] = (
+                    next(entries) if p.size == 1 else cast(mi.Color3f, *(next(entries) for _ in range(3)))
+                )
         return parameters

@@ -26,6 +26,12 @@ def recording(tmp_path_factory):
     return scene, scene.record(renderer.start, grid=3, seed=1, near=False)
 
 
+def lanes(paths, groups):
+    from mfo_backend.render.packed_lanes import Lanes
+
+    return Lanes.as_recorded(paths, groups), groups
+
+
 def middle(table) -> np.ndarray:
     return table.lower + (table.upper - table.lower) * np.linspace(0.3, 0.7, table.length)
 
@@ -34,12 +40,13 @@ def test_columns_equal_central_differences(recording):
     scene, paths = recording
     table, groups = scene.renderer.table, paths.tile_groups()
     x, h = middle(table), 2e-3
-    jacobian = scene.jacobian(x, paths, groups)[0, :, :, 1:]
+    jacobian = scene.jacobian(x, *lanes(paths, groups))[0, :, :, 1:]
     for k in range(table.length):
         step = np.zeros(table.length)
         step[k] = h
         difference = (
-            scene.jacobian(x + step, paths, groups)[0, :, :, 0] - scene.jacobian(x - step, paths, groups)[0, :, :, 0]
+            scene.jacobian(x + step, *lanes(paths, groups))[0, :, :, 0]
+            - scene.jacobian(x - step, *lanes(paths, groups))[0, :, :, 0]
         ) / (2 * h)
         # float32 images of order 1 over 4e-3, and the curvature of the column
         scale = max(np.abs(difference).max(), 0.05)
@@ -50,7 +57,7 @@ def test_tiles_are_means_of_pixels(recording):
     scene, paths = recording
     x = middle(scene.renderer.table)
     pixels, tiles = paths.pixel_groups(), paths.tile_groups()
-    (by_pixel,), (by_tile,) = scene.jacobian(x, paths, pixels), scene.jacobian(x, paths, tiles)
+    (by_pixel,), (by_tile,) = scene.jacobian(x, *lanes(paths, pixels)), scene.jacobian(x, *lanes(paths, tiles))
     expected = np.stack([by_pixel[a:b].mean(axis=0) for a, b in zip(tiles.first[:-1], tiles.first[1:], strict=True)])
     np.testing.assert_allclose(by_tile, expected, rtol=1e-4, atol=1e-5)  # another order of float32 sums
     image = np.random.default_rng(0).uniform(size=(20, 20, 3)).astype(np.float32)
@@ -129,7 +136,10 @@ def test_chosen_groups_equal_the_rows_of_all(recording):
     x, tiles = middle(scene.renderer.table), paths.tile_groups()
     chosen = np.array([0, 2, 3, 7])
     np.testing.assert_allclose(
-        scene.jacobian(x, paths, tiles.take(chosen)), scene.jacobian(x, paths, tiles)[:, chosen], rtol=1e-4, atol=1e-5
+        scene.jacobian(x, *lanes(paths, tiles.take(chosen))),
+        scene.jacobian(x, *lanes(paths, tiles))[:, chosen],
+        rtol=1e-4,
+        atol=1e-5,
     )
 
 
@@ -138,13 +148,13 @@ def test_an_evaluation_is_one_cached_kernel_and_always_the_same(recording):
 
     scene, paths = recording
     x, groups = middle(scene.renderer.table), paths.pixel_groups()
-    first = scene.jacobian(x, paths, groups)
+    first = scene.jacobian(x, *lanes(paths, groups))
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         for k in range(3):
-            scene.jacobian(x + 1e-3 * k, paths, groups)
+            scene.jacobian(x + 1e-3 * k, *lanes(paths, groups))
         recordings = scene.jacobian._launch.n_recordings
         dr.kernel_history_clear()
-        again = scene.jacobian(x, paths, groups)
+        again = scene.jacobian(x, *lanes(paths, groups))
         history = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert len(history) == 1
     assert scene.jacobian._launch.n_recordings == recordings
@@ -160,10 +170,10 @@ def test_another_fixed_value_needs_no_other_kernel(recording):
     table, groups = scene.renderer.table.select(["base_color", "roughness"]), paths.pixel_groups()
     fixed = scene.model.values({"metallic": 0.25, "specular": 0.5}, table.names)
     x = table.pack({"base_color": (0.5, 0.4, 0.3), "roughness": 0.3})
-    before = RecordedJacobian(scene.model, table, fixed)(x, paths, groups)
+    before = RecordedJacobian(scene.model, table, fixed)(x, *lanes(paths, groups))
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
-        after = RecordedJacobian(scene.model, table, {**fixed, "metallic": 0.75})(x, paths, groups)
+        after = RecordedJacobian(scene.model, table, {**fixed, "metallic": 0.75})(x, *lanes(paths, groups))
         misses = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT and not k["cache_hit"]]
     assert misses == []
     assert np.abs(after - before).max() > 0.05
