@@ -61,9 +61,9 @@ def highlight_cells(
     done, new, left = [], cells, settings.most
     for _ in range(settings.levels if lights else 0):
         si, on_target = first_hits(rays_in(new))
-        size = np.zeros(len(new))
+        size = np.zeros(len(new), np.float32)
         for light in lights:
-            size = np.maximum(size, _sizes(*_slopes(light, si, on_target, settings.turn), settings))
+            size = np.maximum(size, _sizes(*_slopes(light, si, on_target, settings), settings))
         split = size > settings.share
         if split.sum() > left:  # the coarsest first
             split &= size > np.partition(size, -left - 1)[-left - 1]
@@ -76,45 +76,54 @@ def highlight_cells(
 
 
 def _slopes(
-    light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool, turn: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool, settings: Highlights
+) -> tuple[NDArray[np.float32], NDArray[np.float32] | None, NDArray[np.bool_]]:
     """Slopes (3, cells, 4) of the half vector against the normal, the lobe's axes, and where there is light (cells, 4).
 
     All are in the world's frame: that of a surface may turn from one ray to the next. The axes (2, 3, cells) are the
-    lobe's tangent and bitangent at a cell's first ray.
+    lobe's tangent and bitangent at a cell's first ray, None for a lobe that is as wide along both.
     """
     ds, value = light.sample_direction(si, mi.Point2f(0.5))
     wo = si.to_local(ds.d)
     lit = on_target & (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
     half = si.wi + wo
     slope, frame = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0)), si.sh_frame
-    dr.eval(slope, frame.s, frame.t, lit)
+    dr.eval(slope, lit)
 
     def of_world(vector: mi.Vector3f) -> NDArray[np.float32]:
         return np.stack([vector[axis].numpy() for axis in range(3)]).reshape(3, -1, 4)
 
-    angle = np.float32(2.0 * np.pi * turn)
-    s, t = of_world(frame.s)[..., 0], of_world(frame.t)[..., 0]
-    axes = np.stack([np.cos(angle) * s + np.sin(angle) * t, np.cos(angle) * t - np.sin(angle) * s])
+    axes = None
+    if settings.narrow < 1.0:
+        dr.eval(frame.s, frame.t)
+        angle = np.float32(2.0 * np.pi * settings.turn)
+        s, t = of_world(frame.s)[..., 0], of_world(frame.t)[..., 0]
+        axes = np.stack([np.cos(angle) * s + np.sin(angle) * t, np.cos(angle) * t - np.sin(angle) * s])
     return of_world(slope), axes, np.array(lit).reshape(-1, 4)
 
 
 def _sizes(
-    slope: NDArray[np.float32], axes: NDArray[np.float32], lit: NDArray[np.bool_], settings: Highlights
-) -> NDArray[np.float64]:
+    slope: NDArray[np.float32], axes: NDArray[np.float32] | None, lit: NDArray[np.bool_], settings: Highlights
+) -> NDArray[np.float32]:
     """Half diagonals of cells in slopes, relative to the scale on which a lobe changes there; 0 in the dark.
 
     A lobe of widths ax and ay = r ax, r < 1, changes along its bitangent over sqrt(ay^2 + ty^2 + (r tx)^2).
     """
-    count = np.maximum(lit.sum(-1), 1)
-    slope = np.where(lit, slope, 0.0)
-    middle = slope.sum(-1) / count
+    sizes = np.zeros(len(lit), np.float32)
+    seen = np.flatnonzero(lit.sum(-1) > 1)  # most cells are beside the target
+    lit = lit[seen]
+    slope = np.where(lit, slope[:, seen], np.float32(0.0))
+    middle = slope.sum(-1) / lit.sum(-1, dtype=np.float32)
     away = (slope - middle[..., None]) * lit
-    reach = 1.0 / (2.0 * GAUSS)  # corners lie further out than the points
-    size = reach * np.linalg.norm(away, axis=0).max(-1) / (settings.narrowest + np.linalg.norm(middle, axis=0))
-    if settings.narrow < 1.0:
-        tangent, bitangent = axes  # one frame for a cell: where it turns within one, smaller cells are no help
+    reach = np.float32(1.0 / (2.0 * GAUSS))  # corners lie further out than the points
+    narrowest, narrow = np.float32(settings.narrowest), np.float32(settings.narrow)
+    size = reach * np.linalg.norm(away, axis=0).max(-1) / (narrowest + np.linalg.norm(middle, axis=0))
+    if axes is not None:
+        tangent, bitangent = axes[
+            :, :, seen
+        ]  # one frame for a cell: where it turns within one, smaller cells are no help
         tx, ty = (np.sum(axis * middle, axis=0) for axis in (tangent, bitangent))
         across = reach * np.abs(np.sum(bitangent[..., None] * away, axis=0)).max(-1)
-        size = np.maximum(size, across / np.sqrt(settings.narrowest**2 + ty**2 + (settings.narrow * tx) ** 2))
-    return np.where(count > 1, size, 0.0)
+        size = np.maximum(size, across / np.sqrt(narrowest**2 + ty**2 + (narrow * tx) ** 2))
+    sizes[seen] = size
+    return sizes
