@@ -53,30 +53,30 @@ class Dual:
         return _mapped(lambda array: -array, self)
 
     def __add__(self, other: Any) -> Dual:
-        return _sum(value_of(self) + value_of(other), (self, None), (other, None))
+        return _sum(value_of(self) + value_of(other), (self, _same), (other, _same))
 
     def __sub__(self, other: Any) -> Dual:
-        return _sum(value_of(self) - value_of(other), (self, None), (other, -1.0))
+        return _sum(value_of(self) - value_of(other), (self, _same), (other, _times(-1.0)))
 
     def __rsub__(self, other: Any) -> Dual:
-        return _sum(other - self.value, (self, -1.0))
+        return _sum(other - self.value, (self, _times(-1.0)))
 
     def __mul__(self, other: Any) -> Dual:
-        return _sum(self.value * value_of(other), (self, value_of(other)), (other, self.value))
+        return _sum(self.value * value_of(other), (self, _times(value_of(other))), (other, _times(self.value)))
 
     def __truediv__(self, other: Any) -> Dual:
         value = self.value / value_of(other)
         if not isinstance(other, Dual):
-            return _sum(value, (self, 1.0 / other))
+            return _sum(value, (self, _times(1.0 / other)))
         scale = drjit.rcp(other.value)
-        return _sum(value, (self, scale), (other, -value * scale))
+        return _sum(value, (self, _times(scale)), (other, _times(-value * scale)))
 
     def __rtruediv__(self, other: Any) -> Dual:
         value = other / self.value
-        return _sum(value, (self, -value / self.value))
+        return _sum(value, (self, _times(-value / self.value)))
 
     def __pow__(self, exponent: int) -> Dual:
-        return _sum(self.value**exponent, (self, exponent * self.value ** (exponent - 1)))
+        return _sum(self.value**exponent, (self, _times(exponent * self.value ** (exponent - 1))))
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -130,14 +130,22 @@ def _mapped(linear: Callable[[Any], Any], x: Dual) -> Dual:
     return Dual(linear(x.value), {k: linear(slope) for k, slope in x.slopes.items()})
 
 
-def _sum(value: Any, *parts: tuple[Any, Any]) -> Dual:
-    """`value` with the slopes of the parts, each times its weight, None for 1."""
+def _sum(value: Any, *parts: tuple[Any, Callable[[Any], Any]]) -> Dual:
+    """`value` with the sum of what the parts' linear functions make of their numbers' slopes."""
     slopes: Slopes = {}
-    for x, weight in parts:
+    for x, linear in parts:
         for k, slope in x.slopes.items() if isinstance(x, Dual) else ():
-            term = slope if weight is None else weight * slope
+            term = linear(slope)
             slopes[k] = slopes[k] + term if k in slopes else term
     return Dual(value, slopes)
+
+
+def _same(slope: Any) -> Any:
+    return slope
+
+
+def _times(weight: Any) -> Callable[[Any], Any]:
+    return lambda slope: weight * slope
 
 
 def _by_slope(function: Callable[[Any], Any], weight: Callable[[Any, Any], Any], name: str) -> Callable[[Any], Any]:
@@ -147,7 +155,7 @@ def _by_slope(function: Callable[[Any], Any], weight: Callable[[Any, Any], Any],
         if not isinstance(x, Dual):
             return function(x)
         value = function(x.value)
-        return _sum(value, (x, weight(x.value, value)))
+        return _sum(value, (x, _times(weight(x.value, value))))
 
     of_either.__name__, of_either.__doc__ = name, f"`drjit.{name}`."
     return of_either
@@ -170,7 +178,9 @@ abs = _by_slope(drjit.abs, lambda x, _: drjit.sign(x), "abs")
 def sincos(x: Any) -> tuple[Any, Any]:
     """`drjit.sincos`."""
     sine, cosine = drjit.sincos(value_of(x))
-    return (_sum(sine, (x, cosine)), _sum(cosine, (x, -sine))) if isinstance(x, Dual) else (sine, cosine)
+    if not isinstance(x, Dual):
+        return sine, cosine
+    return _sum(sine, (x, _times(cosine))), _sum(cosine, (x, _times(-sine)))
 
 
 def select(mask: Any, yes: Any, no: Any) -> Any:
@@ -207,7 +217,7 @@ def lerp(a: Any, b: Any, t: Any) -> Any:
     value = drjit.lerp(va, vb, vt)
     if not any(isinstance(x, Dual) for x in (a, b, t)):
         return value
-    return _sum(value, (a, 1.0 - vt), (b, vt), (t, vb - va))
+    return _sum(value, (a, _times(1.0 - vt)), (b, _times(vt)), (t, _times(vb - va)))
 
 
 def mulsign(x: Any, sign: Any) -> Any:
@@ -221,12 +231,8 @@ def dot(a: Any, b: Any) -> Any:
     """`drjit.dot`."""
     if not (isinstance(a, Dual) or isinstance(b, Dual)):
         return drjit.dot(a, b)
-    slopes: Slopes = {}
-    for x, other in ((a, value_of(b)), (b, value_of(a))):
-        for k, slope in x.slopes.items() if isinstance(x, Dual) else ():
-            term = drjit.dot(slope, other)
-            slopes[k] = slopes[k] + term if k in slopes else term
-    return Dual(drjit.dot(value_of(a), value_of(b)), slopes)
+    va, vb = value_of(a), value_of(b)
+    return _sum(drjit.dot(va, vb), (a, lambda slope: drjit.dot(slope, vb)), (b, lambda slope: drjit.dot(va, slope)))
 
 
 def normalize(v: Any) -> Any:
@@ -235,9 +241,7 @@ def normalize(v: Any) -> Any:
         return drjit.normalize(v)
     direction = drjit.normalize(v.value)
     scale = drjit.rsqrt(drjit.squared_norm(v.value))
-    return Dual(
-        direction, {k: scale * (slope - direction * drjit.dot(direction, slope)) for k, slope in v.slopes.items()}
-    )
+    return _sum(direction, (v, lambda slope: scale * (slope - direction * drjit.dot(direction, slope))))
 
 
 def luminance(colour: Any) -> Any:
