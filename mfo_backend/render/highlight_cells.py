@@ -88,14 +88,13 @@ def _slopes(
     lit = on_target & (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
     half = si.wi + wo
     slope, frame = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0)), si.sh_frame
-    dr.eval(slope, lit)
+    dr.eval(slope, frame.s, frame.t, lit)  # one kernel, whether the axes are wanted or not
 
     def of_world(vector: mi.Vector3f) -> NDArray[np.float32]:
         return np.stack([vector[axis].numpy() for axis in range(3)]).reshape(3, -1, 4)
 
     axes = None
     if settings.narrow < 1.0:
-        dr.eval(frame.s, frame.t)
         angle = np.float32(2.0 * np.pi * settings.turn)
         s, t = of_world(frame.s)[..., 0], of_world(frame.t)[..., 0]
         axes = np.stack([np.cos(angle) * s + np.sin(angle) * t, np.cos(angle) * t - np.sin(angle) * s])

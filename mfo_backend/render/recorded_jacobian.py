@@ -94,27 +94,29 @@ class RecordedJacobian:
         *_, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(scale) * 3 * width)
         dr.eval(theta, out)
+        # not the dataclass: Dr.Jit would run Python to look into it, which may let another thread go on, and that one
+        # waits for a lock which this one holds
+        arrays = (lanes.wi, lanes.wo, mi.Color3f(lanes.weight), *lanes.held)
         with _no_garbage_collection():
-            self._launch(theta, self._constants, lanes, scale, out)
+            self._launch(theta, self._constants, arrays, lanes.start, lanes.stop, lanes.step, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
-    def _kernel(self, theta, constants, lanes, scale, out):
+    def _kernel(self, theta, constants, arrays, start, stop, step, scale, out):
         width = self._width
-        arrays = (lanes.wi, lanes.wo, mi.Color3f(lanes.weight), *lanes.held)
 
         def body(lane, stop, sums):
             wi, wo, weight, *held = (dr.gather(type(array), array, lane) for array in arrays)
             columns = self._columns(theta, constants, wi, wo, weight, held)
             return (
-                lane + lanes.step,
+                lane + step,
                 stop,
                 [s + c[k] for k in range(3) for s, c in zip(sums[k * width :], columns, strict=False)],
             )
 
         sums = [mi.Float(0.0) for _ in range(3 * width)]
         _, _, sums = dr.while_loop(
-            (mi.UInt32(lanes.start), mi.UInt32(lanes.stop), sums),
+            (mi.UInt32(start), mi.UInt32(stop), sums),
             lambda lane, stop, sums: lane < stop,
             body,
             label="recorded paths",
