@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -177,3 +178,19 @@ def test_another_fixed_value_needs_no_other_kernel(recording):
         misses = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT and not k["cache_hit"]]
     assert misses == []
     assert np.abs(after - before).max() > 0.05
+
+
+def test_a_launch_runs_no_python_that_dr_jit_starts_under_its_lock(recording):
+    # Dr.Jit 1.5.0 holds its lock while it looks into the arguments, into dataclasses by Python's own function: another
+    # thread may go on there and wait for the lock
+    scene, paths = recording
+    x, arguments = middle(scene.renderer.table), lanes(paths, paths.pixel_groups())
+    scene.jacobian(x, *arguments)
+    called = []
+    sys.setprofile(lambda frame, event, _: called.append(frame.f_code.co_name) if event == "call" else None)
+    try:
+        scene.jacobian(x, *arguments)
+    finally:
+        sys.setprofile(None)
+    assert "fields" not in called
+    assert "own_memory" in called  # it does see what is called
