@@ -118,9 +118,8 @@ def _sizes(
     narrowest, narrow = np.float32(settings.narrowest), np.float32(settings.narrow)
     size = reach * np.linalg.norm(away, axis=0).max(-1) / (narrowest + np.linalg.norm(middle, axis=0))
     if axes is not None:
-        tangent, bitangent = axes[
-            :, :, seen
-        ]  # one frame for a cell: where it turns within one, smaller cells are no help
+        # one frame for a cell: where it turns within one, smaller cells are no help
+        tangent, bitangent = axes[:, :, seen]
         tx, ty = (np.sum(axis * middle, axis=0) for axis in (tangent, bitangent))
         across = reach * np.abs(np.sum(bitangent[..., None] * away, axis=0)).max(-1)
         size = np.maximum(size, across / np.sqrt(narrowest**2 + ty**2 + (narrow * tx) ** 2))

@@ -24,12 +24,12 @@ READ_BEFORE = 1  # times that lanes are read as they were recorded: packing take
 
 @dataclass(frozen=True)
 class Lanes:
-    """Arrays of lanes, and which of them each lane of a kernel reads: `start`, then `step` further, before `stop`."""
+    """Lanes, and which of them each lane of a kernel reads: `start`, then `step` further, before `stop`.
 
-    wi: mi.Vector3f
-    wo: mi.Vector3f
-    weight: mi.Color3f
-    held: tuple[Any, ...]
+    `arrays` are directions to camera and light, weights, and values that textures give.
+    """
+
+    arrays: tuple[Any, ...]
     start: mi.UInt32
     stop: mi.UInt32
     step: mi.UInt32
@@ -38,8 +38,8 @@ class Lanes:
     def as_recorded(paths: RecordedPaths, groups: LaneGroups, held: Sequence[str] = ()) -> Lanes:
         """Those of `groups` where they are in the recording, with the values `held` by name."""
         start, stop, _ = groups.parts
-        values = tuple(paths.held[name] for name in held)
-        return Lanes(paths.wi, paths.wo, paths.weight, values, start, stop, dr.opaque(mi.UInt32, 1))
+        arrays = (paths.wi, paths.wo, paths.weight, *(paths.held[name] for name in held))
+        return Lanes(arrays, start, stop, dr.opaque(mi.UInt32, 1))
 
 
 class LaneReader:
@@ -70,17 +70,15 @@ def packed(lanes: Lanes) -> Lanes:
     begin = first[runs // BLOCK] + runs % BLOCK
     size, step = int(BLOCK * longest.sum()), dr.opaque(mi.UInt32, BLOCK)
     to_start, to_stop = (own_memory(a, mi.UInt32) for a in (begin, begin + BLOCK * (stop - start)))
-    arrays = (lanes.wi, lanes.wo, lanes.weight, *lanes.held)
-    copies = tuple(dr.zeros(type(array), size) for array in arrays)
+    copies = tuple(dr.zeros(type(array), size) for array in lanes.arrays)
     dr.eval(copies, to_start, to_stop)
 
     def body(source, stop, target):
-        for array, copy in zip(arrays, copies, strict=True):
+        for array, copy in zip(lanes.arrays, copies, strict=True):
             dr.scatter(copy, dr.gather(type(array), array, source), target, mode=dr.ReduceMode.Permute)
         return source + 1, stop, target + step
 
     state = (mi.UInt32(lanes.start), mi.UInt32(lanes.stop), mi.UInt32(to_start))
     dr.while_loop(state, lambda source, stop, target: source < stop, body, label="pack lanes")
     dr.eval(copies)
-    wi, wo, weight, *held = copies
-    return Lanes(wi, wo, weight, tuple(held), to_start, to_stop, step)
+    return Lanes(copies, to_start, to_stop, step)

@@ -96,9 +96,8 @@ class RecordedJacobian:
         dr.eval(theta, out)
         # not the dataclass: Dr.Jit would run Python to look into it, which may let another thread go on, and that one
         # waits for a lock which this one holds
-        arrays = (lanes.wi, lanes.wo, mi.Color3f(lanes.weight), *lanes.held)
         with _no_garbage_collection():
-            self._launch(theta, self._constants, arrays, lanes.start, lanes.stop, lanes.step, scale, out)
+            self._launch(theta, self._constants, lanes.arrays, lanes.start, lanes.stop, lanes.step, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
@@ -127,31 +126,35 @@ class RecordedJacobian:
 
     def _columns(self, theta, constants, wi, wo, weight, held) -> list[mi.Color3f]:
         """The weighted BSDF value and its derivative by each free value."""
-        values: list[Any] = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
+        free, fixed = self._numbers(theta, constants)
         if not self._derivatives:
-            return [mi.Color3f(self._evaluate(self._parameters(values, constants, held), wi, wo) * weight)]
-        values = [Dual(value, {k: mi.Float(1.0)}) for k, value in enumerate(values)]
-        wi, wo, *held = (Dual(array) for array in (wi, wo, *held))
-        result = self._evaluate(self._parameters(values, constants, held), wi, wo) * weight
-        return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(len(values))))]
+            return [mi.Color3f(self._evaluate(self._parameters(free, fixed, held), wi, wo) * weight)]
+        free = [Dual(value, {k: mi.Float(1.0)}) for k, value in enumerate(free)]
+        fixed, held, (wi, wo) = ([Dual(array) for array in arrays] for arrays in (fixed, held, (wi, wo)))
+        result = self._evaluate(self._parameters(free, fixed, held), wi, wo) * weight
+        return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(len(free))))]
 
     def _warm_up(self) -> None:
         """Let the model load its tables: a frozen launch cannot."""
         theta = own_memory(self.table.pack({}), mi.Float)
-        values = [dr.gather(mi.Float, theta, mi.UInt32(k)) for k in range(self.table.length)]
         up = mi.Vector3f(0.0, 0.0, 1.0)
         some = [mi.Color3f(0.5) if p.size == 3 else mi.Float(0.5) for p in self._held]
-        self._evaluate(self._parameters(values, self._constants, some), up, up)  # traced, never run
+        self._evaluate(self._parameters(*self._numbers(theta, self._constants), some), up, up)  # traced, never run
 
-    def _parameters(self, values: list[mi.Float], constants: mi.Float, held: list[Any]) -> dict[str, Any]:
+    def _numbers(self, theta, constants) -> tuple[list[Any], list[Any]]:
+        """The components of all free values and of all fixed ones that are data."""
+        counts = (self.table.length, sum(p.size for p in self._fixed_table))
+        free, fixed = (
+            [dr.gather(mi.Float, array, mi.UInt32(k)) for k in range(count)]
+            for array, count in zip((theta, constants), counts, strict=True)
+        )
+        return free, fixed
+
+    def _parameters(self, free: list[Any], fixed: list[Any], held: list[Any]) -> dict[str, Any]:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)
         parameters |= {p.name: value for p, value in zip(self._held, held, strict=True)}
-        rest = [dr.gather(mi.Float, constants, mi.UInt32(k)) for k in range(sum(p.size for p in self._fixed_table))]
-        if values and isinstance(values[0], Dual):
-            rest = [Dual(value) for value in rest]
-        for table, entries in ((self.table, iter(values)), (self._fixed_table, iter(rest))):
+        for table, entries in ((self.table, iter(free)), (self._fixed_table, iter(fixed))):
             for p in table:
-                parameters[p.name] = (
-                    next(entries) if p.size == 1 else cast(mi.Color3f, *(next(entries) for _ in range(3)))
-                )
+                components = [next(entries) for _ in range(p.size)]
+                parameters[p.name] = components[0] if p.size == 1 else cast(mi.Color3f, *components)
         return parameters

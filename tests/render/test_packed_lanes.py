@@ -33,7 +33,8 @@ def test_every_run_reads_what_it_read_before(recording, kind):
     if kind.endswith(("some tiles", "one tile")):
         groups = groups.take(np.arange(1, len(groups), 3 if kind == "some tiles" else len(groups)))
     number = mi.Float(np.arange(paths.lanes, dtype=np.float32))  # a texture's value of each lane
-    before = replace(Lanes.as_recorded(paths, groups), held=(number,))
+    before = Lanes.as_recorded(paths, groups)
+    before = replace(before, arrays=(*before.arrays, number))
     after = packed(before)
     runs = [np.arange(int(a), int(b)) for a, b in zip(before.start.numpy(), before.stop.numpy(), strict=True)]
     places = [
@@ -43,12 +44,7 @@ def test_every_run_reads_what_it_read_before(recording, kind):
     assert list(map(len, runs)) == list(map(len, places))
     runs, places = np.concatenate(runs), np.concatenate(places)
     assert len(np.unique(places)) == len(runs)
-    for old, new in (
-        (before.wi, after.wi),
-        (before.wo, after.wo),
-        (before.weight, after.weight),
-        (number, *after.held),
-    ):
+    for old, new in zip(before.arrays, after.arrays, strict=True):
         np.testing.assert_array_equal(np.array(new)[..., places], np.array(old)[..., runs])
 
 
