@@ -14,13 +14,14 @@ error falls with the fourth power of the side.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from .lamps.met_lamps import DELTA
 from .pixel_cells import PixelCells
@@ -61,9 +62,8 @@ def highlight_cells(
     done, new, left = [], cells, settings.most
     for _ in range(settings.levels if lights else 0):
         si, on_target = first_hits(rays_in(new))
-        size = np.zeros(len(new), np.float32)
-        for light in lights:
-            size = np.maximum(size, _sizes(*_slopes(light, si, on_target, settings), settings))
+        sizes = [_sizes(*_slopes(light, si, on_target), settings) for light in lights]
+        size = np.maximum.reduce([of_light.numpy() for of_light in sizes])
         split = size > settings.share
         if split.sum() > left:  # the coarsest first
             split &= size > np.partition(size, -left - 1)[-left - 1]
@@ -76,52 +76,52 @@ def highlight_cells(
 
 
 def _slopes(
-    light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool, settings: Highlights
-) -> tuple[NDArray[np.float32], NDArray[np.float32] | None, NDArray[np.bool_]]:
-    """Slopes (3, cells, 4) of the half vector against the normal, the lobe's axes, and where there is light (cells, 4).
+    light: mi.Emitter, si: mi.SurfaceInteraction3f, on_target: mi.Bool
+) -> tuple[mi.Vector3f, mi.Frame3f, mi.Bool]:
+    """The slope of the half vector against the normal, the surface's frame and whether there is light, for each ray.
 
-    All are in the world's frame: that of a surface may turn from one ray to the next. The axes (2, 3, cells) are the
-    lobe's tangent and bitangent at a cell's first ray, None for a lobe that is as wide along both.
+    Slopes are in the world's frame: that of a surface may turn from one ray to the next.
     """
     ds, value = light.sample_direction(si, mi.Point2f(0.5))
     wo = si.to_local(ds.d)
     lit = on_target & (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
     half = si.wi + wo
     slope, frame = si.to_world(mi.Vector3f(half.x / half.z, half.y / half.z, 0.0)), si.sh_frame
-    dr.eval(slope, frame.s, frame.t, lit)  # one kernel, whether the axes are wanted or not
-
-    def of_world(vector: mi.Vector3f) -> NDArray[np.float32]:
-        return np.stack([vector[axis].numpy() for axis in range(3)]).reshape(3, -1, 4)
-
-    axes = None
-    if settings.narrow < 1.0:
-        angle = np.float32(2.0 * np.pi * settings.turn)
-        s, t = of_world(frame.s)[..., 0], of_world(frame.t)[..., 0]
-        axes = np.stack([np.cos(angle) * s + np.sin(angle) * t, np.cos(angle) * t - np.sin(angle) * s])
-    return of_world(slope), axes, np.array(lit).reshape(-1, 4)
+    dr.eval(slope, frame, lit)
+    return slope, frame, lit
 
 
-def _sizes(
-    slope: NDArray[np.float32], axes: NDArray[np.float32] | None, lit: NDArray[np.bool_], settings: Highlights
-) -> NDArray[np.float32]:
+def _sizes(slope: mi.Vector3f, frame: mi.Frame3f, lit: mi.Bool, settings: Highlights) -> mi.Float:
     """Half diagonals of cells in slopes, relative to the scale on which a lobe changes there; 0 in the dark.
 
     A lobe of widths ax and ay = r ax, r < 1, changes along its bitangent over sqrt(ay^2 + ty^2 + (r tx)^2).
     """
-    sizes = np.zeros(len(lit), np.float32)
-    seen = np.flatnonzero(lit.sum(-1) > 1)  # most cells are beside the target
-    lit = lit[seen]
-    slope = np.where(lit, slope[:, seen], np.float32(0.0))
-    middle = slope.sum(-1) / lit.sum(-1, dtype=np.float32)
-    away = (slope - middle[..., None]) * lit
-    reach = np.float32(1.0 / (2.0 * GAUSS))  # corners lie further out than the points
-    narrowest, narrow = np.float32(settings.narrowest), np.float32(settings.narrow)
-    size = reach * np.linalg.norm(away, axis=0).max(-1) / (narrowest + np.linalg.norm(middle, axis=0))
-    if axes is not None:
-        # one frame for a cell: where it turns within one, smaller cells are no help
-        tangent, bitangent = axes[:, :, seen]
-        tx, ty = (np.sum(axis * middle, axis=0) for axis in (tangent, bitangent))
-        across = reach * np.abs(np.sum(bitangent[..., None] * away, axis=0)).max(-1)
-        size = np.maximum(size, across / np.sqrt(narrowest**2 + ty**2 + (narrow * tx) ** 2))
-    sizes[seen] = size
-    return sizes
+    first = 4 * dr.arange(mi.UInt32, dr.width(lit) // 4)
+    rays = [first + k for k in range(4)]
+    seen = [dr.gather(mi.Bool, lit, ray) for ray in rays]
+    slopes = [dr.gather(mi.Vector3f, slope, ray, active) for ray, active in zip(rays, seen, strict=True)]
+    count = sum(dr.select(active, mi.Float(1.0), 0.0) for active in seen)
+    middle = sum(slopes[1:], slopes[0]) / count
+    away = [dr.select(active, s - middle, 0.0) for s, active in zip(slopes, seen, strict=True)]
+    reach = 1.0 / (2.0 * GAUSS)  # corners lie further out than the points
+    # all settings are data: others need no other kernel
+    angle = 2.0 * math.pi * settings.turn
+    narrowest, narrow, cosine, sine = (
+        dr.opaque(mi.Float, number)
+        for number in (settings.narrowest, settings.narrow, math.cos(angle), math.sin(angle))
+    )
+    size = reach * dr.sqrt(_largest([dr.squared_norm(a) for a in away])) / (narrowest + dr.norm(middle))
+    # one frame for a cell: where it turns within one, smaller cells are no help
+    s, t = (dr.gather(mi.Vector3f, axis, first) for axis in (frame.s, frame.t))
+    tangent, bitangent = cosine * s + sine * t, cosine * t - sine * s
+    across = reach * _largest([dr.abs(dr.dot(bitangent, a)) for a in away])
+    tx, ty = (dr.dot(axis, middle) for axis in (tangent, bitangent))
+    across /= dr.sqrt(dr.square(narrowest) + dr.square(ty) + dr.square(narrow * tx))
+    size = dr.select(narrow < 1.0, dr.maximum(size, across), size)
+    size = dr.select(count > 1.0, size, 0.0)  # most cells are beside the target
+    dr.eval(size)
+    return size
+
+
+def _largest(values: list[mi.Float]) -> mi.Float:
+    return reduce(dr.maximum, values)
