@@ -134,16 +134,20 @@ class MitsubaRenderer:
         import mitsuba as mi
 
         width, height = (int(n) for n in self._sensor.film().crop_size())
-        columns, rows = width * _MASK_RAYS, height * _MASK_RAYS
-        index = dr.arange(mi.UInt32, columns * rows)
-        column, row = mi.Float(index % columns), mi.Float(index // columns)
-        position = mi.Point2f((column + 0.5) / columns, (row + 0.5) / rows)
+        # one pixel's rays follow each other: the nearer the rays of a packet, the quicker
+        number, columns = dr.arange(mi.UInt32, _MASK_RAYS**2 * width * height), dr.opaque(mi.UInt32, width)
+        pixel, of_pixel = number // _MASK_RAYS**2, number % _MASK_RAYS**2
+        corner = mi.Point2f(pixel % columns, pixel // columns)
+        within = mi.Point2f(of_pixel % _MASK_RAYS, of_pixel // _MASK_RAYS)
+        position = (corner + (within + 0.5) / _MASK_RAYS) / dr.opaque(mi.Point2f, (width, height))
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
-        surface = self._scene.ray_intersect_preliminary(ray)
+        surface = self._scene.ray_intersect_preliminary(ray, coherent=True)
         target = mi.ShapePtr(self.shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
         hit = surface.is_valid() & (surface.shape == target)
-        return np.array(hit).reshape(height, _MASK_RAYS, width, _MASK_RAYS).any(axis=(1, 3))
+        seen = dr.zeros(mi.UInt32, width * height)
+        dr.scatter(seen, mi.UInt32(1), pixel, hit)
+        return seen.numpy().reshape(height, width) > 0
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:
         """Put `vector` into the scene anew: the plugin derives values (IOR from specular) in the update's own graph."""
