@@ -111,7 +111,7 @@ def record_paths(
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
-        hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
+        seen = hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
         target = mi.ShapePtr(shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
         on_target = hit.is_valid() & (hit.shape == target)
@@ -142,7 +142,7 @@ def record_paths(
         lanes += _sampled_lights(scene, hits, settings, lamps)
 
         covered, coverage = _coverage(pixels, position, filter_weight)
-        constant = _background(scene, rays, on_target, covered, settings)
+        constant = _background(scene, rays, seen, on_target, covered, settings, lamps)
         if glow is not None:
             pixel = rays.pixel[np.array(position)]
             flat = constant.reshape(-1, 3)
@@ -205,7 +205,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
         ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
         wo = si.to_local(ds.d)
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
-        lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
+        lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), True, lit)
         started.append(_lit(hits, wo, value * hits.share, lit))
     return [kept() for kept in started]
 
@@ -328,26 +328,45 @@ def _coverage(pixels: int, position: mi.UInt32, share: mi.Float) -> tuple[NDArra
 
 
 def _background(
-    scene: mi.Scene, rays: PrimaryRays, on_target: mi.Bool, covered: NDArray[np.int64], settings: RecordSettings
+    scene: mi.Scene,
+    rays: PrimaryRays,
+    met: mi.PreliminaryIntersection3f,
+    on_target: mi.Bool,
+    covered: NDArray[np.int64],
+    settings: RecordSettings,
+    lamps: SceneLamps,
 ) -> NDArray[np.float32]:
-    """Radiance of camera rays that pass by the target, in covered pixels only."""
+    """Radiance of camera rays that pass by the target, in covered pixels only; `met` is what they meet."""
     film = scene.sensors()[0].film()
     width, height = (int(v) for v in film.crop_size())
     image = np.zeros((width * height, 3), np.float32)
     beside = np.zeros(width * height, bool)
     beside[covered] = True
     wanted = ~on_target & dr.gather(mi.Bool, own_memory(beside, mi.Bool), rays.pixel_position)
-    index = dr.compress(wanted)
-    if dr.width(index) > 0:
-        sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
-        ray = dr.gather(mi.Ray3f, rays.ray, index)
-        depth, hide = max(settings.depth, 2), settings.hide_emitters
-        radiance = traced_radiance(scene, sampler, ray, settings.light_paths, depth, hide=hide)
+    # a path tracer's first step takes ten times as long as a look at the environment, and most rays see nothing else
+    traced = wanted if lamps else wanted & met.is_valid()
+    rest = wanted & ~traced
+    dr.eval(traced, rest)
+
+    def add(index: mi.UInt32, radiance: mi.Color3f) -> None:
         value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
         dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
         flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
         for channel in range(3):
-            image[:, channel] = np.bincount(flat, value[channel].numpy(), width * height)
+            image[:, channel] += np.bincount(flat, value[channel].numpy(), width * height)
+
+    index = dr.compress(traced)
+    if dr.width(index) > 0:
+        sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
+        ray = dr.gather(mi.Ray3f, rays.ray, index)
+        depth, hide = max(settings.depth, 2), settings.hide_emitters
+        add(index, traced_radiance(scene, sampler, ray, settings.light_paths, depth, hide=hide))
+    index = dr.compress(rest)
+    environment = None if settings.hide_emitters else scene.environment()
+    if dr.width(index) > 0 and environment is not None:
+        beyond = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
+        beyond.wi = -dr.gather(mi.Vector3f, rays.ray.d, index)
+        add(index, environment.eval(beyond))
     return image.reshape(height, width, 3)
 
 
