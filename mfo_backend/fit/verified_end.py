@@ -17,11 +17,12 @@ from .stages import Candidate
 from .verification import VERIFY_STREAM
 
 FIRST_SAMPLES = 16  # a quarter of the noise (squares) of a reference of 4 samples a pixel
+START_SAMPLES = 4  # of the start, which is mostly far away: a part that has more counts, too
 FIRST_SAMPLES_EXACT = 8  # where every light is exact: for silhouettes and light over other surfaces
 # Part of the squared difference from the reference that may be the picture's own noise; below, more samples would tell
 # little. With 0.25 the root of the difference is at most 15 % too large.
 NOISE_SHARE = 0.25
-MOST_EVEN = 8  # samples of a part, stratified in each pixel; more would need another kernel and change little
+MOST_EVEN = 4  # samples of a part, stratified in each pixel; more would need another kernel and change little
 UNSEEN = 0.002  # of a display's white, half a step of 8 bits
 PATHS_OF_A_PART = 1 << 19  # after twice as many, those of both halves, a request to stop is heard
 
@@ -64,8 +65,8 @@ class Verification:
     Parameters
     ----------
     first, most
-        Samples a pixel of a picture, at least and at most. The first often say enough: the start is usually far away,
-        and under a noisy reference a picture without noise looks no nearer.
+        Samples a pixel of an end's picture, at least and at most. The first often say enough: under a noisy reference a
+        picture without noise looks no nearer.
     view
         What a display shows: differences and noise are compared in its values, as every measure of a fit sees them
         compressed.
@@ -101,14 +102,13 @@ class Verification:
         The ends are near each other, so all of them have as many samples as the one that needs most.
         """
         begun = [self.begin(end) for end in ends]
-        groups = [[start()], [end() for end in begun]]
-        for group in groups:
-            self._grow(group)
-        return [picture.end() for group in groups for picture in group]
+        first, last = [start()], [end() for end in begun]
+        self._grow(first, min(START_SAMPLES // 2, self._first))
+        self._grow(last, self._first)
+        return [picture.end() for picture in (*first, *last)]
 
-    def _grow(self, pictures: list[GrowingPicture]) -> None:
-        """Double the samples of all pictures until they say enough."""
-        wanted = self._first
+    def _grow(self, pictures: list[GrowingPicture], wanted: int) -> None:
+        """Double the samples of all pictures, at least `wanted`, until they say enough."""
         while pictures:
             while pictures[0].samples < min(wanted, self._most):
                 if self._should_stop():

@@ -6,13 +6,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.verified_end import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, PATHS_OF_A_PART, Verification
+from mfo_backend.fit.verified_end import (
+    FIRST_SAMPLES,
+    FIRST_SAMPLES_EXACT,
+    MOST_EVEN,
+    PATHS_OF_A_PART,
+    START_SAMPLES,
+    Verification,
+)
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 
 SHAPE = (32, 32, 3)
 NOISE = 0.2  # standard deviation of one sample of a pixel
 MOST = 64
+FAR = 2 * MOST_EVEN  # samples of a start that is far away: a part of each half
 
 
 class Renderer:
@@ -47,16 +55,18 @@ def found(renderer, reference, start, ends, **more):
 def test_only_what_is_near_the_reference_takes_all_samples():
     renderer = Renderer()
     found(renderer, 0.4, 0.8, [0.4])
-    assert samples_of(renderer, 0.8) == FIRST_SAMPLES
+    assert samples_of(renderer, 0.8) == FAR
     assert samples_of(renderer, 0.4) == MOST
-    assert renderer.passes == pytest.approx(1 + FIRST_SAMPLES / MOST)  # a whole picture is one
+    assert renderer.passes == pytest.approx(1 + FAR / MOST)  # a whole picture is one
 
 
 def test_fewer_samples_to_begin_with_grow_as_much():
     renderer = Renderer()
-    found(renderer, 0.4, 0.8, [0.4], first=FIRST_SAMPLES_EXACT)
-    assert samples_of(renderer, 0.8) == FIRST_SAMPLES_EXACT
-    assert samples_of(renderer, 0.4) == MOST
+    found(renderer, 0.4, 0.8, [0.7, 0.4], first=FIRST_SAMPLES_EXACT)
+    assert samples_of(renderer, 0.7) == samples_of(renderer, 0.4) == MOST
+    renderer = Renderer()
+    found(renderer, 0.4, 0.8, [0.7], first=FIRST_SAMPLES_EXACT)
+    assert samples_of(renderer, 0.7) == FIRST_SAMPLES_EXACT
 
 
 def test_a_start_at_the_solution_takes_all_samples_too():
@@ -108,7 +118,7 @@ def test_no_more_samples_than_asked_for(most):
 def test_a_request_to_stop_ends_it():
     renderer = Renderer()
     start, end = found(renderer, 0.4, 0.4, [0.4001], should_stop=lambda: True)
-    assert samples_of(renderer, 0.4) == samples_of(renderer, 0.4001) == FIRST_SAMPLES
+    assert samples_of(renderer, 0.4) == samples_of(renderer, 0.4001) == FAR
     assert start.image.shape == end.image.shape == SHAPE
 
 
@@ -118,7 +128,7 @@ def test_large_pictures_come_in_parts_that_a_stop_is_heard_between():
     renderer = Renderer(shape=shape)
     found(renderer, 0.4, 0.9, [], shape=shape)
     assert max(side * side * spp for _, _, spp in renderer.taken) <= PATHS_OF_A_PART
-    assert samples_of(renderer, 0.9) == FIRST_SAMPLES
+    assert samples_of(renderer, 0.9) == START_SAMPLES
     renderer = Renderer(shape=shape)
     found(renderer, 0.4, 0.9, [0.4], shape=shape, should_stop=lambda: len(renderer.taken) > 6)
-    assert len(renderer.taken) == 8  # two parts of each half of each picture
+    assert len(renderer.taken) == 8  # a part of each half of the start and three of the end
