@@ -135,10 +135,13 @@ class RecordedJacobian:
         return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(len(free))))]
 
     def _warm_up(self) -> None:
-        """Let the model load its tables: a frozen launch cannot."""
+        """Let the model load its tables: a frozen launch cannot.
+
+        Numbers are data here as they are there: a table's place that the compiler knows is looked up in another table.
+        """
         theta = own_memory(self.table.pack({}), mi.Float)
-        up = mi.Vector3f(0.0, 0.0, 1.0)
-        some = [mi.Color3f(0.5) if p.size == 3 else mi.Float(0.5) for p in self._held]
+        up = dr.opaque(mi.Vector3f, (0.0, 0.0, 1.0))
+        some = [dr.opaque(mi.Color3f if p.size == 3 else mi.Float, 0.5) for p in self._held]
         self._evaluate(self._parameters(*self._numbers(theta, self._constants), some), up, up)  # traced, never run
 
     def _numbers(self, theta, constants) -> tuple[list[Any], list[Any]]:

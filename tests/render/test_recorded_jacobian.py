@@ -180,6 +180,22 @@ def test_another_fixed_value_needs_no_other_kernel(recording):
     assert np.abs(after - before).max() > 0.05
 
 
+def test_tables_are_loaded_before_the_launch_is_recorded(recording, monkeypatch):
+    from mfo_backend.material import grid_table
+    from mfo_backend.material.recorded_models import BlenderPrincipledModel
+    from mfo_backend.render.recorded_jacobian import RecordedJacobian
+
+    for table in grid_table._TABLES:  # as in a process that has not evaluated this material yet
+        monkeypatch.setattr(table, "_buffers", {})
+        monkeypatch.setattr(table, "_slices", {})
+    (_, paths), model = recording, BlenderPrincipledModel()
+    table = model.table.select(["base_color", "roughness", "sheen_weight"])
+    jacobian = RecordedJacobian(model, table, model.values({}, table.names))
+    loaded = len(model.buffers())
+    assert np.isfinite(jacobian(middle(table), *lanes(paths, paths.tile_groups()))).all()
+    assert len(model.buffers()) == loaded > 0
+
+
 def test_a_launch_runs_no_python_that_dr_jit_starts_under_its_lock(recording):
     # Dr.Jit 1.5.0 holds its lock while it looks into the arguments, into dataclasses by Python's own function: another
     # thread may go on there and wait for the lock
