@@ -21,6 +21,7 @@ _PACKAGE = str(Path(__file__).parents[1])
 # the innermost frame in one of these files or folders of the package decides
 _PLACES = {
     "render/record_paths.py": "record",
+    "render/recorded_background.py": "record",
     "render/proposal.py": "record",
     "render/recorded_jacobian.py": "jacobian",
     "render/recorded_paths.py": "jacobian",

@@ -25,6 +25,7 @@ from .lamps.met_lamps import DELTA, SceneLamps
 from .pixel_cells import PixelCells
 from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_order
 from .proposal import DefensiveProposal
+from .recorded_background import recorded_background
 from .recorded_paths import RecordedPaths
 from .traced_radiance import traced_radiance
 
@@ -142,7 +143,10 @@ def record_paths(
         lanes += _sampled_lights(scene, hits, settings, lamps)
 
         covered, coverage = _coverage(pixels, position, filter_weight)
-        constant = _background(scene, rays, seen, on_target, covered, settings, lamps)
+        constant = recorded_background(
+            scene, rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
+            depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
+        )  # fmt: skip
         if glow is not None:
             pixel = rays.pixel[np.array(position)]
             flat = constant.reshape(-1, 3)
@@ -325,49 +329,6 @@ def _coverage(pixels: int, position: mi.UInt32, share: mi.Float) -> tuple[NDArra
     total = np.bincount(np.array(position), np.array(share), pixels)
     covered = np.flatnonzero(total > 0.0)
     return covered, total[covered].astype(np.float32)
-
-
-def _background(
-    scene: mi.Scene,
-    rays: PrimaryRays,
-    met: mi.PreliminaryIntersection3f,
-    on_target: mi.Bool,
-    covered: NDArray[np.int64],
-    settings: RecordSettings,
-    lamps: SceneLamps,
-) -> NDArray[np.float32]:
-    """Radiance of camera rays that pass by the target, in covered pixels only; `met` is what they meet."""
-    film = scene.sensors()[0].film()
-    width, height = (int(v) for v in film.crop_size())
-    image = np.zeros((width * height, 3), np.float32)
-    beside = np.zeros(width * height, bool)
-    beside[covered] = True
-    wanted = ~on_target & dr.gather(mi.Bool, own_memory(beside, mi.Bool), rays.pixel_position)
-    # a path tracer's first step takes ten times as long as a look at the environment, and most rays see nothing else
-    traced = wanted if lamps else wanted & met.is_valid()
-    rest = wanted & ~traced
-    dr.eval(traced, rest)
-
-    def add(index: mi.UInt32, radiance: mi.Color3f) -> None:
-        value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
-        dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
-        flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
-        for channel in range(3):
-            image[:, channel] += np.bincount(flat, value[channel].numpy(), width * height)
-
-    index = dr.compress(traced)
-    if dr.width(index) > 0:
-        sampler = fresh_sampler(settings.seed + 0x2545F49, dr.width(index))
-        ray = dr.gather(mi.Ray3f, rays.ray, index)
-        depth, hide = max(settings.depth, 2), settings.hide_emitters
-        add(index, traced_radiance(scene, sampler, ray, settings.light_paths, depth, hide=hide))
-    index = dr.compress(rest)
-    environment = None if settings.hide_emitters else scene.environment()
-    if dr.width(index) > 0 and environment is not None:
-        beyond = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
-        beyond.wi = -dr.gather(mi.Vector3f, rays.ray.d, index)
-        add(index, environment.eval(beyond))
-    return image.reshape(height, width, 3)
 
 
 def _merge(

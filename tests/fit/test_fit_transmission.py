@@ -64,7 +64,8 @@ def test_the_intervals_hold_the_truth(tmp_path):
 
 def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     sockets = {"Sheen Tint": {"value": [0.3, 0.3, 0.3], "linked": False}}
-    renderer = load(tmp_path, [*NAMES, "sheen_weight", "sheen_tint"], sockets, size=32)
+    renderer = load(tmp_path, [*NAMES, "sheen_weight", "sheen_tint"], sockets, size=48)
+    # at 32 x 32 pixels the FLIP of either end is noisy by what no eye sees, 0.002, which decides
     # with 64 samples the sheen is unsure by 0.07, and another BLAS kernel's rounding moves it from 0.028 to 0.042
     reference = renderer.image(renderer.table.pack({**TRUTH, "sheen_tint": (0.9, 0.1, 0.1)}), seed=5, spp=256)
     result, _ = fit(renderer, reference)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What camera rays see beside the target, in pixels that the target covers in part."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..material.own_memory import own_memory
+from ..types.light_paths import LightPaths
+from .lamps.met_lamps import SceneLamps
+from .primary_rays import PrimaryRays, fresh_sampler
+from .traced_radiance import traced_radiance
+
+
+def recorded_background(
+    scene: mi.Scene,
+    rays: PrimaryRays,
+    met: mi.PreliminaryIntersection3f,
+    on_target: mi.Bool,
+    covered: NDArray[np.int64],
+    lamps: SceneLamps,
+    *,
+    seed: int,
+    depth: int,
+    light_paths: LightPaths | None,
+    hide_emitters: bool,
+) -> NDArray[np.float32]:
+    """Radiance (height, width, 3), linear Rec.709, of rays that pass by the target, in the `covered` pixels only.
+
+    `met` is what the rays meet, `covered` counts as they do; paths are of up to `depth`.
+    """
+    width, height = (int(v) for v in scene.sensors()[0].film().crop_size())
+    image = np.zeros((width * height, 3), np.float32)
+    looked_at = np.zeros(len(rays.pixel), bool)
+    looked_at[covered] = True
+    wanted = ~on_target & dr.gather(mi.Bool, own_memory(looked_at, mi.Bool), rays.pixel_position)
+    # a path tracer's first step takes ten times as long as a look at the environment, and most rays see nothing else
+    traced = wanted if lamps else wanted & met.is_valid()
+    rest = wanted & ~traced
+    dr.eval(traced, rest)
+
+    def add(index: mi.UInt32, radiance: mi.Color3f) -> None:
+        value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
+        dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
+        flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
+        for channel in range(3):
+            image[:, channel] += np.bincount(flat, value[channel].numpy(), width * height)
+
+    index = dr.compress(traced)
+    if dr.width(index) > 0:
+        sampler = fresh_sampler(seed, dr.width(index))
+        ray = dr.gather(mi.Ray3f, rays.ray, index)
+        add(index, traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters))
+    index = dr.compress(rest)
+    environment = None if hide_emitters else scene.environment()
+    if dr.width(index) > 0 and environment is not None:
+        beyond = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
+        beyond.wi = -dr.gather(mi.Vector3f, rays.ray.d, index)
+        add(index, environment.eval(beyond))
+    return image.reshape(height, width, 3)
