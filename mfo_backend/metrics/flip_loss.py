@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .exposure_range import ExposureRange
 from .flip import pixels_of, planes_of
 from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
-from .flip_reference import FlipComparison, FlipReference
+from .flip_reference import FlipComparison, FlipReference, comparisons
 from .hdr_flip import HdrFlip
 from .pixel_check import check_image
 from .tone_mapping import View
@@ -42,7 +42,8 @@ class FlipLoss:
 
     def _compare(self, image: Array) -> FlipComparison:
         check_image(image, self._shape)
-        return self._reference.compare(planes_of(self._view.light(image).astype(self._dtype, copy=False)))
+        light = self._view.light(image).astype(self._dtype, copy=False)
+        return next(comparisons([self._reference], planes_of(light)))
 
 
 class HdrFlipLoss:

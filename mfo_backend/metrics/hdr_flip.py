@@ -8,13 +8,15 @@ Andersson et al., "Visualizing Errors in Rendered High Dynamic Range Images", Eu
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .exposure_range import ExposureRange, official_exposures
 from .flip import pixels_of, planes_of
 from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
-from .flip_reference import FlipComparison, FlipReference
+from .flip_reference import FlipComparison, FlipReference, comparisons
 from .pixel_check import check_finite, check_pair
 from .side_by_side import side_by_side
 from .tone_curve import ToneCurve
@@ -61,14 +63,17 @@ class HdrFlip:
         self.exposures = exposures or official_exposures(reference, curve)
         self._curve = curve
         planes = planes_of(reference.astype(self.dtype, copy=False))
-        self._references = [FlipReference(curve.apply(planes, ev), pixels_per_degree) for ev in self.exposures.values]
+        self._references = [
+            FlipReference(planes, pixels_per_degree, partial(curve.apply, exposure_ev=ev))
+            for ev in self.exposures.values
+        ]
 
     def map(self, test: Array) -> Array:
         """The error map (height, width) in [0, 1] of linear pixels (height, width, 3); negative values count as 0."""
         planes = planes_of(test.astype(self.dtype, copy=False))
         error = np.zeros(planes.shape[1:], self.dtype)
-        for of_one in side_by_side(lambda index: self._compare_at(index, planes).error, range(self.exposures.count)):
-            np.maximum(error, of_one, out=error)
+        for comparison in comparisons(self._references, planes):
+            np.maximum(error, comparison.error, out=error)
         return error
 
     def map_and_pullback(self, test: Array, weight: Array | float) -> tuple[Array, Array]:
@@ -80,18 +85,17 @@ class HdrFlip:
         error = np.zeros(planes.shape[1:], self.dtype)
         winner = np.full(error.shape, -1, np.int16)
         keep = error.size * self.exposures.count <= _KEPT
-        comparisons: dict[int, FlipComparison] = {}
-        compared = side_by_side(lambda index: self._compare_at(index, planes), range(self.exposures.count))
-        for index, comparison in enumerate(compared):
+        kept: dict[int, FlipComparison] = {}
+        for index, comparison in enumerate(comparisons(self._references, planes)):
             larger = comparison.error > error
             if larger.any():
                 np.copyto(error, comparison.error, where=larger)
                 winner[larger] = index
                 if keep:
-                    comparisons[index] = comparison
+                    kept[index] = comparison
 
         def gradient_at(index: int) -> Array:
-            comparison = comparisons.pop(index, None) or self._compare_at(index, planes)
+            comparison = kept.pop(index, None) or self._references[index].compare(planes)
             shown = comparison.pullback(((winner == index) * weight).astype(self.dtype, copy=False))
             return self._curve.pullback(planes, self.exposures.values[index], shown)
 
@@ -99,9 +103,6 @@ class HdrFlip:
         for of_one in side_by_side(gradient_at, [index for index in np.unique(winner).tolist() if index >= 0]):
             gradient += of_one
         return error, pixels_of(gradient)
-
-    def _compare_at(self, index: int, planes: Array) -> FlipComparison:
-        return self._references[index].compare(self._curve.apply(planes, self.exposures.values[index]))
 
 
 def hdr_flip_map(

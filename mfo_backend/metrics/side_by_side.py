@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from typing import TypeVar
 
@@ -17,14 +18,25 @@ Result = TypeVar("Result")
 def side_by_side(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
     """`function` of each item, in order; as many at a time as there are processors, or `MFO_THREADS`.
 
-    No more results are held than are computed at a time. The first error is raised.
+    No more than twice as many results are held. The first error is raised. A `function` must not call this again: where
+    all threads wait for others, none is left to work.
     """
     threads = threads_wanted() or processors()
     if threads == 1 or len(items) < 2:
         yield from map(function, items)
         return
-    for begin in range(0, len(items), threads):
-        yield from _pool(threads).map(function, items[begin : begin + threads])
+    pool = _pool(threads)
+    begun: deque[Future[Result]] = deque()
+    try:
+        for item in items:
+            if len(begun) == 2 * threads:
+                yield begun.popleft().result()
+            begun.append(pool.submit(function, item))
+        while begun:
+            yield begun.popleft().result()
+    finally:
+        for future in begun:
+            future.cancel()
 
 
 @cache

@@ -116,13 +116,7 @@ def test_hdr_pair(seed):
     if seed % EXACT_HDR_EVERY == 0:
         np.testing.assert_allclose(ours, exact_hdr_flip(reference, test), rtol=0, atol=EXACT)
     exact = HdrFlip(reference.astype(np.float64))
-    slack = np.max(
-        [
-            rounding(flip, np.moveaxis(exact._curve.apply(planes_of(test.astype(np.float64)), ev), 0, -1))
-            for flip, ev in zip(exact._references, exact.exposures.values, strict=True)
-        ],
-        axis=0,
-    )
+    slack = np.max([rounding(flip, test.astype(np.float64)) for flip in exact._references], axis=0)
     assert_equal_maps(ours, oracle.evaluate(reference, test, "HDR", applyMagma=False)[0][..., 0], slack)
     error, gradient = HdrFlip(reference).map_and_pullback(test, 1 / ours.size)
     assert_equal_maps(ours, error, slack)

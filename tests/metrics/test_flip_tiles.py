@@ -15,9 +15,14 @@ from mfo_backend.metrics.hdr_flip import HdrFlip
 SIZE = (100, 70)
 
 
+def make_tiles_small(monkeypatch):
+    monkeypatch.setattr(flip_reference, "TILE_HEIGHT", 32)
+    monkeypatch.setattr(flip_reference, "TILE_WIDTH", 32)
+
+
 @pytest.fixture
 def small_tiles(monkeypatch):
-    monkeypatch.setattr(flip_reference, "TILE", 32)
+    make_tiles_small(monkeypatch)
 
 
 @pytest.fixture
@@ -48,7 +53,7 @@ def test_tiles_give_the_errors_and_gradients_of_the_whole_picture(monkeypatch):
     reference, test = (planes_of(image) for image in images())
     weight = np.random.default_rng(3).random(SIZE)
     whole = FlipReference(reference, 40.0).compare(test)
-    monkeypatch.setattr(flip_reference, "TILE", 32)
+    make_tiles_small(monkeypatch)
     tiled = FlipReference(reference, 40.0).compare(test)
     assert len(whole._differences) == 1
     assert len(tiled._differences) == 6
