@@ -85,6 +85,7 @@ class RecordedFit:
         self.paths: RecordedPaths
         self._groups: dict[int, LaneGroups] = {}  # tiles of the present recording by side
         self._tiles: dict[LaneGroups, RecordedImage] = {}
+        self._pictures: RecordedImage | None = None
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
@@ -309,7 +310,7 @@ class RecordedFit:
     def _record(self, x: Vector, grid: int | NDArray[np.int64]) -> None:
         """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
-        self._groups, self._tiles = {}, {}
+        self._groups, self._tiles, self._pictures = {}, {}, None
         self.recordings += 1
         seed = self.seed + self.recordings
         self.paths = self.scene.record(x, grid=grid, seed=seed, near=True, samples=SAMPLES)
@@ -336,7 +337,8 @@ class RecordedFit:
 
     def _pixels(self, x: Vector) -> NDArray[np.float32]:
         """Radiance of the covered pixels, (p, 3)."""
-        return self.scene.image(x, self.paths, self.paths.pixel_groups())
+        self._pictures = self._pictures or self.scene.pictures(self.paths, self.paths.pixel_groups(), RECALLED)
+        return self._pictures(x)[:, :, 0]
 
     def _pixels_with_tiles(self, x: Vector, groups: LaneGroups) -> NDArray[np.float32]:
         """The same by an evaluation with derivatives, which those of the tiles `groups` are made of."""

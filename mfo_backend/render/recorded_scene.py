@@ -201,11 +201,16 @@ class RecordedScene:
         reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
         return widened(self.renderer.target_mask(), reach)
 
-    def image(self, vector: NDArray[np.float64], paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.float32]:
-        """The image of the groups alone (g, 3), background included, without its derivatives."""
-        samples = self._image(vector, Lanes.as_recorded(paths, groups, self._held), groups)
-        self.renderer.passes += _share(groups, paths)
-        return TwoSamples.of(samples, groups.average(paths.constant)).mean[:, :, 0]
+    def pictures(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
+        """The function from a vector to the image of the groups alone, background included, without derivatives."""
+        constant = groups.average(paths.constant)
+        lanes, cost = Lanes.as_recorded(paths, groups, self._held), _share(groups, paths)
+
+        def at(vector: NDArray[np.float64]) -> TwoSamples:
+            self.renderer.passes += cost
+            return TwoSamples.of(self._image(vector, lanes, groups), constant)
+
+        return RecordedImage(at, recalled)
 
     @cached_property
     def _image(self) -> RecordedJacobian:

@@ -14,6 +14,7 @@ from mfo_backend.fit.problem import Rival
 from mfo_backend.fit.recorded_plan import RecordedPlan
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.metrics.loss import make_loss
 from mfo_backend.render.renderer import load_renderer
 from mfo_backend.solve.bounded_least_squares import NormalEquations
 from mfo_backend.types.certainty import Level
@@ -33,6 +34,8 @@ USER = {"base_color": (0.5, 0.5, 0.5), "roughness": 0.6, "sheen": 0.001, "sheen_
 def test_undetermined_values_go_back_where_nothing_is_seen_of_it(tmp_path, monkeypatch, visible, given_back):
     # below zero, every change counts as seen
     monkeypatch.setattr(kept_values, "VISIBLE", visible)
+    if not given_back:
+        monkeypatch.setattr(kept_values, "UNSEEN_CHANGE", -1.0)
     renderer = load_renderer(
         write_scene(tmp_path, POINT, size=32), "target", model="mitsuba_principled", parameters=NAMES
     )
@@ -50,17 +53,63 @@ def test_undetermined_values_go_back_where_nothing_is_seen_of_it(tmp_path, monke
     assert result.recovered["roughness"] == pytest.approx(TRUTH["roughness"], abs=0.01)
 
 
+class Pictures:
+    """A fit that shows grey pictures, one for each first value of a vector, and counts how often it is asked."""
+
+    def __init__(self, greys):
+        self.greys, self.mask, self.shown = greys, np.ones((2, 2), bool), 0
+
+    def picture(self, x):
+        self.shown += 1
+        return np.full((2, 2, 3), self.greys[float(x[0])])
+
+    def rows(self, x):
+        return np.full((4, 3, 1), self.greys[float(x[0])])
+
+    def unseen(self, seen):
+        refined = SimpleNamespace(x=np.array([0.0]), all=SimpleNamespace(evaluate=self.rows))
+        return kept_values._UnseenChange(self, refined, seen)
+
+
 def test_the_error_to_the_eye_may_grow_by_a_trace_only():
-    pictures = {0.0: np.zeros((2, 2, 3)), 1.0: np.full((2, 2, 3), 0.001), 2.0: np.full((2, 2, 3), 0.01)}
-
-    class Fit:
-        def picture(self, x):
-            return pictures[float(x[0])]
-
-    unseen = kept_values._UnseenChange(Fit(), np.array([0.0]), lambda picture: float(picture.mean()))
+    fit = Pictures({0.0: 0.0, 1.0: 0.001, 2.0: 0.01})
+    unseen = fit.unseen(lambda picture: float(picture.mean()))
     assert unseen(np.array([1.0]))
     assert not unseen(np.array([2.0]))
-    assert kept_values._UnseenChange(Fit(), np.array([0.0]), None)(np.array([2.0]))
+    assert fit.unseen(None)(np.array([2.0]))
+
+
+def test_a_change_that_nobody_can_see_needs_no_picture():
+    fit = Pictures({0.0: 1.0, 1.0: 1.0 + 0.9 * kept_values.UNSEEN_CHANGE, 2.0: 1.0 + 1.1 * kept_values.UNSEEN_CHANGE})
+    unseen = fit.unseen(lambda picture: 1e6 * float(picture.mean()))
+    assert unseen(np.array([1.0]))
+    assert fit.shown == 0
+    assert not unseen(np.array([2.0]))
+    assert fit.shown == 2
+
+
+@pytest.mark.parametrize("change", ["brighter", "either way", "another hue", "noise"])
+@pytest.mark.parametrize("picture", ["even", "contrasty", "red"])
+@pytest.mark.parametrize("name", ["flip-hdr", "flip-ldr"])
+def test_such_a_change_moves_flip_less_than_what_counts_as_visible(picture, change, name):
+    """Of the reference itself, where FLIP is steepest."""
+    rng, shape = np.random.default_rng(0), (64, 64, 3)
+    reference = {
+        "even": rng.random(shape),
+        "contrasty": np.exp(2.0 * rng.normal(size=shape)),
+        "red": np.broadcast_to([0.9, 0.1, 0.2], shape),
+    }[picture].astype(np.float32)
+    sign = {
+        "brighter": 1.0,
+        "either way": rng.choice([-1.0, 1.0], shape[:2])[..., None],
+        "another hue": np.array([1.0, -1.0, 1.0]),
+        "noise": np.sqrt(np.pi / 2) * rng.normal(size=shape),  # its mean size is 1
+    }[change]
+    changed = (reference * (1.0 + kept_values.UNSEEN_CHANGE * sign)).astype(np.float32)
+    loss = make_loss(name, Image(reference, Encoding.LINEAR))
+    assert 0.0 < loss.value(changed) < kept_values.VISIBLE
+    rows = [pixels.reshape(-1, 3) for pixels in (reference, changed)]
+    assert kept_values.relative_change(*rows) == pytest.approx(kept_values.UNSEEN_CHANGE, rel=0.1)
 
 
 TRADED = ParameterTable([Parameter(name, 1, 0.0, 1.0, 0.5) for name in ("roughness", "sheen", "sheen_tint", "coat")])

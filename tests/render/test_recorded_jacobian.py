@@ -115,7 +115,7 @@ def test_the_image_alone_is_that_of_the_derivatives(recording):
     for groups in (paths.pixel_groups(), paths.tile_groups()):
         expected = scene.evaluator(paths, groups)(x)[:, :, 0]
         # another kernel contracts other products and sums
-        np.testing.assert_allclose(scene.image(x, paths, groups), expected, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(scene.pictures(paths, groups)(x)[:, :, 0], expected, rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("size", [[1, 1, 1], [1, 40, 2, 1, 7], [300]])
