@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -94,7 +95,7 @@ class Verification:
         """Start the first samples of a picture; returns what waits for it."""
         samples = self._samples_of_a_part(min(self._first, self._most))
         halves = self._halves_later(vector, 0, samples)
-        return lambda: GrowingPicture(vector, [half() for half in halves], samples)
+        return lambda: GrowingPicture(vector, halves(), samples)
 
     def pictures(self, start: Callable[[], GrowingPicture], ends: Sequence[Vector]) -> list[VerifiedEnd]:
         """The pictures of the start, which has begun, and of the fit's ends.
@@ -110,14 +111,31 @@ class Verification:
     def _grow(self, pictures: list[GrowingPicture], wanted: int) -> None:
         """Double the samples of all pictures, at least `wanted`, until they say enough."""
         while pictures:
-            while pictures[0].samples < min(wanted, self._most):
-                if self._should_stop():
-                    return
-                for picture in pictures:
-                    self._add_part(picture, min(wanted, self._most) - picture.samples)
+            self._add(pictures, min(wanted, self._most))
+            if pictures[0].samples < min(wanted, self._most):
+                return  # as was requested
             if wanted >= self._most or not any(self._is_noisy(*picture.halves) for picture in pictures):
                 return
             wanted *= 2
+
+    def _add(self, pictures: list[GrowingPicture], wanted: int) -> None:
+        """Render parts until all pictures have so many samples; the next one is traced while one is computed."""
+        begun: deque[Callable[[], None]] = deque()
+        ahead = 1 if self._mask.size <= PATHS_OF_A_PART else 0  # two parts of a huge picture are twice the memory
+        after = pictures[0].samples
+        while after < wanted and not self._should_stop():
+            samples = self._samples_of_a_part(wanted - after)
+            for picture in pictures:
+                begun.append(self._add_later(picture, after, samples))
+                if len(begun) > ahead:
+                    begun.popleft()()
+            after += samples
+        for add in begun:
+            add()
+
+    def _add_later(self, picture: GrowingPicture, after: int, samples: int) -> Callable[[], None]:
+        halves = self._halves_later(picture.vector, after, samples)
+        return lambda: picture.add(halves(), samples)
 
     def _is_noisy(self, first: Pixels, second: Pixels) -> bool:
         """Whether noise is more than `NOISE_SHARE` of what the mean of two halves and the reference differ by.
@@ -135,14 +153,10 @@ class Verification:
         """At most so many samples; a power of two, for any other number is another kernel."""
         return 1 << min(most, self._part).bit_length() - 1
 
-    def _add_part(self, picture: GrowingPicture, most: int) -> None:
-        samples = self._samples_of_a_part(most)
-        picture.add([half() for half in self._halves_later(picture.vector, picture.samples, samples)], samples)
-
-    def _halves_later(self, vector: Vector, after: int, samples: int) -> list[Callable[[], Pixels]]:
+    def _halves_later(self, vector: Vector, after: int, samples: int) -> Callable[[], list[Pixels]]:
         """Start `samples` more samples a pixel of both halves; a whole picture counts as one pass."""
         passes = self._renderer.passes
         seeds = ((half + after * _NEXT_SAMPLE) % 2**32 for half in (self._seed, self._seed ^ _SECOND_HALF))
         halves = [self._renderer.image_later(vector, seed=seed, spp=samples, even=True) for seed in seeds]
         self._renderer.passes = passes + samples / self._most
-        return halves
+        return lambda: [half() for half in halves]
