@@ -21,13 +21,15 @@ from ..types.parameter import ParameterTable
 from ..types.status import Status
 from .course import Course
 from .final_result import SQUARES_KEPT, final_result
+from .finishing import finishing_residuals
 from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
 from .kept_values import VISIBLE, kept_note
+from .linear_pictures import LinearPictures
 from .picture_judge import PictureJudge
 from .polished import CORE, Polished
 from .settings import FitSettings
-from .traced_flip import FLIP, lower_traced_flip
+from .traced_perception import FLIP, lower_seen_error
 from .transmission_plan import TransmissionPlan
 from .transmission_stages import TransmissionFit
 from .uncertainty import WEAK_BELOW, certainties
@@ -74,10 +76,11 @@ def fit_transmission(
     scene_view = DisplayView.for_scene(reference.pixels, mask) if reference.encoding is Encoding.LINEAR else None
     view = scene_view or display or DisplayView()
     paths = TracedPaths(renderer)
-    stages = (*STAGES, FLIP) if settings.preset == "best" else STAGES
+    light, clipped = linear_pixels(reference, view), clipped_pixels(reference, view)
+    seen_residuals = finishing_residuals(settings, reference.encoding, light, mask, view)
+    stages = (*STAGES, *seen_residuals, *([FLIP] if settings.preset == "best" else []))
     listener(Started(stages=stages, parameters=renderer.table.names, seconds=time.monotonic() - began))
     course = Course(renderer, stages, listener, should_stop, began)
-    light, clipped = linear_pixels(reference, view), clipped_pixels(reference, view)
     course.picture = lambda x: _preview(paths, x, mask.shape, settings.seed ^ VERIFY_STREAM)
     fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
 
@@ -101,27 +104,27 @@ def fit_transmission(
         if raced:
             ends = ends[: freest + 1]
     name = "flip-ldr" if ldr else "flip-hdr"
-    judge, flipped = None, []
-    if FLIP in stages and ends and not should_stop():
+    judge, nearer = None, []
+    linear = LinearPictures(fit.pictures, settings.seed)
+    if len(stages) > len(STAGES) and ends and not should_stop() and linear.are_worth_it(found[0], reference, view):
         blurred = reference.encoding is Encoding.LINEAR
         judge = PictureJudge(name, reference, light, mask, settings, view, blurred=blurred)
-        flipped = lower_traced_flip(
-            fit.pictures, judge, reference, view, found[0], ends[-1].kept, course, settings.seed
-        )
+        end = lower_seen_error(linear, judge, seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in stages)
+        nearer = [] if np.array_equal(end, found[0]) else [end]
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
     )
-    pictures = verification.pictures(verification.begin(renderer.start), [*found, *flipped])
+    pictures = verification.pictures(verification.begin(renderer.start), [*found, *nearer])
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
     seen = [loss.value(picture.image) for picture in pictures]
     kept = len(found) == 2 and seen[1] <= seen[2] + VISIBLE
     best = 1 if kept else len(found)
-    if judge and flipped and best == 1 and judge.value(pictures[-1].image) < judge.value(pictures[1].image):
+    if judge and nearer and best == 1 and judge.value(pictures[-1].image) < judge.value(pictures[1].image):
         best = len(pictures) - 1
     listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
-    if flipped and best == 1:
+    if nearer and best == 1:
         notes.append(SQUARES_KEPT.format(stage="polish"))
     if ends:
         shown = ends if kept or len(found) == 1 else ends[: freest + 1]

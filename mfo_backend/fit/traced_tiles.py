@@ -41,7 +41,7 @@ class TracedTiles:
     ) -> None:
         self.paths, self.reference, self.mask, self.clipped = paths, reference, mask, clipped
         self.counts: EqualCounts | None = None
-        self._should_stop = should_stop
+        self.should_stop = should_stop
 
     def tiles(self, size: int, most: int) -> TileRows:
         """Tiles of the reference, compressed where pictures are compared so."""
@@ -80,7 +80,7 @@ class TracedTiles:
 
         def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
             images = self.paths.images(
-                vectors, pixels, seed=seed, samples=samples, jacobian=derivatives, should_stop=self._should_stop
+                vectors, pixels, seed=seed, samples=samples, jacobian=derivatives, should_stop=self.should_stop
             )
             return images if self.counts is None else self.counts.compress(images)
 

@@ -106,9 +106,7 @@ def _joined(tiles: Sequence[Tile], differences: Iterable[FlipDifference | None],
 class FlipComparison:
     """The map of one comparison: `error` (height, width) in [0, 1], exactly 0 where both pictures are equal around."""
 
-    def __init__(
-        self, differences: list[tuple[Tile, FlipDifference]], shape: tuple[int, ...], dtype: np.dtype
-    ) -> None:
+    def __init__(self, differences: list[tuple[Tile, FlipDifference]], shape: tuple[int, ...], dtype: np.dtype) -> None:
         self._differences = differences
         self._shape = shape
         self.error = np.zeros(shape[1:], dtype)
