@@ -337,7 +337,7 @@ class RecordedFit:
 
     def _pixels(self, x: Vector) -> NDArray[np.float32]:
         """Radiance of the covered pixels, (p, 3)."""
-        self._pictures = self._pictures or self.scene.pictures(self.paths, self.paths.pixel_groups(), RECALLED)
+        self._pictures = self._pictures or self.scene.pictures(self.paths, self.paths.pixel_groups())
         return self._pictures(x)[:, :, 0]
 
     def _pixels_with_tiles(self, x: Vector, groups: LaneGroups) -> NDArray[np.float32]:

@@ -201,8 +201,11 @@ class RecordedScene:
         reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
         return widened(self.renderer.target_mask(), reach)
 
-    def pictures(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
-        """The function from a vector to the image of the groups alone, background included, without derivatives."""
+    def pictures(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage:
+        """The function from a vector to the image of the groups alone, background included, without derivatives.
+
+        It remembers two: solutions are compared in pairs.
+        """
         constant = groups.average(paths.constant)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), _share(groups, paths)
 
@@ -210,7 +213,7 @@ class RecordedScene:
             self.renderer.passes += cost
             return TwoSamples.of(self._image(vector, lanes, groups), constant)
 
-        return RecordedImage(at, recalled)
+        return RecordedImage(at, 2)
 
     @cached_property
     def _image(self) -> RecordedJacobian:
