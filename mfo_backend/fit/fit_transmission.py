@@ -105,12 +105,13 @@ def fit_transmission(
             ends = ends[: freest + 1]
     name = "flip-ldr" if ldr else "flip-hdr"
     judge, nearer = None, []
-    linear = LinearPictures(fit.pictures, settings.seed)
-    if len(stages) > len(STAGES) and ends and not should_stop() and linear.are_worth_it(found[0], reference, view):
-        blurred = reference.encoding is Encoding.LINEAR
-        judge = PictureJudge(name, reference, light, mask, settings, view, blurred=blurred)
-        end = lower_seen_error(linear, judge, seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in stages)
-        nearer = [] if np.array_equal(end, found[0]) else [end]
+    if seen_residuals and ends and not should_stop():
+        linear = LinearPictures(fit.pictures, settings.seed)
+        if linear.are_worth_it(found[0], reference, view):
+            blurred = reference.encoding is Encoding.LINEAR
+            judge = PictureJudge(name, reference, light, mask, settings, view, blurred=blurred)
+            end = lower_seen_error(linear, judge, seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in stages)
+            nearer = [] if np.array_equal(end, found[0]) else [end]
     stopped = should_stop()
     verification = Verification(
         renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop

@@ -17,9 +17,10 @@ from .traced_tiles import TracedTiles
 STREAM = 0x6F000000  # random numbers of no other stage
 WORTH = 0.02  # relative difference of blocks of pixels that noise does not explain; less is hard to see
 MOST_PIXELS = 1 << 16  # whole pictures are needed; of more pixels one takes too long
-HALF_PATHS = 1 << 19  # of a half of a picture; with fewer, noise decides some results (docs/glass.md)
+# Of a half of a picture. With fewer, noise decides some results (docs/glass.md); with a quarter, a difference of 4 % is
+# found in half of the pictures of 48 x 48 pixels only
+HALF_PATHS = 1 << 19
 HALF_SAMPLES = (4, 32)  # of a pixel, at least and at most
-GAP_SAMPLES = 8  # the same, at most, to tell a difference of `WORTH`: blocks of pixels average more
 REACH = 0.1  # of the range: as far as one linear picture is trusted
 TILE = 4  # pixels: averages noise before the response of an eye bends it
 
@@ -35,15 +36,10 @@ class LinearPictures:
     """
 
     def __init__(self, pictures: TracedTiles, seed: int) -> None:
-        self.mask, self.reference, self._pictures, self._seed = pictures.mask, pictures.reference, pictures, seed
-        self._pixels = np.flatnonzero(self.mask)
+        self.tiles = pictures.tiles(TILE, pictures.mask.size)
         self.width = pictures.paths.table.upper - pictures.paths.table.lower
-        self._samples = int(np.clip(HALF_PATHS // max(len(self._pixels), 1), *HALF_SAMPLES))
-        row, column = np.divmod(self._pixels, self.mask.shape[1])
-        tile = row // TILE * -(-self.mask.shape[1] // TILE) + column // TILE
-        self._order = np.argsort(tile, kind="stable")
-        self._first = np.flatnonzero(np.diff(tile[self._order], prepend=-1))
-        self._count = np.diff(np.append(self._first, len(tile))).astype(np.float32)
+        self._pictures, self._seed = pictures, seed
+        self._samples = int(np.clip(HALF_PATHS // max(len(self.tiles.pixels), 1), *HALF_SAMPLES))
 
     def are_worth_it(self, start: Vector, reference: Image, view: View) -> bool:
         """Whether the picture at `start` differs from the reference by more than noise explains and an eye sees.
@@ -51,13 +47,13 @@ class LinearPictures:
         It is not where the reference is compared at equal counts (its noise is all there is to see) or the target is
         too large, nor after a request to stop.
         """
-        if self._pictures.counts is not None or len(self._pixels) > MOST_PIXELS:
+        if self._pictures.counts is not None or len(self.tiles.pixels) > MOST_PIXELS:
             return False
         halves = self._traced(start, 0)
         if halves is None:
             return False
         first, second = (self.whole(half[..., 0]) for half in halves)
-        gap = model_gap(reference, (first, second), self.mask, view)
+        gap = model_gap(reference, (first, second), self._pictures.mask, view)
         return gap is not None and gap.relative >= WORTH
 
     def around(self, x: Vector, turn: int) -> LinearPicture | None:
@@ -72,20 +68,14 @@ class LinearPictures:
         return np.maximum(table.lower, x - reach), np.minimum(table.upper, x + reach)
 
     def whole(self, rows: NDArray[np.floating]) -> Pixels:
-        """The reference with the values (p, 3) in the pixels of the target."""
-        image = self.reference.copy()
-        image[self.mask] = rows
+        """The reference with the values (p, 3) in the pixels of the tiles."""
+        image = self._pictures.reference.copy()
+        image.reshape(-1, 3)[self.tiles.pixels] = rows
         return image
-
-    def tiles(self, rows: Rows) -> Rows:
-        """Means over tiles (t, ...) of pixels of the target (p, ...)."""
-        means = np.add.reduceat(rows[self._order], self._first, axis=0)
-        return means / self._count.reshape(-1, *[1] * (rows.ndim - 1))
 
     def _traced(self, x: Vector, turn: int) -> tuple[Rows, Rows] | None:
         seed, pictures = (self._seed ^ STREAM) + turn, self._pictures
-        samples = self._samples if turn else min(self._samples, GAP_SAMPLES)
-        table = pictures.tables(self._pixels, x[None], seed, samples, jacobian=turn > 0)
+        table = pictures.tables(self.tiles.pixels, x[None], seed, self._samples, jacobian=turn > 0)
         if pictures.should_stop():
             return None
         first, second = np.split(table[0], 2)
@@ -107,12 +97,12 @@ class LinearPicture:
     def __call__(self, x: Vector) -> tuple[Pixels, Callable[[Pixels], Vector]]:
         """The same, and the pullback of a gradient by it."""
         return self.image(x), lambda gradient: np.einsum(
-            "pc,pck->k", gradient[self._pictures.mask], self._jacobian, dtype=np.float64
+            "pc,pck->k", gradient.reshape(-1, 3)[self._pictures.tiles.pixels], self._jacobian, dtype=np.float64
         )
 
     def of_tiles(self) -> Callable[[Vector], TwoSamples]:
         """A function to the tiles of a picture with their derivatives, and to half the difference of its halves."""
-        first, second = (self._pictures.tiles(half) for half in self._halves)
+        first, second = (self._pictures.tiles.means(half) for half in self._halves)
         parts = 0.5 * (first + second), 0.5 * (first - second)
 
         def at(x: Vector) -> TwoSamples:

@@ -88,13 +88,17 @@ class TileRows:
     def _count(self) -> NDArray[np.int64]:
         return np.diff(np.append(self.first, len(self.pixels)))
 
+    def means(self, table: Rows) -> Rows:
+        """Means over the tiles (t, 3, ...) of pixels (p, 3, ...)."""
+        sums = np.add.reduceat(table.reshape(len(self.pixels), -1), self.first, axis=0)
+        return (sums / self._count[:, None].astype(np.float32)).reshape(len(self), *table.shape[1:])
+
     def rows(self, table: Rows, seen: Rows | None = None) -> Rows:
         """Weighted residual and derivatives (3 t, 1 + k) of pixels (p, 3, 1 + k).
 
         `seen` (t, 3), a better estimate of the picture, decides whether a clipped tile is bright enough.
         """
-        sums = np.add.reduceat(table.reshape(len(self.pixels), -1), self.first, axis=0)
-        tiles = (sums / self._count[:, None].astype(np.float32)).reshape(len(self), 3, -1)
+        tiles = self.means(table)
         if self.clipped.any():
             bright = (tiles[..., 0] if seen is None else seen) >= self.reference
             tiles = tiles * ~(self.clipped & bright)[..., None]

@@ -62,7 +62,7 @@ def _lower_squares(
     kept: NDArray[np.bool_],
     course: Course,
 ) -> list[Vector]:
-    residual = make(pictures.tiles(pictures.reference[pictures.mask]))
+    residual = make(pictures.tiles.reference)
     with course.stage(name) as stage:
         equations = course.watch(stage, unbiased_equations(picture.of_tiles(), residual, start))
         limits = SolveLimits(evaluations=EVALUATIONS, cost_change=COST_CHANGE)

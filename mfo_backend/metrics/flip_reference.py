@@ -24,7 +24,7 @@ Array = NDArray[np.floating]
 _Box = tuple[slice, slice]
 
 # Smaller ones have more margin and, on two processors, more turns at Python's lock: 128 x 128 takes 1.2 times as long
-# on one and 1.35 times on two (256 x 256, HDR-FLIP); 256 x 256 leaves one of them idle.
+# on one and 1.3 times on two (256 x 256, HDR-FLIP); 256 x 256 leaves one of them idle.
 TILE_HEIGHT, TILE_WIDTH = 128, 256
 
 
@@ -83,9 +83,10 @@ class FlipReference:
         return FlipDifference(self._perceived[tile], self._features(test))
 
     def _light_of(self, planes: Array, tile: Tile) -> Array:
-        return np.ascontiguousarray(self._shown(planes[:, tile.outer[0], tile.outer[1]]))
+        return self._shown(planes[:, tile.outer[0], tile.outer[1]])
 
     def _features(self, light: Array) -> FlipFeatures:
+        light = np.ascontiguousarray(light)
         return FlipFeatures(light, flip_filters(*light.shape[1:], self._pixels_per_degree, light.dtype))
 
 

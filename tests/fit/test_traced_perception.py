@@ -14,6 +14,7 @@ from mfo_backend.fit.finishing import finishing_residuals
 from mfo_backend.fit.linear_pictures import LinearPictures
 from mfo_backend.fit.picture_judge import PictureJudge
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.fit.tile_rows import TileRows
 from mfo_backend.fit.traced_tiles import TracedTiles
 from mfo_backend.metrics.loss import make_loss
 from mfo_backend.metrics.tone_mapping import DisplayView
@@ -50,13 +51,12 @@ class Given:
     """Halves of a picture instead of traced ones."""
 
     def __init__(self, halves, mask):
-        self._halves, self.mask, self.reference, self.counts = (
-            halves,
-            mask,
-            np.zeros((*mask.shape, 3), np.float32),
-            None,
-        )
+        self._halves, self.mask, self.counts = halves, mask, None
+        self.reference = np.zeros((*mask.shape, 3), np.float32)
         self.paths = SimpleNamespace(table=SimpleNamespace(lower=np.zeros(2), upper=np.ones(2)))
+
+    def tiles(self, size, most):
+        return TileRows.of(self.reference, self.mask, size, most=most)
 
     def tables(self, pixels, xs, seed, samples, jacobian):
         return np.concatenate(self._halves)[None]
@@ -71,14 +71,16 @@ def linear_picture(shape=(3, 4)):
     mask[1:, 1:] = True
     halves = [random.normal(size=(mask.sum(), 3, 1 + 2)).astype(np.float32) for _ in range(2)]
     at = np.array([0.4, 0.6])
-    return LinearPictures(Given(halves, mask), 1).around(at, 1), halves, mask, at
+    pictures = LinearPictures(Given(halves, mask), 1)
+    np.testing.assert_array_equal(np.sort(pictures.tiles.pixels), np.flatnonzero(mask))
+    return pictures.around(at, 1), halves, pictures.tiles.pixels, at
 
 
 def test_the_linear_picture_has_the_slope_of_its_pullback():
-    picture, halves, mask, at = linear_picture()
-    gradient = np.random.default_rng(1).normal(size=(*mask.shape, 3)).astype(np.float32)
+    picture, halves, pixels, at = linear_picture()
+    gradient = np.random.default_rng(1).normal(size=(3, 4, 3)).astype(np.float32)
     image, pullback = picture(at)
-    np.testing.assert_allclose(image[mask], np.mean(halves, axis=0)[..., 0], rtol=1e-6)
+    np.testing.assert_allclose(image.reshape(-1, 3)[pixels], np.mean(halves, axis=0)[..., 0], rtol=1e-6)
     step = np.array([0.5, -0.3])
     moved, _ = picture(at + step)
     gained = float(np.sum((moved - image) * gradient, dtype=np.float64))
@@ -87,10 +89,10 @@ def test_the_linear_picture_has_the_slope_of_its_pullback():
 
 
 def test_tiles_are_the_means_of_the_picture_and_of_its_halves():
-    picture, halves, mask, at = linear_picture((9, 11))
+    picture, halves, pixels, at = linear_picture((9, 11))
     x = at + np.array([0.2, 0.1])
     two = picture.of_tiles()(x)
-    rows, columns = np.nonzero(mask)
+    rows, columns = np.divmod(pixels, 11)
     number = rows // linear_pictures.TILE * 3 + columns // linear_pictures.TILE
     shown = [half[..., 0] + half[..., 1:] @ (x - at) for half in halves]
     for found, expected in (
@@ -123,6 +125,20 @@ def test_values_that_are_kept_stay(blend):
     assert [report.name for report in course.reports] == ["itp", "pu21", "flip"]
     for report in course.reports:
         assert report.loss_best < report.loss_start
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_difference_of_four_per_cent_is_found_whatever_the_random_numbers(blend, seed):
+    """With a quarter of the paths it was found with every second seed."""
+    renderer, picture = blend
+    from mfo_backend.render.traced_paths import TracedPaths
+
+    # where squares end
+    near = {"base_color": (0.583, 0.607, 0.571), "roughness": 0.438, "ior": 1.5, "transmission_weight": 0.569}
+    mask, reference = renderer.target_mask(), Image(picture(5, 32), Encoding.LINEAR)
+    tiles = TracedTiles(TracedPaths(renderer), reference.pixels, mask, None, lambda: False)
+    view = DisplayView.for_scene(reference.pixels, mask)
+    assert LinearPictures(tiles, seed).are_worth_it(renderer.table.pack(near), reference, view)
 
 
 def test_nothing_is_done_where_noise_is_all_that_is_left(blend):
