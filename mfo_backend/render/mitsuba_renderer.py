@@ -35,6 +35,8 @@ class MitsubaRenderer:
     ) -> None:
         import mitsuba as mi
 
+        from .direct_light import picture_integrator
+
         self.model = model
         self.light_paths = light_paths
         self.table = material.table
@@ -43,6 +45,7 @@ class MitsubaRenderer:
         self._shape_id = material.target.shape_id
         self._scene = scene
         self._integrator = scene.integrator()
+        self._of_pictures = picture_integrator(scene)
         self._sensor = scene.sensors()[0]
         self._params = mi.traverse(scene)
         self._keys = _keys_of(list(self._params.keys()), material)
@@ -65,14 +68,14 @@ class MitsubaRenderer:
         parts = list(parts_of(width * height, seed, spp, even=even))
         self._update(vector, differentiable=False)
         self.passes += 1.0
-        first = start_part(self._integrator, self._scene, self._sensor, parts[0])
+        first = start_part(self._of_pictures, self._scene, self._sensor, parts[0])
 
         def wait() -> Pixels:
             total = parts[0].share * first()
             if len(parts) > 1:
                 self._update(vector, differentiable=False)  # other values may have been shown since
             for part in parts[1:]:
-                total += part.share * start_part(self._integrator, self._scene, self._sensor, part)()
+                total += part.share * start_part(self._of_pictures, self._scene, self._sensor, part)()
             pixels = total.astype(np.float32)
             pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
             return pixels

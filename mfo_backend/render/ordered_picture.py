@@ -60,10 +60,11 @@ def _even_sampler(sensor: mi.Sensor, part: Part) -> mi.Sampler:
 
 
 def start_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
-    """Start to render a part by an integrator in Python (`prb`, `cycles_path`); returns what waits for it.
+    """Start to render a part by an integrator with Python's `sample` (`prb`, `cycles_path`, `direct_light`).
 
-    That gives scene-linear (height, width, 3). The estimate is that of Mitsuba's film: samples weighted by the filter,
-    over the sum of the weights. Pixels without a sample in reach are 0; values that are not finite stay so.
+    Returns what waits for it and gives scene-linear (height, width, 3). The estimate is that of Mitsuba's film: samples
+    weighted by the filter, over the sum of the weights. Pixels without a sample in reach are 0; values that are not
+    finite stay so.
     """
     with dr.suspend_grad():
         return _start(integrator, scene, sensor, part)
