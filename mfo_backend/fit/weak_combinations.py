@@ -17,6 +17,7 @@ WEAK_DIRECTION = 0.05  # standard deviation along it, in widths of the box, from
 PART = 0.35  # of the largest one: smaller components of a direction are not named
 ALONE = 0.9  # share of one value in a direction that makes it that value's own uncertainty, which has its own column
 MOST = 3
+LEAST_VARIANCE = 1e-8  # of the box; channels of a grey that move as one would have none against each other
 # Lobes that differ in how they change towards the silhouette
 _GRAZING = ("sheen", "coat", "clearcoat", "specular", "spec_tint", "ior", "eta", "flatness")
 
@@ -34,7 +35,7 @@ def weak_combinations(
     if len(names) < 2:
         return ()
     # what is held does not vary: the others' covariance given its value
-    precision = np.linalg.inv(spread)[np.ix_(entries, entries)]
+    precision = np.linalg.inv(spread + LEAST_VARIANCE * np.eye(len(spread)))[np.ix_(entries, entries)]
     variances, directions = np.linalg.eigh(np.linalg.inv(precision))
     owner = [name for name in names for _ in range(table[name].size)]
     width = (table.upper - table.lower)[entries]

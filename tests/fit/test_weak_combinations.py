@@ -49,3 +49,10 @@ def test_says_nothing_of_sure_single_held_and_invisible_values():
     assert combinations(along([0, 0, 0, 1, 0, 0], 0.1)) == ()
     assert combinations(along([0, 0, 0, 1, -1, 0], 0.1), held=("coat_weight",)) == ()
     assert combinations(along([0, 0, 0, 1, -1, 0], 0.9)) == ()  # both not visible
+
+
+def test_channels_that_move_as_one_are_no_trouble():
+    grey = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 1.0])  # whose covariance cannot be inverted
+    spread = 0.01 * np.outer(grey, grey) + np.diag([0.0, 0.0, 0.0, 1e-6, 1e-6, 1e-6])
+    (weak,) = combinations(spread)
+    assert set(weak.parameters) == {"base_color", "metallic"}
