@@ -3,7 +3,8 @@
 
 Sandwich estimate clustered by group (P. Huber 1967; H. White 1980): Cov = H^-1 (sum_g q_g q_g^T) H^-1 with
 q_g = J_g^T r_g. It needs no model of the noise, unlike s^2 H^-1, which is several times too small where neighbouring
-pixels or channels share their noise.
+pixels or channels share their noise. Where a few pixels rule a value, as those of a highlight do, they count with the
+residual that a solution without them would leave (`solve.leverage`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solve.leverage import residuals_left_out
 from ..types.certainty import Certainty, Level
 from ..types.parameter import ParameterTable
 from .own_noise import without_own_noise
@@ -40,15 +42,17 @@ def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_er
     width = table.upper - table.lower
     scaled, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
     noise = np.maximum(np.abs(residual), model_error)
-    q = np.einsum("gck,gc->gk", scaled, np.where(residual < 0.0, -noise, noise), optimize=True)
     gram = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)
     if own is not None:
-        scaled = own[:, :, 1:] * width
-        q -= np.einsum("gck,gc->gk", scaled, own[:, :, 0], optimize=True)
-        gram, inflation = without_own_noise(gram, np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)), 1.0
+        half = own[:, :, 1:] * width
+        gram, inflation = without_own_noise(gram, np.einsum("gck,gcl->kl", half, half, optimize=True)), 1.0
     # a prior as wide as the box, in units of the mean noise
     prior = float(np.mean(noise**2)) / PRIOR_SD**2
     inverse = np.linalg.inv(gram + prior * np.eye(k))
+    left_out = residuals_left_out(scaled, np.where(residual < 0.0, -noise, noise)[:, :, None], inverse)[:, :, 0]
+    q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True)
+    if own is not None:
+        q -= np.einsum("gck,gc->gk", own[:, :, 1:] * width, own[:, :, 0], optimize=True)
     found = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
     return inflation**2 * g / max(g - k / 3, 1) * found
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from .bounded_least_squares import NormalEquations
 from .box_quadratic import minimise_in_box
-
-MOST_LEVERAGE = 0.9  # of a group: a residual counts ten times at most
+from .leverage import residuals_left_out
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
@@ -71,14 +70,13 @@ class CrossProducts:
     def jackknife_noise(self, rows_of_group: int, matrix: SafeMatrix) -> Vector:
         """`gradient_noise` where few groups rule the solution; `matrix` is that of the equations.
 
-        Such a group pulls the solution towards itself and so has too small a residual r there; it counts with what a
-        solution without it would leave, (1 - h)^-1 r with h its leverage (HC3, J. MacKinnon and H. White 1985; for
-        groups R. Bell and D. McCaffrey 2002).
+        Each of them counts with the residual that a solution without it would leave (`leverage`).
         """
         rows = self._groups(rows_of_group)
         derivatives, residual = rows[:, :, 1:], rows[:, :, :1]
-        kept = np.eye(rows_of_group) - self._leverage(derivatives, matrix)
-        return self._scatter(derivatives, np.linalg.solve(kept, residual))
+        inverse = matrix.inverse / len(self.total)
+        inverse[matrix.blind] = inverse[:, matrix.blind] = 0.0
+        return self._scatter(derivatives, residuals_left_out(derivatives, residual, inverse))
 
     def _groups(self, rows_of_group: int) -> Vector:
         return self.mean.reshape(-1, rows_of_group, self.total.shape[1])
@@ -89,14 +87,6 @@ class CrossProducts:
         groups = groups - groups.mean(axis=0)
         count = len(groups)
         return groups.T @ groups * (count / max(count - 1, 1)) / len(self.total) ** 2
-
-    def _leverage(self, derivatives: Vector, matrix: SafeMatrix) -> Vector:
-        """How much of each group's own residual (g, n, n) the solution takes up, from its derivatives (g, n, k)."""
-        inverse = matrix.inverse / len(self.total)
-        inverse[matrix.blind] = inverse[:, matrix.blind] = 0.0
-        leverage = derivatives @ inverse @ derivatives.transpose(0, 2, 1)
-        of_group = np.trace(leverage, axis1=1, axis2=2)[:, None, None]
-        return leverage * np.minimum(MOST_LEVERAGE / np.maximum(of_group, 1e-300), 1.0)
 
     def own_share(self) -> Vector:
         """Which part (k,) of the variances in `gradient_noise` is the samples' own, so that more of them take it away.
