@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,10 @@ from .scene_text import on_sphere, point_light, probe_light, scene_text
 
 REDUCED = ("base_color", "roughness", "metallic", "specular")
 OPAQUE = (*REDUCED, "anisotropic", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss")
+BLENDER = (
+    "base_color", "metallic", "roughness", "specular_ior_level", "anisotropic", "coat_weight", "coat_roughness",
+    "sheen_weight", "sheen_roughness",
+)  # fmt: skip
 GLASS = ("base_color", "roughness", "ior", "transmission_weight")
 _NEAR, _FAR = 3.6, 26.0  # of the camera: the object fills nine tenths of the frame, or 8 of 64 pixels
 _EDGE = 1e-3
@@ -31,9 +35,10 @@ class HardCase:
     Attributes
     ----------
     light
-        ``"point"``, ``"probe"`` (with small bright lamps) or ``"soft"`` (an environment of low frequency).
+        ``"point"``, ``"grazing"`` (a point light behind the object: sheen shows nowhere else), ``"probe"`` (with small
+        bright lamps) or ``"soft"`` (an environment of low frequency).
     model
-        Material model of truth and fit: Blender's for glass, which the presets fit in that model only.
+        Material model of truth and fit.
     truth
         Values that are not drawn at random.
     fitted
@@ -69,12 +74,12 @@ class HardCase:
     @property
     def noisy(self) -> bool:
         """Whether the reference's own noise is what limits the result."""
-        return self.light != "point" or self.is_glass
+        return self.light not in ("point", "grazing") or self.is_glass
 
     @property
     def is_glass(self) -> bool:
         """Whether light passes through the material."""
-        return self.model == "blender_principled"
+        return "transmission_weight" in self.fitted
 
 
 def _glass(roughness: float) -> HardCase:
@@ -82,17 +87,27 @@ def _glass(roughness: float) -> HardCase:
     return HardCase(f"glass-{roughness:g}", "probe", "blender_principled", truth, GLASS, spp=32, limit=0.02)
 
 
+def _materials() -> Iterator[HardCase]:
+    """Materials under one lamp, in Mitsuba's model and in Blender's."""
+    coat, blender_coat = {"clearcoat": 0.9, "clearcoat_gloss": 0.9}, {"coat_weight": 0.9, "coat_roughness": 0.1}
+    for name, light, truth, own, blender in (
+        ("mirror-like", "point", {"roughness": 0.05}, {}, {}),
+        ("black", "point", {"base_color": (_EDGE,) * 3}, {}, {}),
+        ("white", "point", {"base_color": (1.0 - _EDGE,) * 3}, {}, {}),
+        ("metallic-0", "point", {"metallic": 0.0}, {}, {}),
+        ("metallic-1", "point", {"metallic": 1.0}, {}, {}),
+        ("coat-on-metal", "point", {"metallic": 1.0}, coat, blender_coat),
+        ("sheen", "grazing", {"metallic": 0.05}, {"sheen": 0.9}, {"sheen_weight": 0.9}),
+        ("anisotropy", "point", {"anisotropic": 0.9}, {}, {}),
+    ):
+        yield HardCase(name, light, truth=truth | own)
+        yield HardCase(f"blender-{name}", light, "blender_principled", truth | blender, BLENDER)
+
+
 HARD_CASES = {
     case.name: case
     for case in (
-        HardCase("mirror-like", truth={"roughness": 0.05}),
-        HardCase("black", truth={"base_color": (_EDGE,) * 3}),
-        HardCase("white", truth={"base_color": (1.0 - _EDGE,) * 3}),
-        HardCase("metallic-0", truth={"metallic": 0.0}),
-        HardCase("metallic-1", truth={"metallic": 1.0}),
-        HardCase("coat-on-metal", truth={"metallic": 1.0, "clearcoat": 0.9, "clearcoat_gloss": 0.9}),
-        HardCase("sheen", truth={"sheen": 0.9, "metallic": 0.05}),
-        HardCase("anisotropy", truth={"anisotropic": 0.9}),
+        *_materials(),
         _glass(0.0),
         _glass(0.1),
         _glass(0.6),
@@ -164,6 +179,8 @@ def _material(model: str, rng: np.random.Generator, names: tuple[str, ...]) -> d
 def _light(case: HardCase, azimuth: float, rng: np.random.Generator, folder: Path) -> str:
     if case.light == "point":
         return point_light(azimuth + rng.uniform(-50.0, 50.0), rng.uniform(10.0, 60.0))
+    if case.light == "grazing":
+        return point_light(azimuth + rng.choice((-1.0, 1.0)) * rng.uniform(120.0, 150.0), rng.uniform(10.0, 40.0))
     probe = generated_probe(int(rng.integers(2**31)))
     if case.light == "soft":
         up = np.linspace(1.0, -1.0, len(probe))[:, None, None]

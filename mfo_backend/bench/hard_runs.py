@@ -113,8 +113,8 @@ def hard_table(runs: Sequence[HardRun]) -> str:
     """A line of Markdown for each case."""
     lines = [
         "| case | runs | solved | worst error | median passes | not finite | silent failures | "
-        "guards that fired (runs) |",
-        "| --- | --: | --: | --: | --: | --: | --: | --- |",
+        "wrongly determined (runs) | guards that fired (runs) |",
+        "| --- | --: | --: | --: | --: | --: | --: | --: | --- |",
     ]
     for name in dict.fromkeys(run.case for run in runs):
         rows = [run for run in runs if run.case == name]
@@ -126,7 +126,8 @@ def hard_table(runs: Sequence[HardRun]) -> str:
         lines.append(
             f"| {name} | {len(rows)} | {100 * np.mean([r.solved for r in rows]):.0f} % | "
             f"{max(r.error for r in rows):.3g} | {np.median([r.passes for r in rows]):.0f} | "
-            f"{sum(not r.finite for r in rows)} | {sum(r.silent for r in rows)} | {guards or '-'} |"
+            f"{sum(not r.finite for r in rows)} | {sum(r.silent for r in rows)} | {sum(bool(r.wrong) for r in rows)} | "
+            f"{guards or '-'} |"
         )
     return "\n".join(lines)
 

@@ -36,7 +36,7 @@ def hard_section(folder: Path) -> Table | None:
     except (ValueError, KeyError, TypeError) as error:
         raise BadInputError(f"{path} holds a line that is no hard case: remove it ({error!r}).") from None
     heads = ("case", "runs", "solved", "worst error", "median passes", "not finite", "silent failures",
-             "guards that spoke (runs)")  # fmt: skip
+             "wrongly determined (runs)", "guards that spoke (runs)")  # fmt: skip
     return Table(heads, table) if table else None
 
 
@@ -55,16 +55,17 @@ def _cells(case: str, rows: list[dict[str, Any]]) -> tuple[str, ...]:
         number(max(float(row["error"]) for row in rows)),
         number(quantile([float(row["passes"]) for row in rows], 0.5)),
         str(sum(not row["finite"] for row in rows)),
-        _silent(rows),
+        _wrong(rows, failed=True),
+        _wrong(rows, failed=False),
         guards or "–",
     )
 
 
-def _silent(rows: list[dict[str, Any]]) -> str:
-    """Failures that name wrong values as determined; unknown of rows without that key, which are older."""
+def _wrong(rows: list[dict[str, Any]], *, failed: bool) -> str:
+    """Runs, or failures alone, that call wrong values determined; unknown of rows without that key, which are older."""
     if not all("wrong" in row for row in rows):
         return "–"
-    return str(sum(bool(row["wrong"]) and not row["solved"] for row in rows))
+    return str(sum(bool(row["wrong"]) and not (failed and row["solved"]) for row in rows))
 
 
 def _short(guard: str) -> str:

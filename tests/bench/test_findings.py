@@ -153,8 +153,8 @@ def test_hard_cases_are_counted_with_their_guards(tmp_path):
     table = hard_section(tmp_path)
     assert table is not None
     assert table.rows == [
-        ("mirror", "2", "1 (50%)", "0.5", "20", "0", "1", "Fireflies are left out (1); Kept values (1)"),
-        ("tiny", "1", "1 (100%)", "0", "5", "1", "–", "–"),
+        ("mirror", "2", "1 (50%)", "0.5", "20", "0", "1", "2", "Fireflies are left out (1); Kept values (1)"),
+        ("tiny", "1", "1 (100%)", "0", "5", "1", "–", "–", "–"),
     ]
     (tmp_path / "hard.jsonl").write_text('{"case": "tiny"}\n')
     with pytest.raises(BadInputError, match="no hard case"):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,8 @@ from mfo_backend.types.certainty import Certainty, Level
 
 
 def test_every_hard_case_is_there():
-    assert len(HARD_CASES) == 20  # seventeen, of which metallic counts twice and glass three times
+    # seventeen, of which metallic counts twice, glass three times, and eight materials in two models
+    assert len(HARD_CASES) == 28
     assert all(case.limit > 0.0 for case in HARD_CASES.values())
 
 
@@ -25,7 +27,17 @@ def test_glass_is_fitted_by_the_stages_of_the_presets(tmp_path):
     assert any("whole light paths were traced" in guard for guard in run.guards)
 
 
-@pytest.mark.parametrize("name", ["mirror-like", "soft-light", "fireflies", "tiny", "glass-0.6"])
+@pytest.mark.parametrize("name", ["sheen", "blender-sheen"])
+def test_sheen_is_lit_from_behind(name, tmp_path):
+    for seed in range(4):
+        text = write_hard_scene(HARD_CASES[name], seed, 16, tmp_path).file.read_text()
+        camera = np.array(re.search(r'origin="([^"]*)"', text)[1].split(","), float)
+        lamp = np.array(re.search(r'position" x="([^"]*)" y="([^"]*)" z="([^"]*)"', text).groups(), float)
+        angle = np.degrees(np.arccos(camera @ lamp / np.linalg.norm(camera) / np.linalg.norm(lamp)))
+        assert 90.0 < angle < 165.0  # Mitsuba's sheen goes with (1 - cos(angle / 2))^5
+
+
+@pytest.mark.parametrize("name", ["mirror-like", "blender-black", "soft-light", "fireflies", "tiny", "glass-0.6"])
 def test_scenes_follow_from_name_and_seed(name, tmp_path):
     first, again, other = (
         write_hard_scene(HARD_CASES[name], n, 16, tmp_path / f"{k}") for k, n in enumerate([3, 3, 4])
@@ -40,7 +52,9 @@ def test_scenes_follow_from_name_and_seed(name, tmp_path):
         assert first.truth[key] == value
 
 
-@pytest.mark.parametrize("name", ["metallic-0", "clipped", "exposure", "other-object", "fireflies", "all-locked"])
+@pytest.mark.parametrize(
+    "name", ["metallic-0", "blender-black", "clipped", "exposure", "other-object", "fireflies", "all-locked"]
+)
 def test_small_hard_cases(name, tmp_path):
     run = run_hard_case(HARD_CASES[name], 0, 24, tmp_path, preset="fast")
     assert run.finite
@@ -59,7 +73,7 @@ def test_the_table_counts_failures_and_names_guards():
         HardRun("black", 2, False, 0.2, 0.5, True, 70.0, (), ("roughness",)),
     ]
     line = hard_table(runs).splitlines()[-1]
-    assert line == "| black | 3 | 33 % | inf | 60 | 1 | 1 | The light was recorded times (1) |"
+    assert line == "| black | 3 | 33 % | inf | 60 | 1 | 1 | 2 | The light was recorded times (1) |"
 
 
 def test_a_determined_value_is_wrong_beyond_three_deviations_and_what_determined_promises():
