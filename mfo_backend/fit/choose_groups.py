@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,10 +14,12 @@ from ..types.image import Pixels
 
 # A pixel with background in it depends on the exact positions of its samples, which the reference does not share
 MINIMUM_INTERIOR_SHARE = 0.3
+MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target lights the silhouette and little else
 
 
 def all_groups(paths: RecordedPaths, side: int) -> LaneGroups:
-    """All pixels or tiles of this `side` without background; those on the silhouette too where the target is small."""
+    """All pixels or tiles of this `side` without background; those on the silhouette too where the target is small or
+    hardly lit elsewhere."""
     interior = paths.interior
 
     def make(keep: NDArray[np.bool_] | None = None) -> LaneGroups:
@@ -25,6 +29,7 @@ def all_groups(paths: RecordedPaths, side: int) -> LaneGroups:
         return make()
     groups = make(interior)
     enough = len(groups.pixels) >= MINIMUM_INTERIOR_SHARE * len(paths.pixel)
+    enough = enough and groups.lanes > MINIMUM_LIT_SHARE * paths.lanes
     return groups if enough else make()
 
 
@@ -44,6 +49,9 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
 # the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
 GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
+FINER = 2  # rays along each axis at the solution, relative to those a start is found with
+FINEST = 60
+MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
 FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
 
 
@@ -67,3 +75,23 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
     if mask.sum() <= FEW_PIXELS:
         grid[mask] = GRID_EDGE
     return grid
+
+
+def solution_grid(
+    reference: Pixels, mask: NDArray[np.bool_], picture: Callable[[], Pixels]
+) -> NDArray[np.int64] | None:
+    """Camera rays along each axis of a recording at the solution, whose `picture` is asked for its detail; None where
+    that would be too many."""
+    grid = detail_grid(reference, mask)
+    if _rays(_finer(grid), mask) > MOST_FINE_RAYS:
+        return None
+    grid = _finer(np.maximum(grid, detail_grid(picture(), mask)))
+    return None if _rays(grid, mask) > MOST_FINE_RAYS else grid
+
+
+def _finer(grid: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.maximum(np.minimum(FINER * grid, FINEST), grid)
+
+
+def _rays(grid: NDArray[np.int64], mask: NDArray[np.bool_]) -> int:
+    return int(np.square(grid)[mask].sum())

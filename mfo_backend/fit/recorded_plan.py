@@ -46,6 +46,8 @@ class RecordedPlan:
     seen_rms, solved_rms
         Root mean squares of the log residual: below the first nothing can be seen, and other starts get their trial
         only, because a wrong basin may come as near; below the second, about a recording's own, none is tried.
+    other_evaluations
+        Of a solve that tries to leave a basin where every light is exact.
     basins, basin_factor
         Solutions the preset `best` keeps alive to the end, and how much more than the best one they may cost.
     """
@@ -73,6 +75,7 @@ class RecordedPlan:
     keep_factor: float = 10.0
     seen_rms: float = 5e-3
     solved_rms: float = 2e-3
+    other_evaluations: int = 25
     basins: int = 3
     basin_factor: float = 1.5
 

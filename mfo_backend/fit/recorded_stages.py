@@ -17,12 +17,13 @@ from ..render.recorded_scene import MOST_LANES, RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..types.errors import UnrecordableError
 from ..types.image import Pixels
-from .choose_groups import all_groups, detail_grid, fewer_groups
+from .choose_groups import all_groups, detail_grid, fewer_groups, solution_grid
 from .course import Course, Stage
 from .finer_grid import finer_grid
 from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
 from .global_start import agreeing_ends, best_starts, random_start, scan
+from .other_basins import best_basin, metal_rivals
 from .picture_judge import PictureJudge
 from .problem import Problem, Refined
 from .race import CLEARLY_LOWER, race
@@ -41,9 +42,6 @@ MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 LEAST_NOISE = 0.002
 SPARE = 1.5  # times the lanes a start is found on are recorded for it: its tiles are chosen by what they show
 MOST_RECORDINGS = 3  # at the solution, until it holds still
-FINER = 2  # rays along each axis at the solution, relative to those a start is found with
-FINEST = 60
-MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
 # After a solve its recording is too old if the tiles changed by this share, or if its own noise grew by this factor.
 # The first is what mends fits that began far away, though most of those keep their samples; the second finds a lobe
 # that became narrow in few tiles.
@@ -236,17 +234,18 @@ class RecordedFit:
         return refined
 
     def _refine_exact(self, stage: Stage, start: Vector, make: MakeResidual) -> Refined:
-        grid = detail_grid(self.reference, self.mask)
-        if self._is_few(_finer(grid)):
-            grid = _finer(np.maximum(grid, detail_grid(self.picture(start), self.mask)))
-            if self._is_few(grid):
-                self._record(start, grid)
+        grid = solution_grid(self.reference, self.mask, lambda: self.picture(start))
+        if grid is not None:
+            self._record(start, grid)
         groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
         problem = self.problem(groups, make)
-        return Refined(self._solve(problem, start, 15, stage=stage).x, problem, problem)
 
-    def _is_few(self, grid: NDArray[np.int64]) -> bool:
-        return bool(np.square(grid)[self.mask].sum() <= MOST_FINE_RAYS)
+        def solve_below(x: Vector, wanted: float) -> Solution:
+            return self._solve(problem, x, self.plan.other_evaluations, stage=stage, wanted=wanted)
+
+        found = best_basin(solve_below, self._solve(problem, start, 15, stage=stage), self.table)
+        found, rivals = metal_rivals(problem, solve_below, found, self.table)
+        return Refined(found.x, problem, problem, rivals=rivals)
 
     def _refine_sampled(
         self,
@@ -393,8 +392,3 @@ class RecordedFit:
             ends = [minimise_flip(judge, picture, x, *self.box, on_value=told, should_stop=stop) for x in starts]
             stage.vector = min(ends, key=lambda end: end[1])[0]
         return [x for x, _ in ends]
-
-
-def _finer(grid: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The grids of a recording at the solution where lights are exact, from those for its pictures' detail."""
-    return np.maximum(np.minimum(FINER * grid, FINEST), grid)

@@ -61,7 +61,7 @@ class OtherEnds:
     def _exchanged(self, found: SimplestEnd) -> SimplestEnd:
         """With the highlights of base and coat exchanged, where that is better, or as good and nearer to the user's."""
         x, table = found.end.x, self._table
-        if not _exchangeable(table) or COAT[0] in found.off or is_off(COAT[0], x, table):
+        if not exchangeable(table) or COAT[0] in found.off or is_off(COAT[0], x, table):
             return found
         box = box_holding(table, self._user, found.off)
         end = self._attempt(found.end, np.clip(exchanged(x, table), *box), box)
@@ -102,7 +102,7 @@ class OtherEnds:
 
     def _without_coat(self, x: Vector, lobes: list[str]) -> Iterator[Vector]:
         yield x
-        if COAT[0] in lobes and _exchangeable(self._table):
+        if COAT[0] in lobes and exchangeable(self._table):
             yield coat_to_base(x, self._table)
 
     def _attempt(self, found: Solution, start: Vector, box: Box) -> Solution | None:
@@ -143,5 +143,6 @@ def _with(x: Vector, table: ParameterTable, *values: float) -> Vector:
     return np.clip(y, table.lower, table.upper)
 
 
-def _exchangeable(table: ParameterTable) -> bool:
+def exchangeable(table: ParameterTable) -> bool:
+    """Whether both highlights are free, so that either may be the other's."""
     return all(name in table.names for name in (*BASE, *COAT))

@@ -40,8 +40,11 @@ class Comparison:
         return NormalDist().cdf(-self.more / max(self.deviation, 1e-12))
 
 
-def compare(problem: Problem, first: Vector, other: Vector) -> Comparison:
-    """Compare two vectors on the tiles of a problem; its residuals of noise at `first` count as one each."""
+def compare(problem: Problem, first: Vector, other: Vector, model_error: float = 0.0) -> Comparison:
+    """Compare two vectors on the tiles of a problem; its residuals of noise at `first` count as one each.
+
+    `model_error` is the least root mean square error of a residual, for problems without noise.
+    """
     (rows, own), (other_rows, other_own) = (
         rows_of_samples(problem.evaluate.samples(x), problem.residual) for x in (first, other)
     )
@@ -51,7 +54,10 @@ def compare(problem: Problem, first: Vector, other: Vector) -> Comparison:
         squares -= other_own[:, :, 0] ** 2 - own[:, :, 0] ** 2
         away -= (other_own[:, :, 0] - own[:, :, 0]) ** 2
     cost, more = problem.equations(first).cost, problem.equations(other).cost
-    unit = cost / problem.independent
+    unit = max(cost, 1e-30) / problem.independent
     tiles = squares.mean(1) / (2.0 * len(squares) * unit)
-    deviation = float(np.sqrt(np.sum((tiles - tiles.mean()) ** 2)))
-    return Comparison((more - cost) / unit, deviation, max(float(away.mean() / (2.0 * unit)), 0.0))
+    distance = max(float(away.mean() / (2.0 * unit)), 0.0)
+    # errors of the picture as large as the model's let the difference of the squares of two others vary by so much
+    least = 4.0 * distance * model_error**2 / (2.0 * max(cost, 1e-30))
+    deviation = float(np.sqrt(max(np.sum((tiles - tiles.mean()) ** 2), least)))
+    return Comparison((more - cost) / unit, deviation, distance)

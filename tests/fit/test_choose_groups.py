@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mfo_backend.fit.choose_groups import GRID_DETAIL, GRID_EDGE, GRID_PLAIN, detail_grid
+from mfo_backend.fit.choose_groups import FINEST, GRID_DETAIL, GRID_EDGE, GRID_PLAIN, detail_grid, solution_grid
 
 
 def test_rays_go_where_the_picture_changes_within_a_pixel():
@@ -31,3 +31,18 @@ def test_a_target_within_a_pixel_is_not_missed():
 
 def test_a_black_picture_has_no_detail():
     assert (detail_grid(np.zeros((6, 6, 3), np.float32), np.ones((6, 6), bool)) == GRID_PLAIN).all()
+
+
+def test_the_solution_is_recorded_more_finely_where_it_has_detail_unless_that_is_too_much():
+    flat, spot = np.full((20, 20, 3), 0.5, np.float32), np.full((20, 20, 3), 0.5, np.float32)
+    spot[10, 10] = 5.0
+    mask = np.ones((20, 20), bool)
+    grid = solution_grid(flat, mask, lambda: spot)
+    assert grid[10, 10] == min(2 * GRID_EDGE, FINEST)
+    assert grid[2, 2] == 2 * GRID_PLAIN
+    wide = np.ones((400, 400), bool)  # 640 000 rays
+
+    def never():
+        raise AssertionError("not asked for")
+
+    assert solution_grid(np.full((400, 400, 3), 0.5, np.float32), wide, never) is None

@@ -73,6 +73,19 @@ def test_sky_and_four_samples_a_pixel_reach_the_noise(tmp_path):
     np.testing.assert_allclose(found[:4], x[:4], atol=0.05)
 
 
+@pytest.mark.parametrize("lamp", ['x="2" y="6" z="1"', 'x="0" y="5" z="1.6"'])
+def test_a_lamp_behind_the_target_lights_its_silhouette(tmp_path, lamp):
+    behind = POINT.replace('x="2" y="-3" z="3"', lamp)
+    renderer = load(tmp_path, behind, size=32)
+    reference = renderer.image(renderer.table.pack(TRUTHS[0]), seed=5, spp=2048)
+    lit = renderer.target_mask() & (reference.max(axis=2) > 0.0)
+    assert 0 < lit.sum() < 0.05 * renderer.target_mask().sum()
+    outcome, _ = fit(renderer, reference)
+    assert outcome.result.status is Status.CONVERGED
+    assert np.isfinite(renderer.table.pack(outcome.result.recovered)).all()
+    assert outcome.result.errors["mse"][1] <= outcome.result.errors["mse"][0]
+
+
 def unreachable(reference, mask):
     """A picture whose light is brighter than the scene's, with a response that no material has."""
     return np.where(mask[..., None], 1.3 * reference * (1.0 + 0.3 * reference / (1.0 + reference)), reference)

@@ -89,3 +89,12 @@ def test_a_material_compared_with_itself():
     it = compare(picture(rng, np.zeros(TILES), {"a": np.zeros(TILES)}), "a", "a")
     assert (it.more, it.deviation, it.distance, it.better) == (0.0, 0.0, 0.0, 0.5)
     assert it.inflation == 1.0
+
+
+def test_materials_nearer_than_the_model_s_own_error_are_not_told_apart():
+    rng = np.random.default_rng(2)
+    zero = np.zeros(TILES)
+    problem = picture(rng, zero, {"a": zero, "b": rng.normal(size=TILES)})
+    assert compare(problem, "a", "b").better < 1e-4
+    # a systematic error of a hundred times the noise may be what sets them apart
+    assert 0.1 < compare(problem, "a", "b", model_error=100.0).better < 0.5
