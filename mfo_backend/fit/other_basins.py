@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..solve.bounded_least_squares import Solution
 from ..types.parameter import ParameterTable
+from .global_start import OPPOSITE
 from .problem import Problem, Rival
 from .race import CLEARLY_LOWER
 from .simplest_end import APART, HOPELESS, exchangeable, exchanged
@@ -31,7 +32,6 @@ HALF = 0.5
 SHEENS = (0.1, 0.5)  # roughnesses of a sheen to begin with
 F0_OF_LEVEL = 0.08  # of a specular level of 1 (Burley 2012; Blender's at an index of 1.5)
 DARK_ALBEDO, DARK_F0 = 0.05, 0.1  # black plastic and grey metal look alike below
-DIELECTRIC, METAL = 0.02, 0.98
 
 
 def best_basin(solve: SolveBelow, found: Solution, table: ParameterTable) -> Solution:
@@ -98,9 +98,10 @@ def metal_exchanged(x: Vector, table: ParameterTable) -> Vector | None:
     f0 = (1.0 - metallic) * F0_OF_LEVEL * _value(x, table, level) + metallic * color
     if np.max((1.0 - metallic) * color) > DARK_ALBEDO or np.max(f0) > DARK_F0:
         return None
+    dielectric, metal = OPPOSITE
     if metallic < HALF:
-        return _with(x, table, metallic=METAL, base_color=f0)
-    return _with(x, table, metallic=DIELECTRIC, base_color=0.0, **{level: float(f0.mean()) / F0_OF_LEVEL})
+        return _with(x, table, metallic=metal, base_color=f0)
+    return _with(x, table, metallic=dielectric, base_color=0.0, **{level: float(f0.mean()) / F0_OF_LEVEL})
 
 
 def _value(x: Vector, table: ParameterTable, name: str) -> float:

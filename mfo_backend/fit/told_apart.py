@@ -58,6 +58,6 @@ def compare(problem: Problem, first: Vector, other: Vector, model_error: float =
     tiles = squares.mean(1) / (2.0 * len(squares) * unit)
     distance = max(float(away.mean() / (2.0 * unit)), 0.0)
     # errors of the picture as large as the model's let the difference of the squares of two others vary by so much
-    least = 4.0 * distance * model_error**2 / (2.0 * max(cost, 1e-30))
+    least = 4.0 * distance * model_error**2 / (2.0 * unit * problem.independent)
     deviation = float(np.sqrt(max(np.sum((tiles - tiles.mean()) ** 2), least)))
     return Comparison((more - cost) / unit, deviation, distance)

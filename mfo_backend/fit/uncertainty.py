@@ -42,17 +42,16 @@ def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_er
     width = table.upper - table.lower
     scaled, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
     noise = np.maximum(np.abs(residual), model_error)
-    gram = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True)
+    gram, own_products = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True), 0.0
     if own is not None:
         half = own[:, :, 1:] * width
         gram, inflation = without_own_noise(gram, np.einsum("gck,gcl->kl", half, half, optimize=True)), 1.0
+        own_products = np.einsum("gck,gc->gk", half, own[:, :, 0], optimize=True)
     # a prior as wide as the box, in units of the mean noise
     prior = float(np.mean(noise**2)) / PRIOR_SD**2
     inverse = np.linalg.inv(gram + prior * np.eye(k))
     left_out = residuals_left_out(scaled, np.where(residual < 0.0, -noise, noise)[:, :, None], inverse)[:, :, 0]
-    q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True)
-    if own is not None:
-        q -= np.einsum("gck,gc->gk", own[:, :, 1:] * width, own[:, :, 0], optimize=True)
+    q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True) - own_products
     found = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
     return inflation**2 * g / max(g - k / 3, 1) * found
 

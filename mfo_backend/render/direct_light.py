@@ -6,9 +6,6 @@ lamps without extent it meets none. Mitsuba's `direct` without samples of the ma
 the rest: the same bits in half the time. Choose the variant before importing this.
 """
 
-# pyright: reportCallIssue=false, reportArgumentType=false
-# Mitsuba's stubs do not know that flags can be combined.
-
 from __future__ import annotations
 
 from typing import Any
@@ -16,7 +13,7 @@ from typing import Any
 import mitsuba as mi
 from mitsuba.ad.integrators.prb import PRBIntegrator  # pyright: ignore[reportMissingImports]
 
-from .lamps.met_lamps import DELTA
+from .lamps.met_lamps import lights_have_no_extent
 
 
 def picture_integrator(scene: mi.Scene) -> Any:
@@ -24,8 +21,7 @@ def picture_integrator(scene: mi.Scene) -> Any:
     integrator: Any = scene.integrator()
     if not isinstance(integrator, PRBIntegrator) or integrator.max_depth != 2:
         return integrator
-    lamps = all(mi.has_flag(emitter.flags(), DELTA) for emitter in scene.emitters())
-    return DirectLight(integrator) if lamps else integrator
+    return DirectLight(integrator) if lights_have_no_extent(scene) else integrator
 
 
 class DirectLight:

@@ -21,12 +21,13 @@ from ..types.errors import UnrecordableError
 from ..types.parameter import Value
 from .highlight_cells import Highlights
 from .indirect_share import indirect_share
+from .lamps.met_lamps import lights_have_no_extent
 from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
 from .packed_lanes import LaneReader, Lanes
 from .primary_rays import tile_order, widened
 from .proposal import DefensiveProposal
-from .record_paths import DELTA, RecordSettings, record_paths
+from .record_paths import RecordSettings, record_paths
 from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths
@@ -81,7 +82,7 @@ class RecordedScene:
     @property
     def lights_exact(self) -> bool:
         """Whether no light has an extent, so that direct light has no noise but at silhouettes."""
-        return all(mi.has_flag(e.flags(), DELTA) for e in self.renderer.scene.emitters())
+        return lights_have_no_extent(self.renderer.scene)
 
     @cached_property
     def needs(self) -> SceneNeeds:

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 DELTA = mi.EmitterFlags.DeltaPosition | mi.EmitterFlags.DeltaDirection
 
 
+def lights_have_no_extent(scene: mi.Scene) -> bool:
+    """Whether all light is that of points, spots and directions, which no ray can meet."""
+    return all(mi.has_flag(emitter.flags(), DELTA) for emitter in scene.emitters())
+
+
 class SceneLamps:
     """The lamps that a ray can meet, with the probability that `scene.sample_emitter_direction` chooses each."""
 
