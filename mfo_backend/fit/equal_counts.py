@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.image import Pixels
-from .neighbours import next_to, sums_around
+from .neighbours import neighbour_pairs, sums_around
+from .noise_excess import NoiseComparison
 
 Vector = NDArray[np.float64]
 Shape = tuple[int, ...]
@@ -86,32 +87,22 @@ def equal_counts(
     if level <= 0.0:
         return None
     top = np.inf if clipped is None or not clipped[mask].any() else float(seen[clipped[mask] > 0].min())
-    target = compressed(reference[..., None], level, top)[..., 0]
-    shown = target.reshape(-1, 3)[pixels]
+    comparison = NoiseComparison(reference, pixels, mask.shape, level, top)
     halves = np.zeros((2, len(pixels), 3))
-    squares = np.zeros((len(pixels), 3))
     count, before, excess = 0, np.inf, np.inf
     while excess > 0.0 and count < MOST_COUNT:
         more = max(count, 1)
         halves = (count * halves + more * pictures(more, count)) / (count + more)
         count += more
-        first, second = (compressed(half[..., None], level, top)[..., 0] for half in halves)
-        squares = 0.5 * np.square(first - second)
-        own = _roughness(first - second, pixels, mask.shape)
-        others = 0.5 * sum(_roughness(shown - half, pixels, mask.shape) for half in (first, second))
-        before, excess = excess, float(np.log(max(own, 1e-30) / max(others, 1e-30)))
+        before, excess = excess, comparison.excess(halves).logarithm
     if excess > ALIKE or _relative_variance(reference.reshape(-1, 3)[pixels], halves, pixels, mask.shape) < LOUD:
         return None
     if excess < 0.0 < before < np.inf:
         # the excess falls about evenly with the logarithm of the count
         count = max(round(count * 2.0 ** (excess / (before - excess))), 1)
-    return EqualCounts(target, _local_noise(squares, pixels, mask.shape), level, top, count)
-
-
-def _roughness(residual: Vector, pixels: NDArray[np.int64], shape: Shape) -> float:
-    """Mean difference of residuals (p, 3) in pixels next to each other: no square, which few fireflies would rule."""
-    steps = _steps(residual, pixels, shape)
-    return float(np.abs(steps).mean()) if len(steps) else 0.0
+    target, first, second = (compressed(y[..., None], level, top)[..., 0] for y in (reference, *halves))
+    noise = _local_noise(0.5 * np.square(first - second), pixels, mask.shape)
+    return EqualCounts(target, noise, level, top, count)
 
 
 def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArray[np.int64], shape: Shape) -> float:
@@ -123,15 +114,9 @@ def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArra
     inside, shown = _in_picture(model, pixels, shape)
     total, count = (sums_around(picture, REACH) for picture in (shown, inside.astype(np.float64)))
     level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + 0.1 * float(model.mean())
-    steps = _steps((seen - model) / np.maximum(level, 1e-30), pixels, shape)
-    return 0.5 * float(np.mean(np.square(steps))) / 1.5 if len(steps) else 0.0
-
-
-def _steps(residual: Vector, pixels: NDArray[np.int64], shape: Shape) -> Vector:
-    """Differences (n, 3) of residuals (p, 3) between pixels next to each other."""
-    inside, shown = _in_picture(residual, pixels, shape)
-    sides = (next_to(axis) for axis in (0, 1))
-    return np.concatenate([(shown[here] - shown[there])[inside[here] & inside[there]] for here, there in sides])
+    residual = (seen - model) / np.maximum(level, 1e-30)
+    here, there = neighbour_pairs(pixels, shape)
+    return float(np.mean(np.square(residual[here] - residual[there]))) / 3.0 if len(here) else 0.0
 
 
 def _local_noise(variance: Vector, pixels: NDArray[np.int64], shape: Shape) -> Pixels:

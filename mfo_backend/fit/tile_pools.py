@@ -104,6 +104,14 @@ class TilePools:
         noise = self.pools[size].jackknife_noise(CHANNELS, safe)
         return safe.covariance(noise), noise
 
+    def answer(self, change: Vector, equations: NormalEquations, size: int, width: Vector) -> Vector:
+        """How far (k,) the solution of `equations`, those of size `size`, moves where pictures change by (p, 3)."""
+        tiles = self.tiles[size]
+        rows = tiles.weight * tiles.means(change[self.order[size]][..., None].astype(np.float32))[..., 0]
+        gradient = self.pools[size].mean[:, 1:].T @ rows.ravel() / rows.size
+        safe = SafeMatrix(equations, width)
+        return -safe.inverse @ np.where(safe.blind, 0.0, gradient)
+
     def expected_error(self, equations: NormalEquations, noise: Vector, size: int, width: Vector) -> ExpectedError:
         """What `noise` in the gradient of `equations`, those of size `size`, leaves at their solution."""
         single = cross_equations(self.pools[0].gram())

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.image import Pixels
-from .equal_counts import EqualCounts, equal_counts
+from .equal_counts import EqualCounts, TwoPictures, equal_counts
+from .noise_excess import NoiseComparison
+from .recount import Recount, recount
 from .tile_rows import BLOCK, TileRows
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -116,8 +118,23 @@ class TracedTiles:
         self.counts = None
         pixels = self.tiles(BLOCK, most).pixels
 
-        def pictures(samples: int, stream: int) -> NDArray[np.float32]:
-            return self.tables(pixels, x[None], seed + stream, samples, jacobian=False)[0, ..., 0].reshape(2, -1, 3)
-
-        self.counts = equal_counts(self.reference, self.mask, pixels, self.clipped, pictures)
+        self.counts = equal_counts(self.reference, self.mask, pixels, self.clipped, self._linear(x, pixels, seed))
         return self.counts
+
+    def recount(self, x: Vector, pixels: NDArray[np.int64], seed: int) -> Recount | None:
+        """What the noise in these pixels says at the end `x` of a fit; None where pictures are not compared so."""
+        if self.counts is None:
+            return None
+        comparison = NoiseComparison(self.reference, pixels, self.mask.shape, self.counts.level, self.counts.top)
+        return recount(self.counts, comparison, self._linear(x, pixels, seed))
+
+    def _linear(self, x: Vector, pixels: NDArray[np.int64], seed: int) -> TwoPictures:
+        twice = np.concatenate([pixels, pixels])
+
+        def pictures(samples: int, stream: int) -> NDArray[np.float32]:
+            images = self.paths.images(
+                x[None], twice, seed=seed + stream, samples=samples, jacobian=False, should_stop=self.should_stop
+            )
+            return images[0, ..., 0].reshape(2, -1, 3)
+
+        return pictures

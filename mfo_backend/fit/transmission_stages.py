@@ -315,6 +315,12 @@ class TransmissionFit:
             x = x + self._step(equations, x, 1e-3, 0.1, frozen)
             stage.vector = x
         covariance, noise = pools.covariance(equations, size, self._width)
+        again = self.pictures.recount(x, pools.pixels, self._seed(3000 + stream)) if steps is None else None
+        if again is not None and not self.course.should_stop():
+            away = pools.answer(again.slope, equations, size, self._width)
+            x = self.table.clip(x + again.log_ratio * away)
+            covariance = covariance + again.sd**2 * np.outer(away, away)
+            stage.vector = x
         return Polished(x, covariance, frozen, none, equations, noise)
 
     def _moved(self, step: Vector) -> float:

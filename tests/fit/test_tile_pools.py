@@ -111,3 +111,17 @@ def test_faded_samples_count_less():
     pools.add([sample(rng, picture, columns, 0.0, 0.0) for _ in range(2)])
     equations, _, _ = pools.best(WIDTH)
     np.testing.assert_allclose(cautious_step(equations, -WIDTH, WIDTH, WIDTH, 0.0), TRUE, atol=0.02)
+
+
+def test_the_answer_to_a_change_of_the_pictures_is_that_of_least_squares():
+    rng = np.random.default_rng(4)
+    picture, columns = scene(False)
+    pools = filled(False, noise=1e-4, of_columns=1e-4, reference_noise=1e-4)
+    equations, _, _ = pools.best(WIDTH)
+    change = rng.normal(size=picture.shape) + 0.5 * columns[..., 0]
+    for size, tiles in enumerate(pools.tiles):
+        rows = tiles.means(columns[pools.order[size]].astype(np.float32)) * tiles.weight[..., None]
+        aim = tiles.means(change[pools.order[size]][..., None].astype(np.float32))[..., 0] * tiles.weight
+        expected = np.linalg.lstsq(rows.reshape(-1, 2), -aim.ravel(), rcond=None)[0]
+        equations = cross_equations(pools.pools[size].gram())
+        np.testing.assert_allclose(pools.answer(change, equations, size, WIDTH), expected, rtol=2e-3, atol=1e-4)
