@@ -36,6 +36,8 @@ from .weak_combinations import weak_combinations
 STAGES = ("scan", "start", "refine")
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
+# Root mean square residual, relative, below which no eye sees what is left; renderers differ by as much
+NOTHING_LEFT = 0.002
 
 
 def fit_recorded(
@@ -115,10 +117,17 @@ def fit_recorded(
         ends.append(End("refine", kept.x))
         notes += kept.notes
         linear = reference.encoding is Encoding.LINEAR
-        alternatives = finishing and settings.losses is None
-        at_noise = alternatives and linear and fit.misfit(kept.x) < AT_NOISE
+        optional = finishing and settings.losses is None and linear
+        # under lights with extent residuals are in deviations of the noise
+        left = np.inf if scene.needs.sampled else float(np.sqrt(2.0 * refined.all.equations(kept.x).cost))
+        nothing_left = optional and left < NOTHING_LEFT
+        at_noise = optional and not nothing_left and fit.misfit(kept.x) < AT_NOISE
         noise = fit.noise.level if fit.noise else 0.0
-        if at_noise:
+        if nothing_left:
+            notes.append(
+                f"What is left of the picture ({100 * left:.1g} %) nobody sees: perceptual stages were left out."
+            )
+        elif at_noise:
             notes.append(
                 f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
                 "perceptual stages would fit that noise and were left out."

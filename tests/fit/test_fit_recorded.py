@@ -118,6 +118,22 @@ def test_perceptual_stages_do_not_fit_noise(tmp_path):
     assert any("has reached the noise of the picture" in note for note in outcome.result.notes)
 
 
+def test_perceptual_stages_do_not_begin_where_nothing_is_left_to_see(tmp_path, monkeypatch):
+    renderer = load(tmp_path, POINT, size=32)
+    from mfo_backend.fit.recorded_stages import RecordedFit
+
+    reference = renderer.image(renderer.table.pack(TRUTHS[1]), seed=5, spp=1024)
+    asked, misfit = [], RecordedFit.misfit
+    monkeypatch.setattr(RecordedFit, "misfit", lambda self, x: asked.append(x) or misfit(self, x))
+    outcome, events = fit(renderer, reference, preset="best")
+    assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "start", "refine"]
+    assert any("nobody sees" in note for note in outcome.result.notes)
+    assert not asked  # how noisy the picture is does not matter then
+    # a picture that no values give has more to show
+    outcome, _ = fit(renderer, reference * np.linspace(0.8, 1.2, 32, dtype=np.float32)[:, None, None], preset="best")
+    assert not any("nobody sees" in note for note in outcome.result.notes)
+
+
 def test_a_firefly_and_noise_do_not_switch_lobes_on(tmp_path):
     names = [*REDUCED, "sheen", "clearcoat", "anisotropic"]
     renderer = load(tmp_path, SKY + POINT, names, size=48)
