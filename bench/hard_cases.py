@@ -34,7 +34,8 @@ def main() -> None:
     if needs_llvm():
         configure_llvm()
     from mfo_backend.bench.hard_cases import HARD_CASES
-    from mfo_backend.bench.hard_runs import HardRun, hard_table, run_hard_case
+    from mfo_backend.bench.hard_runs import HardRun, run_hard_case
+    from mfo_backend.bench.hard_section import hard_table
 
     rows = arguments.rows.read_text("utf-8").splitlines() if arguments.rows.exists() else []
     runs = [HardRun(**{k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(row).items()}) for row in rows]
@@ -49,7 +50,7 @@ def main() -> None:
             with arguments.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(run)) + os.linesep)
             print(f"{name} {seed}: {'solved' if run.solved else 'NOT solved'}, {run.error:.4g}", file=sys.stderr)
-    print(hard_table(runs))
+    print("\n".join(hard_table([asdict(run) for run in runs]).markdown()))
 
 
 if __name__ == "__main__":

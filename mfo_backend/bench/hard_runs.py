@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,11 +51,6 @@ class HardRun:
     passes: float
     guards: tuple[str, ...]
     wrong: tuple[str, ...] = ()
-
-    @property
-    def silent(self) -> bool:
-        """Whether it failed and said the opposite."""
-        return not self.solved and bool(self.wrong)
 
 
 def run_hard_case(case: HardCase, seed: int, size: int, folder: Path, preset: str = "balanced") -> HardRun:
@@ -109,29 +104,6 @@ def wrongly_determined(result: FitResult, truth: Mapping[str, Value], table: Par
     return tuple(wrong)
 
 
-def hard_table(runs: Sequence[HardRun]) -> str:
-    """A line of Markdown for each case."""
-    lines = [
-        "| case | runs | solved | worst error | median passes | not finite | silent failures | "
-        "wrongly determined (runs) | guards that fired (runs) |",
-        "| --- | --: | --: | --: | --: | --: | --: | --: | --- |",
-    ]
-    for name in dict.fromkeys(run.case for run in runs):
-        rows = [run for run in runs if run.case == name]
-        fired: dict[str, int] = {}
-        for run in rows:
-            for guard in dict.fromkeys(_short(guard) for guard in run.guards):
-                fired[guard] = fired.get(guard, 0) + 1
-        guards = "; ".join(f"{guard} ({count})" for guard, count in sorted(fired.items(), key=lambda g: -g[1])[:3])
-        lines.append(
-            f"| {name} | {len(rows)} | {100 * np.mean([r.solved for r in rows]):.0f} % | "
-            f"{max(r.error for r in rows):.3g} | {np.median([r.passes for r in rows]):.0f} | "
-            f"{sum(not r.finite for r in rows)} | {sum(r.silent for r in rows)} | {sum(bool(r.wrong) for r in rows)} | "
-            f"{guards or '-'} |"
-        )
-    return "\n".join(lines)
-
-
 class ExactPicture:
     """Pictures under lights of no extent, with many rays where the picture of one vector has detail.
 
@@ -183,9 +155,3 @@ def _error(
         for image in (truth, picture)
     )
     return float((misfit or 0.0) - (noise or 0.0))
-
-
-def _short(guard: str) -> str:
-    """What a guard's sentence begins with, without its numbers."""
-    words = guard.split(":")[0].split(".")[0].split()
-    return " ".join(word for word in words[:9] if not any(c.isdigit() for c in word))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,20 +32,21 @@ def hard_section(folder: Path) -> Table | None:
     text = path.read_text("utf-8")
     lines = text[: text.rfind("\n") + 1].splitlines()  # not one a killed process left unfinished
     try:
-        rows = [json.loads(line) for line in lines if line]
-        table = [_cells(case, [row for row in rows if row["case"] == case]) for case in dict.fromkeys(_cases(rows))]
+        table = hard_table([json.loads(line) for line in lines if line])
     except (ValueError, KeyError, TypeError) as error:
         raise BadInputError(f"{path} holds a line that is no hard case: remove it ({error!r}).") from None
+    return table if table.rows else None
+
+
+def hard_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """The same of rows, which have the keys of `HardRun`."""
     heads = ("case", "runs", "solved", "worst error", "median passes", "not finite", "silent failures",
              "wrongly determined (runs)", "guards that spoke (runs)")  # fmt: skip
-    return Table(heads, table) if table else None
+    cases = dict.fromkeys(str(row["case"]) for row in rows)
+    return Table(heads, [_cells(case, [row for row in rows if row["case"] == case]) for case in cases])
 
 
-def _cases(rows: list[dict[str, Any]]) -> list[str]:
-    return [str(row["case"]) for row in rows]
-
-
-def _cells(case: str, rows: list[dict[str, Any]]) -> tuple[str, ...]:
+def _cells(case: str, rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     good = sum(bool(row["solved"]) for row in rows)
     spoken = Counter(guard for row in rows for guard in dict.fromkeys(_short(guard) for guard in row["guards"]))
     guards = "; ".join(f"{guard} ({count})" for guard, count in spoken.most_common(_GUARDS))
@@ -61,7 +63,7 @@ def _cells(case: str, rows: list[dict[str, Any]]) -> tuple[str, ...]:
     )
 
 
-def _wrong(rows: list[dict[str, Any]], *, failed: bool) -> str:
+def _wrong(rows: Sequence[Mapping[str, Any]], *, failed: bool) -> str:
     """Runs, or failures alone, that call wrong values determined; unknown of rows without that key, which are older."""
     if not all("wrong" in row for row in rows):
         return "–"

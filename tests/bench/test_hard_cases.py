@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import asdict
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mfo_backend.bench.hard_cases import HARD_CASES, write_hard_scene
-from mfo_backend.bench.hard_runs import HardRun, hard_table, run_hard_case, wrongly_determined
+from mfo_backend.bench.hard_runs import HardRun, run_hard_case, wrongly_determined
+from mfo_backend.bench.hard_section import hard_table
 from mfo_backend.material.mitsuba_parameters import MITSUBA_PRINCIPLED
 from mfo_backend.types.certainty import Certainty, Level
 
@@ -72,8 +74,8 @@ def test_the_table_counts_failures_and_names_guards():
         HardRun("black", 1, False, np.inf, 0.5, False, 60.0, ("The light was recorded 2 times: it moved.",)),
         HardRun("black", 2, False, 0.2, 0.5, True, 70.0, (), ("roughness",)),
     ]
-    line = hard_table(runs).splitlines()[-1]
-    assert line == "| black | 3 | 33 % | inf | 60 | 1 | 1 | 2 | The light was recorded times (1) |"
+    line = hard_table([asdict(run) for run in runs]).rows[-1]
+    assert line == ("black", "3", "1 (33%)", "–", "60", "1", "1", "2", "The light was recorded times (1)")
 
 
 def test_a_determined_value_is_wrong_beyond_three_deviations_and_what_determined_promises():
