@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 _DRAWN = ("base_color", "roughness", "metallic", "specular")  # the paper draws these at random, the others are 0
+_RANGES = {"metallic": (0.001, 0.999)}  # metals of exactly 1 are hard cases (bench/hard_cases.py)
 _GLASS = ("base_color", "roughness", "ior", "transmission_weight")
 
 
@@ -54,7 +55,7 @@ class Scenario:
     fit_spp: int
     max_depth: int
     drawn: tuple[str, ...] = _DRAWN
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=lambda: _RANGES)
     constant: Mapping[str, float] = field(default_factory=dict)
     closed_only: bool = False
     relights: int = 1

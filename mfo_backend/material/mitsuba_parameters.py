@@ -3,11 +3,14 @@
 
 The box stays clear of the places where the plugin's derivative vanishes or overflows: weights of 0 and 1 (masked
 lobes), black base colour under transmission (infinite slope), roughness below 0.0316 (alpha is clamped at 0.001), a
-specular level of 0 (infinite slope) and an IOR of 1 (refraction half vector of length 0).
+specular level of 0 (infinite slope) and an IOR of 1 (refraction half vector of length 0). Metals of exactly 1 are what
+most metals are, and a thousandth of a dielectric is much of their dark parts: they are in the box, and the plugin's
+slope there is that beside it. A clearcoat of 1 masks nothing.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 from ..types.errors import BadInputError
@@ -20,18 +23,22 @@ def _weight(name: str) -> Parameter:
     return Parameter(name, 1, _EDGE, 1.0 - _EDGE, 0.0)
 
 
+def _weight_up_to_1(name: str, slope_upper: float = math.inf) -> Parameter:
+    return Parameter(name, 1, _EDGE, 1.0, 0.0, slope_upper)
+
+
 MITSUBA_PRINCIPLED = ParameterTable(
     [
         Parameter("base_color", 3, _EDGE, 1.0 - _EDGE, (0.5, 0.5, 0.5)),
         Parameter("roughness", 1, 0.04, 1.0, 0.5),
-        _weight("metallic"),
+        _weight_up_to_1("metallic", slope_upper=1.0 - _EDGE),
         Parameter("specular", 1, 0.02, 1.0, 0.5),
         Parameter("eta", 1, 1.01, 2.5, 1.5),
         _weight("spec_tint"),
         Parameter("anisotropic", 1, _EDGE, 0.95, 0.0),
         _weight("sheen"),
         _weight("sheen_tint"),
-        _weight("clearcoat"),
+        _weight_up_to_1("clearcoat"),
         _weight("clearcoat_gloss"),
         _weight("flatness"),
         _weight("spec_trans"),

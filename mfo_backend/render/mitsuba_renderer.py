@@ -114,8 +114,9 @@ class MitsubaRenderer:
             from .ordered_picture import opaque, parts_of
 
             total = np.zeros(len(vector))
+            slopes_at = np.minimum(vector, self.table.slope_upper)
             for part in parts_of(pixel_gradient[..., 0].size, seed, spp):
-                theta = self._update(vector, differentiable=True)
+                theta = self._update(slopes_at, differentiable=True)
                 gradient = mi.TensorXf(own_memory(part.share * pixel_gradient, mi.Float), pixel_gradient.shape)
                 self._integrator.render_backward(
                     self._scene, self._params, gradient, self._sensor, opaque(part.seed), part.spp

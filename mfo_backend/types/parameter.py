@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,8 +19,8 @@ Value = float | tuple[float, ...]
 class Parameter:
     """One value of a material model.
 
-    `size` is 1 for a scalar and 3 for a linear RGB colour. `lower` and `upper` bound every component during a fit;
-    they lie inside the model's own range where its gradient is defined.
+    `size` is 1 for a scalar and 3 for a linear RGB colour. `lower` and `upper` bound every component during a fit.
+    Where the renderer's own gradient is not defined up to there, it is that at `slope_upper`.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Parameter:
     lower: float
     upper: float
     default: Value
+    slope_upper: float = math.inf
 
     def __post_init__(self) -> None:
         if self.size not in (1, 3):
@@ -62,6 +64,11 @@ class ParameterTable(Sequence[Parameter]):
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self._parameters)
+
+    @property
+    def slope_upper(self) -> NDArray[np.float64]:
+        """The largest values at which the renderer's gradient is defined, shape (length,); infinite without limit."""
+        return np.concatenate([np.full(p.size, p.slope_upper) for p in self._parameters])
 
     @property
     def lower(self) -> NDArray[np.float64]:

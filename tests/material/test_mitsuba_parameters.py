@@ -39,6 +39,6 @@ def test_selections(selection, present, linked, has: set, lacks: set) -> None:
 def test_the_box_stays_clear_of_masked_lobes_and_clamped_roughness() -> None:
     for parameter in MITSUBA_PRINCIPLED:
         assert parameter.lower > 0.0
-        if parameter.name not in ("eta", "roughness", "specular"):
-            assert parameter.upper < 1.0
+        if parameter.name not in ("eta", "roughness", "specular", "clearcoat"):
+            assert min(parameter.upper, parameter.slope_upper) < 1.0
     assert MITSUBA_PRINCIPLED["roughness"].lower ** 2 > 0.001  # alpha is clamped there (principled.cpp, 3.9.1)
