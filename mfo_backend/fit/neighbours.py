@@ -6,8 +6,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
-
 
 def next_to(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     """Index of all pixels but the last along an axis (0 or 1), and of their neighbours."""
@@ -16,7 +14,7 @@ def next_to(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     return tuple(here), tuple(there)
 
 
-def neighbour_pairs(pixels: NDArray[np.int64], shape: tuple[int, ...]) -> Pairs:
+def neighbour_pairs(pixels: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Positions (n,) in `pixels`, flat indices in a picture of this shape, and those of neighbours of theirs."""
     place = np.full(shape, -1)
     place.ravel()[pixels] = np.arange(len(pixels))

@@ -30,7 +30,8 @@ class Recount:
     Attributes
     ----------
     log_ratio, sd
-        Natural logarithm of the reference's count over the one that was compared with, and its standard deviation.
+        Natural logarithm of the reference's count over the one that was compared with, `MOST` away at most, and its
+        standard deviation, which holds what is further away.
     slope
         Derivative of the mean of compressed pixels (p, 3) by that logarithm.
     """
@@ -46,9 +47,8 @@ def recount(counts: EqualCounts, comparison: NoiseComparison, pictures: TwoPictu
     twice = 0.5 * (once[::2] + once[1::2])
     here, further = comparison.excess(once), comparison.excess(twice)
     steepness = max((here.logarithm - further.logarithm) / np.log(2.0), LEAST_SLOPE)
+    ratio = here.logarithm / steepness
+    followed = float(np.clip(ratio, -MOST, MOST))
+    sd = float(np.linalg.norm([np.sqrt(here.variance) / steepness, CURVED, ratio - followed]))
     means = [counts.compress(y[..., None])[..., 0].mean(axis=0, dtype=np.float64) for y in (once, twice)]
-    return Recount(
-        float(np.clip(here.logarithm / steepness, -MOST, MOST)),
-        float(np.hypot(np.sqrt(here.variance) / steepness, CURVED)),
-        (means[1] - means[0]) / np.log(2.0),
-    )
+    return Recount(followed, sd, (means[1] - means[0]) / np.log(2.0))

@@ -19,26 +19,22 @@ from ..types.parameter import Parameter, ParameterTable
 _EDGE = 1e-3  # distance of weights from 0 and 1, where `principled` masks lobes out of the derivative
 
 
-def _weight(name: str) -> Parameter:
-    return Parameter(name, 1, _EDGE, 1.0 - _EDGE, 0.0)
-
-
-def _weight_up_to_1(name: str, slope_upper: float = math.inf) -> Parameter:
-    return Parameter(name, 1, _EDGE, 1.0, 0.0, slope_upper)
+def _weight(name: str, upper: float = 1.0 - _EDGE, slope_upper: float = math.inf) -> Parameter:
+    return Parameter(name, 1, _EDGE, upper, 0.0, slope_upper)
 
 
 MITSUBA_PRINCIPLED = ParameterTable(
     [
         Parameter("base_color", 3, _EDGE, 1.0 - _EDGE, (0.5, 0.5, 0.5)),
         Parameter("roughness", 1, 0.04, 1.0, 0.5),
-        _weight_up_to_1("metallic", slope_upper=1.0 - _EDGE),
+        _weight("metallic", upper=1.0, slope_upper=1.0 - _EDGE),
         Parameter("specular", 1, 0.02, 1.0, 0.5),
         Parameter("eta", 1, 1.01, 2.5, 1.5),
         _weight("spec_tint"),
         Parameter("anisotropic", 1, _EDGE, 0.95, 0.0),
         _weight("sheen"),
         _weight("sheen_tint"),
-        _weight_up_to_1("clearcoat"),
+        _weight("clearcoat", upper=1.0),
         _weight("clearcoat_gloss"),
         _weight("flatness"),
         _weight("spec_trans"),

@@ -33,8 +33,10 @@ def test_the_count_is_found_between_whole_numbers(samples, count):
 
 
 def test_a_count_that_is_far_off_is_no_straight_line_away():
-    assert recounted(picture(100, 40), 4)[1].log_ratio == MOST
-    assert recounted(picture(100, 2), 20)[1].log_ratio == -MOST
+    more, fewer = (recounted(picture(100, samples), count)[1] for samples, count in ((40, 4), (2, 20)))
+    assert (more.log_ratio, fewer.log_ratio) == (MOST, -MOST)
+    for found in (more, fewer):  # a factor of ten, of which two is followed: the rest is not sure
+        assert found.sd > np.log(2.0)
 
 
 def test_the_slope_is_that_of_compressed_means():

@@ -117,7 +117,6 @@ def test_the_answer_to_a_change_of_the_pictures_is_that_of_least_squares():
     rng = np.random.default_rng(4)
     picture, columns = scene(False)
     pools = filled(False, noise=1e-4, of_columns=1e-4, reference_noise=1e-4)
-    equations, _, _ = pools.best(WIDTH)
     change = rng.normal(size=picture.shape) + 0.5 * columns[..., 0]
     for size, tiles in enumerate(pools.tiles):
         rows = tiles.means(columns[pools.order[size]].astype(np.float32)) * tiles.weight[..., None]
