@@ -143,10 +143,12 @@ class RecordedFit:
             lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
             few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             starts = []
-            if sampled and plan.same_cost:
+            if plan.same_cost:
+                evaluations = plan.agreement_evaluations if sampled else plan.exact_agreement_evaluations
                 starts = agreeing_ends(
-                    lambda start: self._solve(few, start, plan.agreement_evaluations, stage=stage),
+                    lambda start: self._solve(few, start, evaluations, stage=stage),
                     self.table, self.scene.model.scanned, plan.same_cost,
+                    most=np.inf if sampled else 0.5 * plan.agreement_rms**2,
                 )  # fmt: skip
             if not starts and plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)

@@ -22,36 +22,33 @@ def minimise_in_box(hessian: Vector, gradient: Vector, lower: Vector, upper: Vec
         If `hessian` is not positive definite.
     """
     size = len(gradient)
-    s = np.clip(np.zeros(size), lower, upper)
+    s = np.minimum(np.maximum(0.0, lower), upper)
     held = lower >= upper
     # a bound that the first descent direction would cross at once starts active
     active = held | ((s <= lower) & (gradient > 0.0)) | ((s >= upper) & (gradient < 0.0))
+    scale = np.abs(gradient).max(initial=0.0) * 1e-12
+    unit = np.eye(size)
+    # proves that this is positive definite, and with it every block; solving by it saves nothing at this size
+    np.linalg.cholesky(np.where(held[:, None] | held, unit, hessian))
     for _ in range(10 * size + 10):
         free = ~active
-        direction = np.zeros(size)
-        if free.any():
-            residual = gradient + hessian @ s
-            block = hessian[np.ix_(free, free)]
-            # Cholesky proves that the block is positive definite; solving by it saves nothing at this size
-            np.linalg.cholesky(block)
-            direction[free] = np.linalg.solve(block, -residual[free])
+        slope = gradient + hessian @ s
+        direction = np.linalg.solve(np.where(free[:, None] & free, hessian, unit), np.where(free, -slope, 0.0))
         room = np.full(size, np.inf)
-        down, up = direction < 0.0, direction > 0.0
-        room[down] = (lower - s)[down] / direction[down]
-        room[up] = (upper - s)[up] / direction[up]
-        blocking = int(np.argmin(room))
+        np.divide(np.where(direction < 0.0, lower, upper) - s, direction, out=room, where=direction != 0.0)
+        blocking = int(room.argmin())
         if room[blocking] < 1.0:
-            s = np.clip(s + max(room[blocking], 0.0) * direction, lower, upper)
-            s[blocking] = lower[blocking] if down[blocking] else upper[blocking]
+            bound = lower if direction[blocking] < 0.0 else upper
+            s = np.minimum(np.maximum(s + max(room[blocking], 0.0) * direction, lower), upper)
+            s[blocking] = bound[blocking]
             active[blocking] = True
             continue
-        s = np.clip(s + direction, lower, upper)
+        s = np.minimum(np.maximum(s + direction, lower), upper)
         slope = gradient + hessian @ s
         # multipliers of the active bounds; a negative one wants to leave its bound
-        multiplier = np.where(s <= lower, slope, -slope)
-        scale = np.abs(gradient).max(initial=0.0) * 1e-12
-        wants_out = active & ~held & (multiplier < -scale)
-        if not wants_out.any():
+        multiplier = np.where(active & ~held, np.where(s <= lower, slope, -slope), np.inf)
+        leaving = int(multiplier.argmin())
+        if multiplier[leaving] >= -scale:
             break
-        active[int(np.argmin(np.where(wants_out, multiplier, np.inf)))] = False
+        active[leaving] = False
     return s

@@ -8,7 +8,7 @@ import pytest
 
 from mfo_backend.fit.global_start import (
     METAL,
-    OPPOSITE_WIDTH,
+    OPPOSITE,
     ScanNode,
     agreeing_ends,
     best_starts,
@@ -67,8 +67,7 @@ def solver(residuals, seen):
 def test_opposite_starts_that_end_in_one_place_agree():
     starts = []
     ends = agreeing_ends(solver(one_basin, starts), TABLE, SCANNED, 1.02)
-    assert [start[METALLIC][0] for start in starts] == pytest.approx([1 - METAL, METAL])
-    assert all(start[ROUGHNESS][0] == OPPOSITE_WIDTH for start in starts)
+    assert tuple((start[METALLIC][0], start[ROUGHNESS][0]) for start in starts) == OPPOSITE
     assert len(ends) == 0  # noise-free: both costs are near 0, and their ratio says nothing
     ends = agreeing_ends(solver(one_noisy_basin, []), TABLE, SCANNED, 1.02)
     assert len(ends) == 2
@@ -84,24 +83,25 @@ def test_ends_in_different_basins_do_not_agree():
 
 
 def test_the_better_end_comes_first():
-    costs = iter([2.0, 1.99])
-    nothing = np.zeros(TABLE.length)
-
-    def solve(start):
-        return Solution(start, NormalEquations(next(costs), nothing, np.diag(nothing)), (1.0,), True)
-
-    ends = agreeing_ends(solve, TABLE, SCANNED, 1.02)
+    ends = agreeing_ends(ends_at(2.0, 1.99), TABLE, SCANNED, 1.02)
     assert [end[METALLIC][0] for end in ends] == pytest.approx([METAL, 1 - METAL])
 
 
-@pytest.mark.parametrize("costs", [(np.inf, np.inf), (1.0, np.inf), (np.nan, 1.0), (1.0, np.nan)])
-def test_ends_without_finite_numbers_do_not_agree(costs):
+def ends_at(*costs):
+    """Solves that stay where they begin, at these costs."""
     left, nothing = iter(costs), np.zeros(TABLE.length)
+    return lambda start: Solution(start, NormalEquations(next(left), nothing, np.diag(nothing)), (1.0,), True)
 
-    def solve(start):
-        return Solution(start, NormalEquations(next(left), nothing, np.diag(nothing)), (1.0,), True)
 
-    assert agreeing_ends(solve, TABLE, SCANNED, 1.02) == []
+@pytest.mark.parametrize("most", [np.inf, 2.0])
+@pytest.mark.parametrize("costs", [(np.inf, np.inf), (1.0, np.inf), (np.nan, 1.0), (1.0, np.nan)])
+def test_ends_without_finite_numbers_do_not_agree(costs, most):
+    assert agreeing_ends(ends_at(*costs), TABLE, SCANNED, 1.02, most=most) == []
+
+
+def test_ends_that_explain_too_little_do_not_agree():
+    assert agreeing_ends(ends_at(1.0, 1.0), TABLE, SCANNED, 1.02, most=0.9) == []
+    assert len(agreeing_ends(ends_at(1.0, 1.0), TABLE, SCANNED, 1.02, most=1.1)) == 2
 
 
 def test_without_metallic_nothing_is_opposite():
@@ -122,7 +122,7 @@ def test_starts_stay_inside_narrow_limits():
         return Solution(start, NormalEquations(1.0, np.zeros(2), np.eye(2)), (1.0,), True)
 
     assert len(agreeing_ends(solve, table, SCANNED, 1.02)) == 2
-    np.testing.assert_allclose(starts, [[0.5, 0.2], [0.5, 0.4]])
+    np.testing.assert_allclose(starts, [[0.5, 0.2], [0.6, 0.4]])  # roughness, metallic
 
 
 def test_the_scan_finds_the_lower_basin():
