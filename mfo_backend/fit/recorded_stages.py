@@ -22,7 +22,7 @@ from .course import Course, Stage
 from .finer_grid import finer_grid
 from .fireflies import without_fireflies
 from .flip_stage import minimise_flip
-from .global_start import agreeing_ends, best_starts, random_start, scan
+from .global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
 from .other_basins import best_basin, metal_rivals
 from .picture_judge import PictureJudge
 from .problem import Problem, Refined
@@ -145,10 +145,10 @@ class RecordedFit:
             starts = []
             if plan.same_cost:
                 evaluations = plan.agreement_evaluations if sampled else plan.exact_agreement_evaluations
+                exact = {} if sampled else {"metal_width": ROUGHER_WIDTH, "most": 0.5 * plan.agreement_rms**2}
                 starts = agreeing_ends(
                     lambda start: self._solve(few, start, evaluations, stage=stage),
-                    self.table, self.scene.model.scanned, plan.same_cost,
-                    most=np.inf if sampled else 0.5 * plan.agreement_rms**2,
+                    self.table, self.scene.model.scanned, plan.same_cost, **exact,
                 )  # fmt: skip
             if not starts and plan.scan:
                 nodes = scan(self.course.watch(stage, few.equations), self.table, self.scene.model.scanned)

@@ -8,7 +8,8 @@ import pytest
 
 from mfo_backend.fit.global_start import (
     METAL,
-    OPPOSITE,
+    OPPOSITE_WIDTH,
+    ROUGHER_WIDTH,
     ScanNode,
     agreeing_ends,
     best_starts,
@@ -64,10 +65,12 @@ def solver(residuals, seen):
     return solve
 
 
-def test_opposite_starts_that_end_in_one_place_agree():
+@pytest.mark.parametrize("metal_width", [OPPOSITE_WIDTH, ROUGHER_WIDTH])
+def test_opposite_starts_that_end_in_one_place_agree(metal_width):
     starts = []
-    ends = agreeing_ends(solver(one_basin, starts), TABLE, SCANNED, 1.02)
-    assert tuple((start[METALLIC][0], start[ROUGHNESS][0]) for start in starts) == OPPOSITE
+    ends = agreeing_ends(solver(one_basin, starts), TABLE, SCANNED, 1.02, metal_width=metal_width)
+    assert [start[METALLIC][0] for start in starts] == pytest.approx([1 - METAL, METAL])
+    assert [start[ROUGHNESS][0] for start in starts] == [OPPOSITE_WIDTH, metal_width]
     assert len(ends) == 0  # noise-free: both costs are near 0, and their ratio says nothing
     ends = agreeing_ends(solver(one_noisy_basin, []), TABLE, SCANNED, 1.02)
     assert len(ends) == 2
@@ -122,7 +125,7 @@ def test_starts_stay_inside_narrow_limits():
         return Solution(start, NormalEquations(1.0, np.zeros(2), np.eye(2)), (1.0,), True)
 
     assert len(agreeing_ends(solve, table, SCANNED, 1.02)) == 2
-    np.testing.assert_allclose(starts, [[0.5, 0.2], [0.6, 0.4]])  # roughness, metallic
+    np.testing.assert_allclose(starts, [[0.5, 0.2], [0.5, 0.4]])  # roughness, metallic
 
 
 def test_the_scan_finds_the_lower_basin():
