@@ -22,12 +22,11 @@ class BusyMark:
     @classmethod
     def now(cls) -> BusyMark:
         """This moment."""
-        own = os.times()
-        return cls(time.monotonic(), own.user + own.system, _busy_seconds())
+        return cls(time.monotonic(), time.process_time(), _busy_seconds())
 
     def own_seconds(self) -> float:
         """Processor seconds that this process has used since, on all its threads."""
-        return BusyMark.now().own - self.own
+        return time.process_time() - self.own
 
     def others(self) -> float | None:
         """Share of all processors that other programs have used since."""

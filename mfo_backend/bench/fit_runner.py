@@ -13,6 +13,7 @@ from ..fit.fit_material import FitOutcome
 from ..fit.settings import FitSettings
 from ..job.atomic_file import write_atomically
 from ..types.errors import SetupError, UnrecordableError
+from ..types.event import Event, StageEnd
 from ..types.image import Pixels
 from ..types.status import Status
 from .assets import Assets
@@ -37,6 +38,7 @@ class _Measured:
     parts: Mapping[str, float] = field(default_factory=dict)
     processor_seconds: float | None = None
     others_busy: float | None = None
+    stage_ends: Mapping[str, float] = field(default_factory=dict)  # processor seconds until then
 
 
 class FitRunner:
@@ -136,7 +138,13 @@ class FitRunner:
             materials=self._scene.materials,
         )
         loaded, watch, busy = time.monotonic() - began, Stopwatch(), BusyMark.now()
-        common: dict[str, Any] = {"listener": lambda event: None, "should_stop": should_stop}
+        ends: dict[str, float] = {}
+
+        def note_end(event: Event) -> None:
+            if isinstance(event, StageEnd):
+                ends[event.stage] = busy.own_seconds()
+
+        common: dict[str, Any] = {"listener": note_end, "should_stop": should_stop}
         with watch.watching():
             # not `recover_material`: a preset that hands a scene over to the preset `paper` has not fitted it
             if settings.preset == "paper":
@@ -147,7 +155,7 @@ class FitRunner:
                     outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
                 except UnrecordableError:
                     outcome = fit_transmission(renderer, self._judge.reference, settings, **common)
-        return _Measured(outcome, loaded, watch.parts, busy.own_seconds(), busy.others())
+        return _Measured(outcome, loaded, watch.parts, busy.own_seconds(), busy.others(), ends)
 
     def _row(self, task: Task, measured: _Measured, warm_up: float) -> Row:
         result, scene = measured.outcome.result, self._scene
@@ -198,6 +206,7 @@ class FitRunner:
                     "status": stage.status.value,
                     "iterations": stage.iterations,
                     "passes": stage.curve[-1].passes if stage.curve else None,
+                    "processor_seconds": measured.stage_ends.get(stage.name),
                     "flip": judge.flip(stage.values),
                 }
                 for stage in result.stages

@@ -64,7 +64,8 @@ class Row:
     relit_relative_rmse, relit_flips
         The same under lights that the fit did not see, the first their mean.
     stages
-        Name, iterations and status of every stage, the passes at its end and the FLIP of its values.
+        Name, iterations and status of every stage, passes and processor seconds of the fit at its end, and the FLIP of
+        its values.
     parameter_errors
         Largest absolute difference of a parameter's components from the truth.
     certainty

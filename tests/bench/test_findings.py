@@ -57,8 +57,20 @@ def test_the_loop_is_held_against_ours_on_common_scenes():
     ]
     table = against_the_loop([*ours, *loop])
     assert table is not None
-    assert table.rows == [("noise", "mse-ldr", "2 of 2", "0.02", "1 of 2", "0.03", "1", "15")]
+    assert table.rows == [("noise", "mse-ldr", "2 of 2", "0.02", "1 of 2", "0.03", "1", "15", "–")]
     assert against_the_loop(loop) is None
+
+
+def test_the_loops_time_is_held_against_the_stage_that_is_as_near():
+    ends = (("scan", 0.04, 0.5), ("start", 0.03, 0.8), ("refine", 0.02, 1.6))
+    stages = [{"name": name, "flip": flip, "processor_seconds": seconds} for name, flip, seconds in ends]
+    ours = [row(Task("noise", n, "balanced"), flip=0.02, processor_seconds=2.0, stages=stages) for n in range(3)]
+    flips = (0.035, 0.02, 0.01)  # nearer than any stage: it takes us forever
+    loop = [row(Task("noise", n, "mfo-hdr"), flip=flip, processor_seconds=16.0) for n, flip in enumerate(flips)]
+    for chosen, ratio in ((loop[:1], "20"), (loop[1:2], "10"), (loop[2:], "0"), (loop, "10")):
+        table = against_the_loop([*ours, *chosen])
+        assert table is not None
+        assert table.rows[0][-1] == ratio
 
 
 def test_an_ablation_is_compared_on_common_scenes():

@@ -32,6 +32,11 @@ def test_fast_solves_the_reduced_set(runner):
     assert sum(r.flip <= SOLVED_FLIP for r in rows) == 4
     # 88, 45, 36 and 36 when this was written; a stage that runs to its limit costs hundreds
     assert max(r.passes for r in rows) < 120
+    for r in rows:
+        ends = [stage["processor_seconds"] for stage in r.stages]
+        assert ends[0] > 0.0
+        assert ends == sorted(ends)
+        assert ends[-1] < r.processor_seconds
     assert rows[0].warm_up_seconds > 0
     assert rows[1].warm_up_seconds == 0
     for r in rows:

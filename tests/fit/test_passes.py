@@ -18,7 +18,7 @@ TWELVE = [*REDUCED, "anisotropic", "sheen", "sheen_tint", "spec_tint", "clearcoa
 SEEDS = 4
 
 
-@pytest.mark.parametrize(("names", "most"), [(REDUCED, 64.0), (TWELVE, 217.0)], ids=["six", "twelve"])
+@pytest.mark.parametrize(("names", "most"), [(REDUCED, 35.0), (TWELVE, 163.0)], ids=["six", "twelve"])
 def test_passes_to_one_per_cent(tmp_path, names, most):
     passes = []
     for seed in range(SEEDS):
@@ -40,5 +40,5 @@ def test_passes_to_one_per_cent(tmp_path, names, most):
         found = picture(table.pack(result.recovered))
         error = np.sqrt(np.mean((found - reference)[mask] ** 2) / np.mean(reference[mask] ** 2))
         assert error < 0.01, (seed, error)
-    # the medians were 51 and 174 when this was written; a quarter more is a change worth a look
+    # the medians were 28 and 130 when this was written; a quarter more is a change worth a look
     assert np.median(passes) < most, passes
