@@ -38,10 +38,10 @@ class RecordedPlan:
         Those that they and the last stage look at where every light is exact: without noise more say nothing new.
     starts
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
-    same_cost, agreement_evaluations, exact_agreement_evaluations, agreement_rms
+    same_cost, agreement_evaluations, exact_agreement_evaluations
         Two opposite starts get this many evaluations before the scan, where light is sampled and where every light is
-        exact. It is left out where their costs differ by no more than this factor (0: never). Under exact lights the
-        right material leaves little of the picture: there the root mean square must be below the last, too.
+        exact. It is left out where their costs differ by no more than this factor (0: never); under exact lights only
+        below `seen_rms`, too, for there the right material leaves little of the picture.
     trial_evaluations
         After as many only starts within `keep_factor` of the best cost go on.
     seen_rms, solved_rms
@@ -73,7 +73,6 @@ class RecordedPlan:
     same_cost: float = 1.02
     agreement_evaluations: int = 12
     exact_agreement_evaluations: int = 20
-    agreement_rms: float = 0.02
     trial_evaluations: int = 10
     keep_factor: float = 10.0
     seen_rms: float = 5e-3

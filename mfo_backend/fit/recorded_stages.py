@@ -145,7 +145,7 @@ class RecordedFit:
             starts = []
             if plan.same_cost:
                 evaluations = plan.agreement_evaluations if sampled else plan.exact_agreement_evaluations
-                exact = {} if sampled else {"metal_width": ROUGHER_WIDTH, "most": 0.5 * plan.agreement_rms**2}
+                exact = {} if sampled else {"metal_width": ROUGHER_WIDTH, "most": 0.5 * plan.seen_rms**2}
                 starts = agreeing_ends(
                     lambda start: self._solve(few, start, evaluations, stage=stage),
                     self.table, self.scene.model.scanned, plan.same_cost, **exact,
