@@ -48,7 +48,7 @@ def minimise_in_box(hessian: Vector, gradient: Vector, lower: Vector, upper: Vec
         # multipliers of the active bounds; a negative one wants to leave its bound
         multiplier = np.where(active & ~held, np.where(s <= lower, slope, -slope), np.inf)
         leaving = int(multiplier.argmin())
-        if multiplier[leaving] >= -scale:
+        if not multiplier[leaving] < -scale:  # nor where it is no number
             break
         active[leaving] = False
     return s
