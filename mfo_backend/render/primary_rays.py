@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import drjit as dr
 import mitsuba as mi
@@ -19,22 +19,6 @@ from ..material.own_memory import own_memory
 from .pixel_cells import PixelCells
 
 TILE = 4  # pixels along each side
-
-
-@dataclass(frozen=True)
-class PrimaryRays:
-    """Rays for each pixel, pixels in tile order; `pixel_position` counts in that order.
-
-    Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every
-    ray counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
-    `filter_weight` adds up to 1 within a pixel.
-    """
-
-    ray: mi.Ray3f
-    pixel_position: mi.UInt32
-    filter_weight: mi.Float
-    pixel: NDArray[np.int64]
-    tile: NDArray[np.int64]
 
 
 def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -79,57 +63,105 @@ def fresh_sampler(seed: int, width: int) -> mi.Sampler:
 GAUSS = 0.5 / math.sqrt(3.0)
 
 
-def primary_rays(
-    sensor: mi.Sensor,
-    cells: PixelCells,
-    order: NDArray[np.int64],
-    tile: NDArray[np.int64],
-    seed: int,
-    *,
-    four: bool = False,
-) -> PrimaryRays:
+class PrimaryRays:
     """A camera ray through the centre of each cell, or `four` one after the other through its Gauss points.
 
-    `order` and `tile` are those of `tile_order`.
+    Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every
+    ray counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
+    Nothing is kept for each ray: all of it is computed from the cells wherever it is asked for, which takes less time
+    than to read it.
+
+    Parameters
+    ----------
+    order, tile
+        Those of `tile_order`: `cells` count pixels in this order.
+    seed
+        Of the points on a lens.
+
+    Attributes
+    ----------
+    pixel, tile
+        Flat index of each pixel and the number of its tile.
     """
-    film = sensor.film()
-    width = int(film.crop_size()[0])
-    each = 4 if four else 1
-    count = each * len(cells)
-    number = dr.arange(mi.UInt32, count)
-    cell = number // each
-    position = dr.gather(mi.UInt32, own_memory(cells.position, mi.UInt32), cell)
-    side = dr.gather(mi.Float, own_memory(cells.side, mi.Float), cell)
-    corner = mi.Point2f(*(dr.gather(mi.Float, own_memory(a, mi.Float), cell) for a in (cells.x, cells.y)))
-    sampler = fresh_sampler(seed, count)
-    flat = dr.gather(mi.UInt32, own_memory(order, mi.UInt32), position)
-    y = flat // width
-    x = flat - y * width
-    # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a per
-    # cent
-    point = mi.Point2f(0.5)
-    if four:
-        point += GAUSS * mi.Point2f(2.0 * mi.Float(number & 1) - 1.0, mi.Float(number & 2) - 1.0)
-    offset, sign = through_filter(film.rfilter(), corner + side * point)
-    weight = side * side / each
-    if sign is not None:
-        weight *= sign
-        total = dr.zeros(mi.Float, len(order))
-        dr.scatter_reduce(dr.ReduceOp.Add, total, weight, position)
-        weight /= dr.gather(mi.Float, total, position)
-    crop = film.crop_offset()
-    size = mi.ScalarVector2f(film.size())
-    film_position = mi.Point2f(
-        mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1]
-    ) / mi.Point2f(size)
-    ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, film_position, sampler.next_2d())
-    return PrimaryRays(ray, position, weight, order, tile)
+
+    def __init__(
+        self,
+        sensor: mi.Sensor,
+        cells: PixelCells,
+        order: NDArray[np.int64],
+        tile: NDArray[np.int64],
+        seed: int,
+        *,
+        four: bool = False,
+    ) -> None:
+        self.pixel, self.tile = order, tile
+        self._sensor, self._four, self._each = sensor, four, 4 if four else 1
+        self._count = self._each * len(cells)
+        self._flat = own_memory(order, mi.UInt32)
+        self._position = own_memory(cells.position, mi.UInt32)
+        self._side, self._x, self._y = (own_memory(a, mi.Float) for a in (cells.side, cells.x, cells.y))
+        self._through = through_filter(sensor.film().rfilter())
+        self._on_lens = fresh_sampler(seed, self._count).next_2d() if sensor.needs_aperture_sample() else None
+        self._total: mi.Float | None = None  # of a pixel's weights, where a filter gives them signs
+        number = dr.arange(mi.UInt32, self._count)
+        weight = self._own_weight(number)
+        if self._through(mi.Point2f(0.5))[1] is not None:
+            self._total = dr.zeros(mi.Float, len(order))
+            dr.scatter_reduce(dr.ReduceOp.Add, self._total, weight, self.position(number))
+        dr.eval(self._on_lens, self._total)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def position(self, number: mi.UInt32) -> mi.UInt32:
+        """The pixel of each of these rays, counted in tile order."""
+        return dr.gather(mi.UInt32, self._position, number // self._each)
+
+    def weight(self, number: mi.UInt32) -> mi.Float:
+        """The filter's share of each ray in its pixel; they add up to 1."""
+        weight = self._own_weight(number)
+        return weight if self._total is None else weight / dr.gather(mi.Float, self._total, self.position(number))
+
+    def ray(self, number: mi.UInt32) -> mi.Ray3f:
+        """The rays of these numbers."""
+        film = self._sensor.film()
+        width = int(film.crop_size()[0])
+        flat = dr.gather(mi.UInt32, self._flat, self.position(number))
+        y = flat // width
+        x = flat - y * width
+        offset, _ = self._offset(number)
+        crop = film.crop_offset()
+        on_film = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
+        on_film /= mi.Point2f(mi.ScalarVector2f(film.size()))
+        on_lens = mi.Point2f(0.5) if self._on_lens is None else dr.gather(mi.Point2f, self._on_lens, number)
+        ray, _ = self._sensor.sample_ray(0.5 * self._sensor.shutter_open_time(), 0.5, on_film, on_lens)
+        return ray
+
+    def _own_weight(self, number: mi.UInt32) -> mi.Float:
+        side = dr.gather(mi.Float, self._side, number // self._each)
+        _, sign = self._offset(number)
+        return side * side / self._each * (1.0 if sign is None else sign)
+
+    def _offset(self, number: mi.UInt32) -> tuple[mi.Point2f, mi.Float | None]:
+        """Positions on the film from the pixels' centres, in pixels, and the filter's sign there."""
+        cell = number // self._each
+        side = dr.gather(mi.Float, self._side, cell)
+        corner = mi.Point2f(*(dr.gather(mi.Float, a, cell) for a in (self._x, self._y)))
+        # cell centres: exact for a linear change within the pixel, where jittered positions leave a noise of half a
+        # per cent
+        point = mi.Point2f(0.5)
+        if self._four:
+            point += GAUSS * mi.Point2f(2.0 * mi.Float(number & 1) - 1.0, mi.Float(number & 2) - 1.0)
+        return self._through(corner + side * point)
 
 
-def through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:
-    """Offsets from the pixel centre with density |filter|, and the filter's sign where it has one."""
+def through_filter(
+    rfilter: mi.ReconstructionFilter,
+) -> Callable[[mi.Point2f], tuple[mi.Point2f, mi.Float | None]]:
+    """What makes of points in the unit square offsets from the pixel centre with density |filter|, and the filter's
+    sign where it has one."""
     if rfilter.is_box_filter():
-        return u - 0.5, None
+        return lambda u: (u - 0.5, None)
     edges = np.linspace(-rfilter.radius(), rfilter.radius(), 1025, dtype=np.float32)
     value = np.array(rfilter.eval(own_memory(0.5 * (edges[1:] + edges[:-1]), mi.Float)))
     cumulative = np.concatenate([[0.0], np.cumsum(np.abs(value))])
@@ -140,7 +172,8 @@ def through_filter(rfilter: mi.ReconstructionFilter, u: mi.Point2f) -> tuple[mi.
         low, high = dr.gather(mi.Float, quantiles, cell), dr.gather(mi.Float, quantiles, cell + 1)
         return dr.lerp(low, high, t * 4096.0 - mi.Float(cell))
 
-    offset = mi.Point2f(inverse(u.x), inverse(u.y))
-    if (value >= 0.0).all():
-        return offset, None
-    return offset, dr.sign(rfilter.eval(offset.x) * rfilter.eval(offset.y))
+    def offset(u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:
+        away = mi.Point2f(inverse(u.x), inverse(u.y))
+        return away, None if (value >= 0.0).all() else dr.sign(rfilter.eval(away.x) * rfilter.eval(away.y))
+
+    return offset

@@ -23,7 +23,7 @@ from .even_points import even_points
 from .highlight_cells import Highlights, highlight_cells
 from .lamps.met_lamps import DELTA, SceneLamps
 from .pixel_cells import PixelCells
-from .primary_rays import TILE, PrimaryRays, fresh_sampler, primary_rays, tile_order
+from .primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from .proposal import DefensiveProposal
 from .recorded_background import recorded_background
 from .recorded_paths import RecordedPaths
@@ -112,17 +112,16 @@ def record_paths(
         sensor = scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
-        seen = hit = scene.ray_intersect_preliminary(rays.ray, coherent=True)
+        every_ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
+        seen = hit = scene.ray_intersect_preliminary(every_ray, coherent=True)
         target = mi.ShapePtr(shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
         on_target = hit.is_valid() & (hit.shape == target)
-        dr.eval(rays, hit, on_target)
+        dr.eval(hit, on_target)
         index = dr.compress(on_target)
         if dr.width(index) == 0:
             raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
-        position = dr.gather(mi.UInt32, rays.pixel_position, index)
-        filter_weight = dr.gather(mi.Float, rays.filter_weight, index)
-        ray = dr.gather(mi.Ray3f, rays.ray, index)
+        position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
@@ -135,12 +134,17 @@ def record_paths(
             plugin: Any = shape.bsdf()
             values = plugin.values_at(si, mi.Bool(True))
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
-        dr.eval(si, position, filter_weight, held)
+        sampled = settings.depth > 2 or any(not mi.has_flag(e.flags(), DELTA) for e in scene.emitters())
+        if settings.depth == 2 or settings.light_paths is None:
+            si = _without_parametrisation(si)
+        # exact lights alone look at hits once each: computing them again takes less time than to read them
+        dr.eval(si if sampled else (), position, filter_weight, held)
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels)
         exact = [part for part in _delta_lights(scene, hits) if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
-        lanes += _sampled_lights(scene, hits, settings, lamps)
+        if sampled:
+            lanes += _sampled_lights(scene, hits, settings, lamps)
 
         covered, coverage = _coverage(pixels, position, filter_weight)
         constant = recorded_background(
@@ -168,16 +172,16 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
         order, tile = order[kept], tile[kept]
     per_axis = np.broadcast_to(settings.grid, (height, width)).reshape(-1)[order]
     if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
-        return primary_rays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
+        return PrimaryRays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
 
     target = mi.ShapePtr(shape)
     dr.make_opaque(target)
 
     def rays_in(cells: PixelCells) -> PrimaryRays:
-        return primary_rays(sensor, cells, order, tile, settings.seed, four=True)
+        return PrimaryRays(sensor, cells, order, tile, settings.seed, four=True)
 
     def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
-        ray = rays.ray
+        ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
         hit = scene.ray_intersect_preliminary(ray, coherent=True)
         on_target = hit.is_valid() & (hit.shape == target)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
@@ -185,6 +189,14 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
 
     cells = PixelCells.grid((per_axis + 1) // 2)
     return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
+
+
+def _without_parametrisation(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    """Where hits are and how they are turned: all that lights and proposals ask for, in three fifths of the memory."""
+    bare = dr.zeros(mi.SurfaceInteraction3f, dr.width(si))
+    bare.t, bare.time, bare.wavelengths = si.t, si.time, si.wavelengths
+    bare.p, bare.n, bare.sh_frame, bare.wi = si.p, si.n, si.sh_frame, si.wi
+    return bare
 
 
 def _facing(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
@@ -219,8 +231,6 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
     everywhere = list(scene.emitters())
     extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
     indirect = settings.depth > 2
-    if not extended and not indirect:
-        return []
     # all samples in one launch: tracing the scene in Python takes longer than to launch it
     count = dr.width(hits.position)
     lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)

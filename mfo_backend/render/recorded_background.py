@@ -40,28 +40,28 @@ def recorded_background(
     image = np.zeros((width * height, 3), np.float32)
     looked_at = np.zeros(len(rays.pixel), bool)
     looked_at[covered] = True
-    wanted = ~on_target & dr.gather(mi.Bool, own_memory(looked_at, mi.Bool), rays.pixel_position)
+    position = rays.position(dr.arange(mi.UInt32, len(rays)))
+    wanted = ~on_target & dr.gather(mi.Bool, own_memory(looked_at, mi.Bool), position)
     # a path tracer's first step takes ten times as long as a look at the environment, and most rays see nothing else
     traced = wanted if lamps else wanted & met.is_valid()
     rest = wanted & ~traced
     dr.eval(traced, rest)
 
     def add(index: mi.UInt32, radiance: mi.Color3f) -> None:
-        value = mi.Color3f(radiance) * dr.gather(mi.Float, rays.filter_weight, index)
+        value = mi.Color3f(radiance) * rays.weight(index)
         dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
-        flat = rays.pixel[np.array(dr.gather(mi.UInt32, rays.pixel_position, index))]
+        flat = rays.pixel[np.array(rays.position(index))]
         for channel in range(3):
             image[:, channel] += np.bincount(flat, value[channel].numpy(), width * height)
 
     index = dr.compress(traced)
     if dr.width(index) > 0:
         sampler = fresh_sampler(seed, dr.width(index))
-        ray = dr.gather(mi.Ray3f, rays.ray, index)
-        add(index, traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters))
+        add(index, traced_radiance(scene, sampler, rays.ray(index), light_paths, depth, hide=hide_emitters))
     index = dr.compress(rest)
     environment = None if hide_emitters else scene.environment()
     if dr.width(index) > 0 and environment is not None:
         beyond = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
-        beyond.wi = -dr.gather(mi.Vector3f, rays.ray.d, index)
+        beyond.wi = -rays.ray(index).d
         add(index, environment.eval(beyond))
     return image.reshape(height, width, 3)

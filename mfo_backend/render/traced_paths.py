@@ -179,7 +179,7 @@ class TracedPaths:
         width = int(film.crop_size()[0])
         y = pixel // width
         x = pixel - y * width
-        offset, sign = through_filter(film.rfilter(), rng.pair(0))
+        offset, sign = through_filter(film.rfilter())(rng.pair(0))
         crop = film.crop_offset()
         position = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
         position /= mi.Point2f(mi.ScalarVector2f(film.size()))

@@ -147,10 +147,11 @@ def test_many_rays_beside_a_small_target_are_left_out(tmp_path, monkeypatch):
     from mfo_backend.render import record_paths  # needs the variant
 
     taken = []
-    original = record_paths.primary_rays
-    monkeypatch.setattr(record_paths, "primary_rays", lambda *a, **b: taken.append(original(*a, **b)) or taken[-1])
+    original = record_paths.PrimaryRays
+    monkeypatch.setattr(record_paths, "PrimaryRays", lambda *a, **b: taken.append(original(*a, **b)) or taken[-1])
     near = scene.record(renderer.start, grid=4, seed=0, near=False, highlights=uniform)
-    assert len(np.unique(np.array(taken[0].pixel_position))) == scene._near_target.sum() < scene._near_target.size
+    assert len(np.unique(np.array(taken[0].position(np.arange(len(taken[0])))))) == scene._near_target.sum()
+    assert scene._near_target.sum() < scene._near_target.size
     for name in ("wi", "wo", "weight"):
         np.testing.assert_array_equal(np.array(getattr(everything, name)), np.array(getattr(near, name)))
     np.testing.assert_array_equal(everything.pixel, near.pixel)
