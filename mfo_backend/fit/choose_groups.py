@@ -52,6 +52,9 @@ GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
+# A recording that leaves pixels out: no more of them than this share; so many of the brightest are in it; and what
+# counts as lit, of the median of the target
+MOST_THINNED, BRIGHTEST, LIT = 0.6, 200, 0.01
 FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
 
 
@@ -87,6 +90,26 @@ def solution_grid(
         return None
     grid = _finer(np.maximum(grid, detail_grid(picture(), mask)))
     return None if _rays(grid, mask) > MOST_FINE_RAYS else grid
+
+
+def thinned_grid(grid: NDArray[np.int64], reference: Pixels, mask: NDArray[np.bool_], rays: int) -> NDArray[np.int64]:
+    """`grid` without rays in most pixels, so that those evenly spread over the lit target take about so many `rays` and
+    its brightest come on top; all of it where most pixels would stay, or where a solution is recorded more finely.
+
+    Few pixels hold most of a recording's lanes, those of highlights, and a fit looks at a small part of them all.
+    """
+    value = luminance(reference)
+    lit = mask & (value > LIT * np.median(value[mask]))
+    share = rays / max(_rays(grid, lit), 1)
+    if share > MOST_THINNED or _rays(_finer(grid), mask) <= MOST_FINE_RAYS:
+        return grid
+    y, x = np.indices(mask.shape)
+    # M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018): even whatever the share, without
+    # the rows and columns that every n-th pixel may fall on
+    kept = (0.7548776662466927 * x + 0.5698402909980532 * y) % 1.0 < share
+    bright = np.flatnonzero(mask)[np.argsort(value[mask])[-BRIGHTEST:]]
+    kept.reshape(-1)[bright] = True
+    return np.where(kept & mask, grid, 0)
 
 
 def _finer(grid: NDArray[np.int64]) -> NDArray[np.int64]:

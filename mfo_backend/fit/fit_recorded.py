@@ -23,9 +23,9 @@ from .fit_material import FitOutcome
 from .kept_values import keep_values
 from .perceptual_stages import perceptual_ends
 from .picture_judge import NOISY, PictureJudge
-from .problem import Problem
+from .problem import End, Problem
 from .recorded_plan import RecordedPlan
-from .recorded_stages import End, MakeResidual, MakeWeighted, RecordedFit
+from .recorded_stages import MakeResidual, MakeWeighted, RecordedFit
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .unneeded_lobes import box_holding
@@ -36,8 +36,6 @@ from .weak_combinations import weak_combinations
 STAGES = ("scan", "start", "refine")
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
-# Root mean square residual, relative, below which no eye sees what is left; renderers differ by as much
-NOTHING_LEFT = 0.002
 
 
 def fit_recorded(
@@ -120,7 +118,7 @@ def fit_recorded(
         optional = finishing and settings.losses is None and linear
         # under lights with extent residuals are in deviations of the noise
         left = np.inf if scene.needs.sampled else float(np.sqrt(2.0 * refined.all.equations(kept.x).cost))
-        nothing_left = optional and left < NOTHING_LEFT
+        nothing_left = optional and left < plan.seen_rms
         at_noise = optional and not nothing_left and fit.misfit(kept.x) < AT_NOISE
         noise = fit.noise.level if fit.noise else 0.0
         if nothing_left:
@@ -140,7 +138,7 @@ def fit_recorded(
             ends += perceptual_ends(fit, refined.all, kept.x, tried, finishing, judge, settings, notes)
         if fit.fireflies:
             notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
-        if fit.recordings > 1:
+        if scene.needs.sampled and fit.recordings > 1:
             notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
         if counts is None:
             counts = _misfit(fit, refined.all, _censored(log_residual, reference, view))

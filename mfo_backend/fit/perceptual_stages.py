@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .picture_judge import PictureJudge
-from .problem import Problem
-from .recorded_stages import End, MakeResidual, RecordedFit, Vector
+from .problem import End, Problem
+from .recorded_stages import MakeResidual, RecordedFit, Vector
 from .settings import FitSettings
 
 BASIN = 0.1  # of the box: solutions nearer than this in every value are one
@@ -32,12 +32,13 @@ def perceptual_ends(
     Losses that the settings name are a ladder, each from the end of the one before; a preset's own are alternatives.
     """
     flip = settings.preset == "best"
+    fit.record_whole(start)
     starts = [start]
     for basin in basins:
         starts.append(fit.solve_within(problem, np.clip(basin, *fit.box), *fit.box))
     ends = [End("refine", x) for x in starts[1:]]
     for name, make in residuals.items():
-        polished = fit.polish(name, problem.groups, make, starts)
+        polished = fit.polish(name, problem, make, starts)
         if polished is None:
             notes.append(f"The stage {name!r} met numbers that are not finite and was left out.")
         else:

@@ -49,6 +49,11 @@ class Problem:
             np.sqrt(np.mean(np.square(two.half_difference[:, :, 0] / (radiance + 0.1 * radiance.mean() + 1e-12))))
         )
 
+    def change(self, before: Vector, after: Vector) -> float:
+        """Root mean square change of the groups, relative to their radiance and a tenth of its mean."""
+        old, new = (self.evaluate(x)[:, :, 0] for x in (before, after))
+        return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + 0.1 * np.abs(new).mean() + 1e-12)))))
+
     def own_share(self, x: Vector) -> float:
         """Part of the mean square residual at `x` that is the recording's own noise, 0 for one sample of the light."""
         rows, half_difference = rows_of_samples(self.evaluate.samples(x), self.residual)
@@ -61,6 +66,14 @@ class Problem:
     def independent(self) -> float:
         """Number of independent residuals: the channels of a group share most of their noise."""
         return 1.5 * len(self.groups)
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a stage ended."""
+
+    stage: str
+    x: Vector
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..render.recorded_scene import MOST_LANES, RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..types.errors import UnrecordableError
 from ..types.image import Pixels
-from .choose_groups import all_groups, detail_grid, fewer_groups, solution_grid
+from .choose_groups import all_groups, detail_grid, fewer_groups, solution_grid, thinned_grid
 from .course import Course, Stage
 from .finer_grid import finer_grid
 from .fireflies import without_fireflies
@@ -54,14 +54,6 @@ NOT_SEEN = 0.3
 COST_FLOOR = 1e-11  # a relative error of 5e-6 a pixel: below it float32 leaves nothing to gain
 
 
-@dataclass(frozen=True)
-class End:
-    """Where a stage ended."""
-
-    stage: str
-    x: Vector
-
-
 class RecordedFit:
     """The stages of one fit; `reference` is scene-linear, `mask` holds the pixels that see the target.
 
@@ -87,11 +79,11 @@ class RecordedFit:
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
+        self._thinned = False  # whether the present recording leaves pixels out that no stage has needed so far
         # light with extent is noisy: what a start is found on and noise is measured on; elsewhere a highlight may well
         # be a pixel wide
         self.calm, self.fireflies = without_fireflies(reference, mask) if scene.needs.sampled else (reference, 0)
         self.box = self.table.lower, self.table.upper  # of the perceptual stages, which hold what the user keeps
-        course.picture = self.picture
 
     @property
     def complete(self) -> bool:
@@ -100,6 +92,7 @@ class RecordedFit:
 
     def picture(self, x: Vector) -> Pixels:
         """The recorded picture of a vector, linear; the reference where nothing is recorded."""
+        self.record_whole(x)
         return self._shown(self._pixels(x))
 
     def _shown(self, pixels: NDArray[np.float32]) -> Pixels:
@@ -135,8 +128,12 @@ class RecordedFit:
         plan, renderer = self.plan, self.scene.renderer
         sampled = self.scene.needs.sampled
         with self.course.stage("scan") as stage:
-            # where every light is exact, only the pixel's footprint is sampled
-            grid = plan.grid_first if sampled else detail_grid(self.reference, self.mask)
+            grid = plan.grid_first
+            if not sampled:  # only the pixel's footprint is
+                grid = detail_grid(self.reference, self.mask)
+                grid = thinned_grid(grid, self.reference, self.mask, plan.refine_lanes)
+                self._thinned = not (grid[self.mask] > 0).all()
+            self.course.picture = None if self._thinned else self.picture
             enough = SPARE * plan.start_lanes if sampled else MOST_LANES
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False, enough=enough)
             groups = all_groups(self.paths, TILE if sampled else 1)
@@ -236,7 +233,7 @@ class RecordedFit:
         return refined
 
     def _refine_exact(self, stage: Stage, start: Vector, make: MakeResidual) -> Refined:
-        grid = solution_grid(self.reference, self.mask, lambda: self.picture(start))
+        grid = None if self._thinned else solution_grid(self.reference, self.mask, lambda: self.picture(start))
         if grid is not None:
             self._record(start, grid)
         groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
@@ -300,7 +297,7 @@ class RecordedFit:
             few = self._problems(start, make, weigh).few
             x = self._solve(few, start, 12, stage=stage).x
             before, after = few.own_noise(start), few.own_noise(x)
-            moved = self._moved(few, start, x) > MOVED or after > NOISIER * before
+            moved = few.change(start, x) > MOVED or after > NOISIER * before
             finest = partial(self.scene.finest_grid, SAMPLES)
             finer = finer_grid(grid, after, few.own_share(x), self.plan, finest)
             if not (moved or finer > grid) or self.recordings == most or self.course.should_stop():
@@ -308,13 +305,20 @@ class RecordedFit:
             del few  # and with it the recording
             start, grid = x, finer
 
-    def _record(self, x: Vector, grid: int | NDArray[np.int64]) -> None:
-        """Replace the recording by one near `x`; the old one is let go first, for they are what needs the memory."""
+    def _record(self, x: Vector, grid: int | NDArray[np.int64], *, near: bool = True) -> None:
+        """Replace the recording by one of `x`; the old one is let go first, for they are what needs the memory."""
         del self.paths
         self._groups, self._tiles, self._pictures = {}, {}, None
         self.recordings += 1
         seed = self.seed + self.recordings
-        self.paths = self.scene.record(x, grid=grid, seed=seed, near=True, samples=SAMPLES)
+        self.paths = self.scene.record(x, grid=grid, seed=seed, near=near, samples=SAMPLES)
+
+    def record_whole(self, x: Vector) -> None:
+        """Record the pixels, too, that the stages until here have left out."""
+        if self._thinned:
+            self._thinned = False
+            self._record(x, detail_grid(self.reference, self.mask), near=False)  # few groups look at it closely
+            self.course.picture = self.picture
 
     def _problems(
         self, x: Vector, make: MakeResidual, weigh: MakeWeighted | None, *, solve_all: bool = False
@@ -349,6 +353,7 @@ class RecordedFit:
 
     def misfit(self, x: Vector) -> float:
         """Root mean square difference of the recorded tiles from the reference, in standard deviations of the noise."""
+        self.record_whole(x)
         groups, pixels = self.tiles(TILE), self._pixels(x)
         self.noise = tile_noise(self.calm, pixels, self.paths, groups, self.paths.interior, TILE)
         problem = self.problem(groups, self._weighing(self.noise, groups))
@@ -361,15 +366,10 @@ class RecordedFit:
         weight = (1.0 / np.hypot(noise.deviation, max(least, 1e-12))).astype(np.float32)
         return lambda target: weigh(target, weight)
 
-    def _moved(self, problem: Problem, before: Vector, after: Vector) -> float:
-        """Root mean square change of the groups relative to their radiance and a tenth of its mean."""
-        old, new = (problem.evaluate(x)[:, :, 0] for x in (before, after))
-        return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + 0.1 * np.abs(new).mean() + 1e-12)))))
-
-    def polish(self, name: str, groups: LaneGroups, make: MakeResidual, starts: list[Vector]) -> list[Vector] | None:
-        """A stage with another residual on the same recording, from each start; None without finite numbers."""
+    def polish(self, name: str, problem: Problem, make: MakeResidual, starts: list[Vector]) -> list[Vector] | None:
+        """A stage with another residual of the groups of `problem`, from each start; None without finite numbers."""
         with self.course.stage(name) as stage:
-            problem = Problem(self._evaluator(groups), make(groups.average(self.reference)), groups, near=starts[0])
+            problem = replace(problem, residual=make(problem.groups.average(self.reference)), near=starts[0])
             found = [self._solve(problem, start, 25, stage=stage, box=self.box) for start in starts]
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x
         finite = [solution.x for solution in found if np.isfinite(solution.equations.cost)]

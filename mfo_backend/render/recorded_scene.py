@@ -208,7 +208,7 @@ class RecordedScene:
         It remembers two: solutions are compared in pairs.
         """
         constant = groups.average(paths.constant)
-        lanes, cost = Lanes.as_recorded(paths, groups, self._held), _share(groups, paths)
+        lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.passes += cost
@@ -226,7 +226,7 @@ class RecordedScene:
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         # 1 + 0.2 K: of Dr.Jit's own forward mode, 564 operations for a value of Mitsuba's principled and 2098 with 14
         # derivatives; dual numbers take less, and a pass stays what it was
-        cost = _share(groups, paths) * (1.0 + 0.2 * self.renderer.table.length)
+        cost = self._share(groups) * (1.0 + 0.2 * self.renderer.table.length)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             samples = self.jacobian(vector, lanes(), groups)
@@ -235,14 +235,13 @@ class RecordedScene:
 
         return RecordedImage(at, recalled)
 
+    def _share(self, groups: LaneGroups) -> float:
+        """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""
+        return len(groups.pixels) / max(self._covered, 1)
+
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
-
-
-def _share(groups: LaneGroups, paths: RecordedPaths) -> float:
-    """The share of the recorded pixels that are in the groups."""
-    return len(groups.pixels) / max(len(paths.pixel), 1)
 
 
 def _rays(squares: NDArray[np.int64], stride: int) -> int:

@@ -290,3 +290,29 @@ def test_what_cannot_be_recorded_is_fitted_by_the_paper_and_says_so(tmp_path):
     assert [stage.name for stage in outcome.result.stages] == ["mse-hdr", "flip-hdr"]
     assert sum(isinstance(e, Started) for e in events) == 1
     assert outcome.result.errors["mse"][1] < outcome.result.errors["mse"][0]
+
+
+@pytest.mark.parametrize("losses", [None, ("mse", "itp")])
+def test_a_large_target_is_fitted_on_some_of_its_pixels(tmp_path, monkeypatch, losses):
+    from mfo_backend.fit import choose_groups, fit_recorded
+    from mfo_backend.fit.recorded_plan import RecordedPlan
+    from mfo_backend.render import recorded_scene
+
+    renderer = load(tmp_path, POINT, size=64)
+    reference = renderer.image(renderer.table.pack(TRUTHS[1]), seed=5, spp=1024)
+    recorded = []
+    original = recorded_scene.record_paths
+    monkeypatch.setattr(
+        recorded_scene, "record_paths", lambda *a, **b: recorded.append(original(*a, **b)) or recorded[-1]
+    )
+    # as for a picture of 256 x 256 pixels: fine recordings are too much, and so are the first one's pixels
+    monkeypatch.setattr(choose_groups, "MOST_FINE_RAYS", 0)
+    monkeypatch.setattr(fit_recorded.RecordedPlan, "of", staticmethod(lambda preset: RecordedPlan(refine_lanes=1500)))
+    outcome, _ = fit(renderer, reference, preset="balanced", losses=losses)
+    found = renderer.table.pack(outcome.result.recovered)
+    np.testing.assert_allclose(found[:4], renderer.table.pack(TRUTHS[1])[:4], atol=0.01)
+    covered = renderer.target_mask().sum()
+    assert len(recorded[0].pixel) < 0.5 * covered
+    # all pixels are recorded where a stage looks at their picture
+    assert [len(paths.pixel) > 0.9 * covered for paths in recorded[1:]] == [True] * (losses is not None)
+    assert not any("recorded" in note for note in outcome.result.notes)
