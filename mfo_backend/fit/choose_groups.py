@@ -40,9 +40,10 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
         return groups
     bright = np.argsort(luminance(groups.average(reference)))[::-1]
     bright = bright[np.cumsum(size[bright]) <= lanes // 3]
+    rest = np.setdiff1d(np.arange(len(groups)), bright)
     # what is left of the budget goes to an even spread; 64 groups are the least that can hold twenty unknowns
-    count = max(int(len(groups) * (lanes - size[bright].sum()) / size.sum()), 64)
-    spread = np.linspace(0, len(groups) - 1, min(count, len(groups))).astype(int)
+    count = max(int(len(rest) * (lanes - size[bright].sum()) / max(size[rest].sum(), 1)), 64)
+    spread = rest[np.linspace(0, len(rest) - 1, min(count, len(rest))).astype(int)]
     return groups.take(np.union1d(spread, bright))
 
 
@@ -54,7 +55,7 @@ FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
 # A recording that leaves pixels out: no more of them than this share; so many of the brightest are in it; and what
 # counts as lit, of the median of the target
-MOST_THINNED, BRIGHTEST, LIT = 0.6, 200, 0.01
+MOST_THINNED, BRIGHTEST, LIT = 0.6, 100, 0.01
 FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
 
 
