@@ -35,7 +35,8 @@ class RecordedPlan:
     scan_lanes, start_lanes
         Recorded lanes the scan and the fits from its nodes look at where light is sampled.
     exact_scan_lanes, exact_start_lanes, refine_lanes
-        Those that they and the last stage look at where every light is exact: without noise more say nothing new.
+        Those that they and the last stage look at where every light is exact: without noise more say nothing new. A
+        large target is recorded on about as many as the last stage looks at.
     starts
         Nodes of the scan to start from, besides the best two metals, the material in the scene and a random one.
     same_cost, agreement_evaluations, exact_agreement_evaluations
@@ -45,8 +46,9 @@ class RecordedPlan:
     trial_evaluations
         After as many only starts within `keep_factor` of the best cost go on.
     seen_rms, solved_rms
-        Root mean squares of the log residual: below the first nothing can be seen, and other starts get their trial
-        only, because a wrong basin may come as near; below the second, about a recording's own, none is tried.
+        Root mean squares of the log residual: below the first nothing can be seen, perceptual stages are left out, and
+        other starts get their trial only, because a wrong basin may come as near; below the second, about a recording's
+        own, none is tried.
     other_evaluations
         Of a solve that tries to leave a basin where every light is exact.
     basins, basin_factor
