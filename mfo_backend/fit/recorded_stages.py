@@ -84,6 +84,7 @@ class RecordedFit:
         # be a pixel wide
         self.calm, self.fireflies = without_fireflies(reference, mask) if scene.needs.sampled else (reference, 0)
         self.box = self.table.lower, self.table.upper  # of the perceptual stages, which hold what the user keeps
+        course.picture = self.picture
 
     @property
     def complete(self) -> bool:
@@ -133,7 +134,8 @@ class RecordedFit:
                 grid = detail_grid(self.reference, self.mask)
                 grid = thinned_grid(grid, self.reference, self.mask, plan.refine_lanes)
                 self._thinned = not (grid[self.mask] > 0).all()
-            self.course.picture = None if self._thinned else self.picture
+            if self._thinned:
+                self.course.picture = None
             enough = SPARE * plan.start_lanes if sampled else MOST_LANES
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False, enough=enough)
             groups = all_groups(self.paths, TILE if sampled else 1)

@@ -68,8 +68,7 @@ class PrimaryRays:
 
     Positions follow the film's reconstruction filter (M. Ernst et al., "Filter Importance Sampling", 2006), so every
     ray counts alike and the expected pixel equals the splatted one; a filter's negative parts carry a negative weight.
-    Nothing is kept for each ray: all of it is computed from the cells wherever it is asked for, which takes less time
-    than to read it.
+    Nothing is kept for each ray but its point on a lens: all else is computed from the cells wherever it is asked for.
 
     Parameters
     ----------
@@ -103,11 +102,9 @@ class PrimaryRays:
         self._through = through_filter(sensor.film().rfilter())
         self._on_lens = fresh_sampler(seed, self._count).next_2d() if sensor.needs_aperture_sample() else None
         self._total: mi.Float | None = None  # of a pixel's weights, where a filter gives them signs
-        number = dr.arange(mi.UInt32, self._count)
-        weight = self._own_weight(number)
         if self._through(mi.Point2f(0.5))[1] is not None:
-            self._total = dr.zeros(mi.Float, len(order))
-            dr.scatter_reduce(dr.ReduceOp.Add, self._total, weight, self.position(number))
+            number, self._total = dr.arange(mi.UInt32, self._count), dr.zeros(mi.Float, len(order))
+            dr.scatter_reduce(dr.ReduceOp.Add, self._total, self._own_weight(number), self.position(number))
         dr.eval(self._on_lens, self._total)
 
     def __len__(self) -> int:

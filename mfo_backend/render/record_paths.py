@@ -21,7 +21,7 @@ from ..types.errors import BadInputError
 from ..types.light_paths import LightPaths
 from .even_points import even_points
 from .highlight_cells import Highlights, highlight_cells
-from .lamps.met_lamps import DELTA, SceneLamps
+from .lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from .pixel_cells import PixelCells
 from .primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from .proposal import DefensiveProposal
@@ -134,10 +134,10 @@ def record_paths(
             plugin: Any = shape.bsdf()
             values = plugin.values_at(si, mi.Bool(True))
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
-        sampled = settings.depth > 2 or any(not mi.has_flag(e.flags(), DELTA) for e in scene.emitters())
+        sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si)
-        # exact lights alone look at hits once each: computing them again takes less time than to read them
+        # exact lights alone look at hits once each, and compute them again instead of keeping them
         dr.eval(si if sampled else (), position, filter_weight, held)
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels)
@@ -192,7 +192,7 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
 
 
 def _without_parametrisation(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
-    """Where hits are and how they are turned: all that lights and proposals ask for, in three fifths of the memory."""
+    """Where hits are and how they are turned: all that lights and proposals ask for."""
     bare = dr.zeros(mi.SurfaceInteraction3f, dr.width(si))
     bare.t, bare.time, bare.wavelengths = si.t, si.time, si.wavelengths
     bare.p, bare.n, bare.sh_frame, bare.wi = si.p, si.n, si.sh_frame, si.wi

@@ -39,10 +39,9 @@ MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every s
 # How finely highlights are recorded (`Highlights.share`): 0.3 % and 0.1 % of the picture at roughness 0.05
 SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
 MOST_RAYS = 12_000_000  # of one recording, those that miss the target included
-# About as many bytes as memory rises by for each of them where every light is exact, and where light is sampled; then
-# those that are mapped: Dr.Jit rounds sizes up to powers of two and keeps what is freed by its size
-BYTES_PER_RAY, BYTES_PER_SAMPLED_RAY = 150, 340
-MAPPED_PER_RAY, MAPPED_PER_SAMPLED_RAY = 220, 480
+# About as many bytes as memory rises by for each of them, and those that are mapped, as Dr.Jit rounds sizes up to
+# powers of two and keeps what is freed by its size; where every light is exact, and where light is sampled
+BYTES_PER_RAY_EXACT, BYTES_PER_RAY_SAMPLED = (150, 220), (340, 480)
 BYTES_PER_SAMPLE = 200  # of each further sample of the light
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
 DEEPEST = 16  # path length of a scene without a limit
@@ -183,13 +182,12 @@ class RecordedScene:
             pixels = self._near_target
             while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
                 stride += 1
-        further = (samples - 1) * BYTES_PER_SAMPLE
-        sampled = self.needs.sampled
-        needed = count * ((BYTES_PER_SAMPLED_RAY if sampled else BYTES_PER_RAY) + further)
+        of_a_ray = BYTES_PER_RAY_SAMPLED if self.needs.sampled else BYTES_PER_RAY_EXACT
+        needed, mapped = (count * (size + (samples - 1) * BYTES_PER_SAMPLE) for size in of_a_ray)
         if needed > self._taken:  # Dr.Jit keeps what an earlier recording has freed
             require_memory(
                 needed - self._taken,
-                mapped=count * ((MAPPED_PER_SAMPLED_RAY if sampled else MAPPED_PER_RAY) + further),
+                mapped=mapped,
                 what="Tracing the light of this picture",
                 cure="use a smaller picture or free some",
             )

@@ -311,6 +311,8 @@ def test_a_large_target_is_fitted_on_some_of_its_pixels(tmp_path, monkeypatch, l
     outcome, _ = fit(renderer, reference, preset="balanced", losses=losses)
     found = renderer.table.pack(outcome.result.recovered)
     np.testing.assert_allclose(found[:4], renderer.table.pack(TRUTHS[1])[:4], atol=0.01)
+    for stage in outcome.result.stages[2:]:  # a stage after another recording still has the residuals of its own pixels
+        np.testing.assert_allclose(renderer.table.pack(stage.values)[:4], found[:4], atol=0.01, err_msg=stage.name)
     covered = renderer.target_mask().sum()
     assert len(recorded[0].pixel) < 0.5 * covered
     # all pixels are recorded where a stage looks at their picture
