@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..metrics.loss import Loss
 from ..metrics.tone_mapping import View
@@ -17,21 +18,24 @@ from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
 from .final_result import final_result
+from .picture_errors import picture_errors
 from .settings import FitSettings
 from .stages import Candidate, run_stages
-from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
+from .verification import VERIFY_STREAM, check_reference, counted_pixels, stage_losses
 
 
 @dataclass(frozen=True)
 class FitOutcome:
     """The result of a fit with the pictures of its start and its end, scene-linear and under one seed.
 
+    Both have few samples outside of the pixels that are `counted`, True (height, width): the fit looked at those.
     `result_halves` are two pictures of the end whose random numbers have nothing in common, where there are such.
     """
 
     result: FitResult
     start_image: Pixels = field(repr=False)
     result_image: Pixels = field(repr=False)
+    counted: NDArray[np.bool_] = field(repr=False)
     result_halves: tuple[Pixels, Pixels] | None = field(default=None, repr=False)
 
 
@@ -78,9 +82,10 @@ def fit_material(
         else:
             candidates = verified
     best = _best(candidates, losses[-1])
-    errors = picture_errors(reference, candidates[0].image, candidates[best].image, mask, display)
+    counted = counted_pixels(mask, settings)
+    errors = picture_errors(reference, candidates[0].image, candidates[best].image, mask, counted, display)
     result = final_result(renderer, candidates, best, status=status, stages=stages.reports, errors=errors, began=began)
-    return FitOutcome(result, candidates[0].image, candidates[best].image)
+    return FitOutcome(result, candidates[0].image, candidates[best].image, counted)
 
 
 def _verify(

@@ -22,6 +22,7 @@ from .finishing import finishing_residuals
 from .fit_material import FitOutcome
 from .kept_values import keep_values
 from .perceptual_stages import perceptual_ends
+from .picture_errors import picture_errors
 from .picture_judge import NOISY, PictureJudge
 from .problem import End, Problem
 from .recorded_plan import RecordedPlan
@@ -29,7 +30,7 @@ from .recorded_stages import MakeResidual, MakeWeighted, RecordedFit
 from .residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
 from .settings import FitSettings
 from .unneeded_lobes import box_holding
-from .verification import check_reference, picture_errors
+from .verification import check_reference, counted_pixels
 from .verified_end import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from .weak_combinations import weak_combinations
 
@@ -79,10 +80,11 @@ def fit_recorded(
     light = linear_pixels(reference, view)
     scene = RecordedScene(renderer, int(mask.sum()))  # refuses glass, so it comes first
     # the start's picture is rendered while the kernels of the fit are compiled
+    counted = counted_pixels(mask, settings)
     verification = Verification(
         renderer,
         reference,
-        mask,
+        counted,
         view,
         seed=settings.seed,
         first=FIRST_SAMPLES_EXACT if scene.lights_exact else FIRST_SAMPLES,
@@ -156,13 +158,13 @@ def fit_recorded(
         best,
         status=status,
         stages=course.reports,
-        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
+        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, counted, display),
         began=began,
         certainty=kept.certainty if kept else {},
         notes=notes,
         weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image, pictures[best].halves)
+    return FitOutcome(result, pictures[0].image, pictures[best].image, counted, pictures[best].halves)
 
 
 def best_of(errors: Sequence[float]) -> int:

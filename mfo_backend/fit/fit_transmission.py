@@ -26,6 +26,7 @@ from .fit_material import FitOutcome
 from .fit_recorded import clipped_pixels, linear_pixels
 from .kept_values import VISIBLE, kept_note
 from .linear_pictures import LinearPictures
+from .picture_errors import picture_errors
 from .picture_judge import PictureJudge
 from .polished import CORE, Polished
 from .settings import FitSettings
@@ -33,7 +34,7 @@ from .traced_perception import FLIP, lower_seen_error
 from .transmission_plan import TransmissionPlan
 from .transmission_stages import TransmissionFit
 from .uncertainty import WEAK_BELOW, certainties
-from .verification import VERIFY_STREAM, check_reference, picture_errors, stage_losses
+from .verification import VERIFY_STREAM, check_reference, counted_pixels, stage_losses
 from .verified_end import Verification
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -113,8 +114,9 @@ def fit_transmission(
             end = lower_seen_error(linear, judge, seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in stages)
             nearer = [] if np.array_equal(end, found[0]) else [end]
     stopped = should_stop()
+    counted = counted_pixels(mask, settings)
     verification = Verification(
-        renderer, reference, mask, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
+        renderer, reference, counted, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
     )
     pictures = verification.pictures(verification.begin(renderer.start), [*found, *nearer])
     loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
@@ -146,12 +148,12 @@ def fit_transmission(
         best,
         status=status,
         stages=course.reports,
-        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, display),
+        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, counted, display),
         began=began,
         certainty=certainty,
         notes=notes,
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image, pictures[best].halves)
+    return FitOutcome(result, pictures[0].image, pictures[best].image, counted, pictures[best].halves)
 
 
 def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:

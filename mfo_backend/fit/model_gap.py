@@ -10,6 +10,7 @@ from ..metrics.colour import linear_from_srgb
 from ..metrics.tone_mapping import View
 from ..types.image import Encoding, Image, Pixels
 from ..types.model_gap import ModelGap
+from .region import box_around
 
 BLOCK = 4  # pixels along each side of what is compared
 LEAST_BLOCKS = 32  # fewer say too little
@@ -27,11 +28,12 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
     itself. Noise that is not independent from pixel to pixel, as after denoising, counts as a difference; so does
     anything else that is wider than a pixel. None if the target fills too few blocks.
     """
-    if reference.encoding is Encoding.LINEAR:
-        target, (first, second) = reference.pixels, renders
-    else:  # what a display cannot show is not known of the reference
-        target = linear_from_srgb(reference.pixels)
-        first, second = (view.light(render) for render in renders)
+    near = tuple(slice(s.start // BLOCK * BLOCK, -(-s.stop // BLOCK) * BLOCK) for s in box_around(mask, 0))
+    mask, target = mask[near], reference.pixels[near]
+    first, second = (render[near] for render in renders)
+    if reference.encoding is Encoding.SRGB:  # what a display cannot show is not known of the reference
+        target = linear_from_srgb(target)
+        first, second = view.light(first), view.light(second)
     weight = mask.astype(np.float64)[..., None]
     even = (np.indices(mask.shape).sum(axis=0) % 2 == 0)[..., None]
     full = _block_sums(weight)[..., 0] == BLOCK * BLOCK

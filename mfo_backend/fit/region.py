@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Losses that look at the target alone, whatever lies behind it."""
+"""The part of a picture that a fit looks at, and losses that look at it alone, whatever lies behind it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,16 @@ def fill_outside(
     """
     shown = display(background) if reference.encoding is Encoding.SRGB else background
     return replace(reference, pixels=np.where(mask[..., None], reference.pixels, shown).astype(np.float32))
+
+
+def box_around(mask: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+    """Rows and columns of the least rectangle around the pixels of `mask`, and `margin` more on each side."""
+    rows, columns = (np.flatnonzero(mask.any(axis=1 - axis)) for axis in (0, 1))
+    return _span(rows, margin), _span(columns, margin)
+
+
+def _span(lines: NDArray[np.int64], margin: int) -> slice:
+    return slice(max(int(lines[0]) - margin, 0), int(lines[-1]) + 1 + margin)
 
 
 class MaskedLoss:

@@ -50,21 +50,26 @@ def tile_noise(
     `model` (p, 3) has a row for each pixel of the recording; only pixels in `keep` (p,) are compared. The recording's
     own noise is part of the answer, as it is of the residual.
     """
-    height, width = reference.shape[:2]
-    inside = np.zeros(height * width, bool)
-    inside[paths.pixel[keep]] = True
-    shown = np.zeros((height * width, 3))
-    shown[paths.pixel] = model
-    inside, shown = inside.reshape(height, width, 1), shown.reshape(height, width, 3) * inside.reshape(height, width, 1)
+    width = reference.shape[1]
+    pixels = np.divmod(paths.pixel, width)  # rows and columns
+    step = max(int(np.gcd.reduce(np.concatenate([np.diff(np.unique(n // side)) for n in pixels]))), 1)
+    lines = [_Lines.of(n, side, step) for n in pixels]
+    at = tuple(line.number[n] for line, n in zip(lines, pixels, strict=True))
+    shape = tuple(len(line.index) for line in lines)
+    inside, shown = np.zeros((*shape, 1), bool), np.zeros((*shape, 3))
+    inside[at] = keep[:, None]
+    shown[at] = model * keep[:, None]
+    rows, columns = (np.minimum(line.index, n - 1) for line, n in zip(lines, reference.shape[:2], strict=True))
+    reference = np.where(inside, reference[np.ix_(rows, columns)], np.float32(0.0))
     level = _tiles(shown, side) / np.maximum(_tiles(inside, side), 1) + DARK * max(
         float(reference[inside[..., 0]].mean()), 1e-12
     )
-    residual = (reference - shown) * inside / np.repeat(np.repeat(level, side, 0), side, 1)[:height, :width]
+    residual = (reference - shown) / np.repeat(np.repeat(level, side, 0), side, 1)
 
-    squares, pairs = np.zeros_like(residual), np.zeros((height, width, 1))
+    squares, pairs = np.zeros_like(residual), np.zeros((*shape, 1))
     for axis in (0, 1):
         here, there = next_to(axis)
-        both = inside[here] & inside[there]
+        both = inside[here] & inside[there] & lines[axis].followed(axis)
         squares[here] += 0.5 * np.square(residual[here] - residual[there]) * both
         pairs[here] += both
     squares, pairs = _tiles(squares, side), _tiles(pairs, side)
@@ -72,22 +77,43 @@ def tile_noise(
     if not counted.any():
         return TileNoise(np.ones((len(groups), 3)), 0.0)
     typical = SKEW * np.median(squares[counted] / pairs[counted], axis=0)  # which one firefly cannot move
-    reach = REACH // side
+    reach = REACH // (side * step)
     variance = (_around(squares, reach) + PRIOR_PAIRS * typical) / (_around(pairs, reach) + PRIOR_PAIRS)
 
-    row, column = np.divmod(groups.pixels[groups.first[:-1]], width)
-    at = row // side, column // side
-    deviation = np.sqrt(variance[at] / np.diff(groups.first)[:, None]) * level[at]
+    first = np.divmod(groups.pixels[groups.first[:-1]], width)
+    tile = tuple(line.number[index] // side for line, index in zip(lines, first, strict=True))
+    deviation = np.sqrt(variance[tile] / np.diff(groups.first)[:, None]) * level[tile]
     return TileNoise(deviation, float(np.sqrt(np.mean(variance[counted]))))
 
 
+@dataclass(frozen=True)
+class _Lines:
+    """Rows, or columns, of the tiles that a recording has: of every tile, or of every second, third, ... one.
+
+    `index` holds their numbers in the picture, `number` the way back.
+    """
+
+    index: NDArray[np.int64]
+    number: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, lines: NDArray[np.int64], side: int, step: int) -> _Lines:
+        """Those of every `step`-th tile between the first and the last of recorded pixels in these lines."""
+        tiles = np.arange(lines.min() // side, lines.max() // side + 1, step)
+        index = (tiles[:, None] * side + np.arange(side)).ravel()
+        number = np.zeros(index[-1] + 1, np.int64)
+        number[index] = np.arange(len(index))
+        return cls(index, number)
+
+    def followed(self, axis: int) -> NDArray[np.bool_]:
+        """Whether the next line is the next one of the picture, too; for arrays that have the lines along `axis`."""
+        return np.expand_dims(np.diff(self.index) == 1, tuple(a for a in range(3) if a != axis))
+
+
 def _tiles(pixels: NDArray, side: int) -> NDArray[np.float64]:
-    """Sums over tiles of an image (height, width, channels)."""
+    """Sums over tiles of an image (height, width, channels) of whole ones."""
     height, width, channels = pixels.shape
-    rows, columns = -(-height // side), -(-width // side)
-    padded = np.zeros((rows * side, columns * side, channels))
-    padded[:height, :width] = pixels
-    return padded.reshape(rows, side, columns, side, channels).sum((1, 3))
+    return pixels.reshape(height // side, side, width // side, side, channels).sum((1, 3), dtype=np.float64)
 
 
 def _around(tiles: NDArray, reach: int) -> NDArray[np.float64]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every preset checks before a fit and measures after it."""
+"""What every preset checks before a fit, and what it looks at."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..metrics.loss import Loss, make_loss
 from ..metrics.tone_mapping import DisplayView, View
 from ..types.errors import BadInputError
-from ..types.image import Encoding, Image, Pixels
+from ..types.image import Image, Pixels
 from .region import MaskedLoss, fill_outside
 from .settings import FitSettings
 
@@ -47,16 +47,6 @@ def stage_losses(
     return [MaskedLoss(make_loss(name, shown, mask=mask, display=display), background, mask) for name in names]
 
 
-def picture_errors(
-    reference: Image, start: Pixels, result: Pixels, mask: NDArray[np.bool_], display: View | None
-) -> dict[str, tuple[float, float]]:
-    """Mean differences of the whole pictures, [start, result]; HDR-FLIP only for a linear reference."""
-    linear = reference.encoding is Encoding.LINEAR
-    names = {"flip": "flip-ldr", "mse": "mse-hdr" if linear else "mse-ldr"} | (
-        {"hdr_flip": "flip-hdr"} if linear else {}
-    )
-    errors = {}
-    for key, name in names.items():
-        loss = make_loss(name, reference, mask=mask, display=display)
-        errors[key] = (loss.value(start), loss.value(result))
-    return errors
+def counted_pixels(mask: NDArray[np.bool_], settings: FitSettings) -> NDArray[np.bool_]:
+    """Those of a picture that the settings' region holds, of which `mask` sees the target."""
+    return np.ones_like(mask) if settings.region == "image" else mask

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..metrics.tone_mapping import View
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Vector
+from ..render.widened_mask import widened
 from ..types.image import Encoding, Image, Pixels
 from .stages import Candidate
 from .verification import VERIFY_STREAM
@@ -25,6 +26,10 @@ FIRST_SAMPLES_EXACT = 8  # where every light is exact: for silhouettes and light
 NOISE_SHARE = 0.25
 MOST_EVEN = 4  # samples of a part, stratified in each pixel; more would need another kernel and change little
 UNSEEN = 0.002  # of a display's white, half a step of 8 bits
+# Paths of one picture: of a whole one, most of which may be background, and further ones where it is looked at. About
+# half a second and two on two processors; a picture of 256 x 256 stays below both
+MOST_WHOLE, MOST_FURTHER = 1 << 21, 1 << 23
+BLURRED = 4  # pixels: what lies further away from a pixel hardly changes its FLIP
 PATHS_OF_A_PART = 1 << 19  # after twice as many, those of both halves, a request to stop is heard
 
 _SECOND_HALF = 0x00A50000
@@ -40,18 +45,18 @@ class VerifiedEnd(Candidate):
 
 @dataclass
 class GrowingPicture:
-    """Two halves of a picture of a vector, and the samples a pixel that each of them has."""
+    """Two halves of a picture of a vector, and the samples that each of them has in a pixel that is looked at."""
 
     vector: Vector
     halves: list[Pixels]
     samples: int
 
-    def add(self, halves: Sequence[Pixels], samples: int) -> None:
-        """Take in further halves of as many samples."""
+    def add(self, pixels: NDArray[np.int64], halves: Sequence[NDArray[np.float32]], samples: int) -> None:
+        """Take in further samples, as many of each half, of some pixels by their flat indices."""
         share = np.float32(samples / (self.samples + samples))
         for half, more in zip(self.halves, halves, strict=True):
-            half *= 1 - share
-            half += share * more
+            flat = half.reshape(-1, 3)
+            flat[pixels] += share * (more - flat[pixels])
         self.samples += samples
 
     def end(self) -> VerifiedEnd:
@@ -62,6 +67,8 @@ class GrowingPicture:
 
 class Verification:
     """Renders the ends of one fit; all of them see the same random numbers.
+
+    A picture begins whole and goes on where it is looked at: where `mask` is True, and next to that.
 
     Parameters
     ----------
@@ -86,16 +93,22 @@ class Verification:
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         self._renderer, self._mask, self._view, self._should_stop = renderer, mask, view, should_stop
-        self._seed, self._first, self._most = seed ^ VERIFY_STREAM, first // 2, max(most // 2, 1)
         linear = reference.encoding is Encoding.LINEAR
         self._reference = view.display(np.maximum(reference.pixels, 0.0)) if linear else reference.pixels
-        self._part = min(max(PATHS_OF_A_PART // mask.size, 1), MOST_EVEN)
+        self._seed = seed ^ VERIFY_STREAM
+        self._whole, self._looked_at = np.arange(mask.size), np.flatnonzero(widened(mask, BLURRED))
+        # of one half, as all counts of samples from here on
+        self._most = max(most // 2, 1)
+        self._first = min(first // 2, self._most)
+        self._begun = _power(min(MOST_WHOLE // (2 * mask.size), self._first, MOST_EVEN))
+        most_here = self._begun + MOST_FURTHER // (2 * len(self._looked_at))
+        self._most_here = self._most if self._most <= most_here else _power(most_here)
 
     def begin(self, vector: Vector) -> Callable[[], GrowingPicture]:
         """Start the first samples of a picture; returns what waits for it."""
-        samples = self._samples_of_a_part(min(self._first, self._most))
-        halves = self._halves_later(vector, 0, samples)
-        return lambda: GrowingPicture(vector, halves(), samples)
+        shape = self._reference.shape
+        later = self._halves_later(vector, self._whole, 0, self._begun)
+        return lambda: GrowingPicture(vector, [half.reshape(shape) for half in later()], self._begun)
 
     def pictures(self, start: Callable[[], GrowingPicture], ends: Sequence[Vector]) -> list[VerifiedEnd]:
         """The pictures of the start, which has begun, and of the fit's ends.
@@ -111,17 +124,17 @@ class Verification:
     def _grow(self, pictures: list[GrowingPicture], wanted: int) -> None:
         """Double the samples of all pictures, at least `wanted`, until they say enough."""
         while pictures:
-            self._add(pictures, min(wanted, self._most))
-            if pictures[0].samples < min(wanted, self._most):
+            self._add(pictures, min(wanted, self._most_here))
+            if pictures[0].samples < min(wanted, self._most_here):
                 return  # as was requested
-            if wanted >= self._most or not any(self._is_noisy(*picture.halves) for picture in pictures):
+            if wanted >= self._most_here or not any(self._is_noisy(*picture.halves) for picture in pictures):
                 return
             wanted *= 2
 
     def _add(self, pictures: list[GrowingPicture], wanted: int) -> None:
         """Render parts until all pictures have so many samples; the next one is traced while one is computed."""
         begun: deque[Callable[[], None]] = deque()
-        ahead = 1 if self._mask.size <= PATHS_OF_A_PART else 0  # two parts of a huge picture are twice the memory
+        ahead = 1 if len(self._looked_at) <= PATHS_OF_A_PART else 0  # two parts of a huge picture are twice the memory
         after = pictures[0].samples
         while after < wanted and not self._should_stop():
             samples = self._samples_of_a_part(wanted - after)
@@ -134,8 +147,8 @@ class Verification:
             add()
 
     def _add_later(self, picture: GrowingPicture, after: int, samples: int) -> Callable[[], None]:
-        halves = self._halves_later(picture.vector, after, samples)
-        return lambda: picture.add(halves(), samples)
+        halves = self._halves_later(picture.vector, self._looked_at, after, samples)
+        return lambda: picture.add(self._looked_at, halves(), samples)
 
     def _is_noisy(self, first: Pixels, second: Pixels) -> bool:
         """Whether noise is more than `NOISE_SHARE` of what the mean of two halves and the reference differ by.
@@ -150,13 +163,19 @@ class Verification:
         return bool(noise.mean() > NOISE_SHARE * difference.mean())
 
     def _samples_of_a_part(self, most: int) -> int:
-        """At most so many samples; a power of two, for any other number is another kernel."""
-        return 1 << min(most, self._part).bit_length() - 1
+        return _power(min(most, PATHS_OF_A_PART // len(self._looked_at), MOST_EVEN))
 
-    def _halves_later(self, vector: Vector, after: int, samples: int) -> Callable[[], list[Pixels]]:
+    def _halves_later(
+        self, vector: Vector, pixels: NDArray[np.int64], after: int, samples: int
+    ) -> Callable[[], list[NDArray[np.float32]]]:
         """Start `samples` more samples a pixel of both halves; a whole picture counts as one pass."""
         passes = self._renderer.passes
         seeds = ((half + after * _NEXT_SAMPLE) % 2**32 for half in (self._seed, self._seed ^ _SECOND_HALF))
-        halves = [self._renderer.image_later(vector, seed=seed, spp=samples, even=True) for seed in seeds]
-        self._renderer.passes = passes + samples / self._most
+        halves = [self._renderer.pixels_later(vector, pixels, seed=seed, spp=samples) for seed in seeds]
+        self._renderer.passes = passes + len(pixels) / self._mask.size * samples / self._most
         return lambda: [half() for half in halves]
+
+
+def _power(most: int) -> int:
+    """At most so many samples, at least one; a power of two, for any other number is another kernel."""
+    return 1 << max(most, 1).bit_length() - 1

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..fit.settings import FitSettings
 from ..metrics.tone_mapping import View
 from ..types.event import Listener
@@ -32,11 +35,15 @@ GAP_STREAM = 0x6A500000  # apart from the seeds users choose and from those of t
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them."""
+    """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them.
+
+    Errors are those of the `counted` pixels, True (height, width).
+    """
 
     result: FitResult
     start_image: Pixels
     result_image: Pixels
+    counted: NDArray[np.bool_]
     variant: str = ""
 
 
@@ -116,7 +123,7 @@ def fit_scene(
         result = replace(result, model_gap=gap, notes=(*result.notes, *said))
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    return JobOutcome(result, outcome.start_image, outcome.result_image, variant)
+    return JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant)
 
 
 def _model_gap(

@@ -67,6 +67,11 @@ class JobFolder:
         return self.root / "pictures"
 
     @property
+    def counted(self) -> Path:
+        """White where the errors of the result are taken."""
+        return self.pictures / "counted.png"
+
+    @property
     def report(self) -> Path:
         """The report for a browser."""
         return self.root / "index.html"

@@ -10,7 +10,7 @@ from ..metrics.tone_mapping import View
 from ..report.curve_picture import curve_png
 from ..report.difference_map import magma
 from ..report.html_report import ReportContent, report_html
-from ..report.picture import displayed, displayed_linear, png_bytes
+from ..report.picture import displayed, displayed_linear, mask_png, png_bytes
 from ..scene.image_file import write_exr
 from ..types.image import Encoding, Image
 from .atomic_file import write_atomically
@@ -50,6 +50,7 @@ def write_outputs(
     curve = curve_png(outcome.result.stages)
     if curve is not None:
         write_atomically(folder.pictures / "curve.png", curve)
+    write_atomically(folder.counted, mask_png(outcome.counted))
     write_exr(folder.pictures / "result.exr", outcome.result_image)
     report = ReportContent(
         title=_title(request),
@@ -66,9 +67,9 @@ def write_outputs(
 
 
 def bytes_needed(request: Request) -> int:
-    """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, and one EXR."""
+    """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, a mask and one EXR."""
     pixels = request.width * request.height
-    return 2**20 + pixels * (4 * 3 * 3 + 12)
+    return 2**20 + pixels * (4 * 3 * 3 + 1 + 12)
 
 
 def _title(request: Request) -> str:

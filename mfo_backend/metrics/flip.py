@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .colour import linear_from_srgb
 from .flip_filters import DEFAULT_PIXELS_PER_DEGREE
-from .flip_reference import FlipReference
+from .flip_reference import FlipReference, comparisons
 from .pixel_check import check_pair
 
 Array = NDArray[np.floating]
@@ -38,4 +38,5 @@ def flip_map(reference: Array, test: Array, *, pixels_per_degree: float = DEFAUL
     check_pair(reference, test)
     shown = (np.clip(image.astype(np.float64), 0, 1) for image in (reference, test))
     light = [planes_of(linear_from_srgb(image)) for image in shown]
-    return FlipReference(light[0], pixels_per_degree).compare(light[1]).error.astype(np.float32)
+    comparison = next(comparisons([FlipReference(light[0], pixels_per_degree)], light[1]))
+    return comparison.error.astype(np.float32)

@@ -8,7 +8,7 @@ import gc
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -23,6 +23,9 @@ from .plugins import check_plugins
 from .prepared_material import Materials, PreparedMaterial
 from .renderer import Pullback, Vector
 from .variant import load_variant
+
+if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
+    from .pixel_pictures import PixelPictures
 
 _MASK_RAYS = 4  # rays per pixel and axis that look for the target
 
@@ -51,34 +54,50 @@ class MitsubaRenderer:
         self._keys = _keys_of(list(self._params.keys()), material)
         self._params.keep(list(self._keys.values()))
         self._mask: NDArray[np.bool_] | None = None
+        self._of_pixels: PixelPictures | None = None
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`. A pixel that Mitsuba leaves non-finite is black."""
-        return self.image_later(vector, seed=seed, spp=spp)()
-
-    def image_later(self, vector: Vector, *, seed: int, spp: int, even: bool = False) -> Callable[[], Pixels]:
-        """Start to render `image` and return what waits for it: other kernels can be compiled meanwhile.
-
-        `even` samples are stratified, for `spp` of 1, 2, 4, 8 or a square; no pull-back follows their paths.
-        Memory holds one part of a picture at a time, so one of several parts is rendered when it is waited for.
-        """
-        from .ordered_picture import parts_of, start_part
+        from .ordered_picture import parts_of, render_part
 
         width, height = (int(n) for n in self._sensor.film().crop_size())
-        parts = list(parts_of(width * height, seed, spp, even=even))
         self._update(vector, differentiable=False)
         self.passes += 1.0
-        first = start_part(self._of_pictures, self._scene, self._sensor, parts[0])
+        pixels = np.zeros((height, width, 3), np.float32)
+        for part in parts_of(width * height, seed, spp):
+            pixels += np.float32(part.share) * render_part(self._of_pictures, self._scene, self._sensor, part)
+        pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
+        return pixels
 
-        def wait() -> Pixels:
-            total = parts[0].share * first()
-            if len(parts) > 1:
-                self._update(vector, differentiable=False)  # other values may have been shown since
-            for part in parts[1:]:
-                total += part.share * start_part(self._of_pictures, self._scene, self._sensor, part)()
-            pixels = total.astype(np.float32)
-            pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
-            return pixels
+    def pixels_later(
+        self, vector: Vector, pixels: NDArray[np.int64], *, seed: int, spp: int
+    ) -> Callable[[], NDArray[np.float32]]:
+        """Start to render some pixels, by their flat indices, and return what waits for them: (pixels, 3).
+
+        Other kernels can be compiled meanwhile. See `PixelPictures` for what differs from `image`; `spp` is 1, 2, 4, 8
+        or a square. All pixels are one pass.
+        """
+        from .pixel_pictures import Piece, PixelPictures, pieces_of
+
+        if self._of_pixels is None:
+            self._of_pixels = PixelPictures(self._of_pictures, self._scene, self._sensor)
+        of_pixels = self._of_pixels
+
+        def start(piece: Piece) -> Callable[[], NDArray[np.float32]]:
+            self._update(vector, differentiable=False)  # other values may have been shown since
+            return of_pixels.start(piece, spp)
+
+        first, *others = pieces_of(pixels, seed, spp)
+        begun = start(first)
+        self.passes += len(pixels) / float(np.prod(self._sensor.film().crop_size()))
+
+        def wait() -> NDArray[np.float32]:
+            found, running = [], begun
+            for piece in others:
+                following = start(piece)
+                found.append(running())
+                running = following
+            return np.concatenate([*found, running()])
 
         return wait
 

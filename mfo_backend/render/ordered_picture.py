@@ -12,7 +12,7 @@ pictures differ by 1e-7 from run to run. Here every pixel collects the samples i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,23 +26,19 @@ _NEXT_SEED = 0x9E3779B9
 
 @dataclass(frozen=True)
 class Part:
-    """Some of a picture's samples: their seed, their number for each pixel, their share of all.
-
-    `even` ones are stratified in each pixel (correlated multi-jittered sampling, Kensler 2013) and not independent.
-    """
+    """Some of a picture's samples: their seed, their number for each pixel, their share of all."""
 
     seed: int
     spp: int
     share: float
-    even: bool = False
 
 
-def parts_of(pixels: int, seed: int, spp: int, *, even: bool = False) -> Iterator[Part]:
+def parts_of(pixels: int, seed: int, spp: int) -> Iterator[Part]:
     """The samples of a picture in parts that memory can hold; a picture of one part has the seed itself."""
     most = max(1, MOST_SAMPLES // pixels)
     for index, done in enumerate(range(0, spp, most)):
         count = min(most, spp - done)
-        yield Part((seed + index * _NEXT_SEED) % 2**32, count, count / spp, even)
+        yield Part((seed + index * _NEXT_SEED) % 2**32, count, count / spp)
 
 
 def opaque(seed: int) -> mi.UInt32:
@@ -50,31 +46,18 @@ def opaque(seed: int) -> mi.UInt32:
     return dr.opaque(mi.UInt32, seed)
 
 
-def _even_sampler(sensor: mi.Sensor, part: Part) -> mi.Sampler:
-    sampler = mi.load_dict({"type": "multijitter", "sample_count": part.spp})
-    if sampler.sample_count() != part.spp:
-        raise ValueError(f"{part.spp} even samples a pixel fill no grid: give 1, 2, 4, 8 or a square.")
-    sampler.set_samples_per_wavefront(part.spp)
-    sampler.seed(opaque(part.seed), int(dr.prod(sensor.film().crop_size())) * part.spp)
-    return sampler
+def render_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> np.ndarray:
+    """Scene-linear (height, width, 3) by an integrator with Python's `sample` (`prb`, `cycles_path`, `direct_light`).
 
-
-def start_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
-    """Start to render a part by an integrator with Python's `sample` (`prb`, `cycles_path`, `direct_light`).
-
-    Returns what waits for it and gives scene-linear (height, width, 3). The estimate is that of Mitsuba's film: samples
-    weighted by the filter, over the sum of the weights. Pixels without a sample in reach are 0; values that are not
-    finite stay so.
+    The estimate is that of Mitsuba's film: samples weighted by the filter, over the sum of the weights. Pixels without
+    a sample in reach are 0; values that are not finite stay so.
     """
     with dr.suspend_grad():
-        return _start(integrator, scene, sensor, part)
+        return _render(integrator, scene, sensor, part)
 
 
-def _start(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> Callable[[], np.ndarray]:
-    if part.even:
-        sampler, spp = _even_sampler(sensor, part), part.spp
-    else:
-        sampler, spp = integrator.prepare(sensor, opaque(part.seed), part.spp, [])
+def _render(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> np.ndarray:
+    sampler, spp = integrator.prepare(sensor, opaque(part.seed), part.spp, [])
     ray, weight, position = integrator.sample_rays(scene, sensor, sampler)
     light, *_ = integrator.sample(
         mode=dr.ADMode.Primal, scene=scene, sampler=sampler, ray=ray, depth=mi.UInt32(0), δL=None, δaovs=None,
@@ -117,5 +100,4 @@ def _start(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> C
     state = (dr.maximum(y, reach) - reach, mi.Color3f(0.0), mi.Float(0.0))
     _, color, total = dr.while_loop(state, lambda row, *_: row <= bottom, of_row, label="rows in reach")
     color = dr.select(total == 0.0, 0.0, color / total)
-    dr.eval(color)
-    return lambda: np.stack([color[k].numpy() for k in range(3)], axis=-1).reshape(height, width, 3)
+    return np.stack([color[k].numpy() for k in range(3)], axis=-1).reshape(height, width, 3)

@@ -41,17 +41,6 @@ def quarter(pixel: NDArray[np.int64], width: int) -> NDArray[np.int64]:
     return 2 * (row % TILE // half) + column % TILE // half
 
 
-def widened(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
-    """`mask` (height, width) with every pixel that is at most `pixels` away along each axis.
-
-    As SciPy's `binary_dilation`, whose package takes a tenth of a second to import.
-    """
-    for axis, size in enumerate(mask.shape):
-        padded = np.pad(mask, [(pixels, pixels) if a == axis else (0, 0) for a in (0, 1)])
-        mask = np.logical_or.reduce([padded.take(range(k, k + size), axis) for k in range(2 * pixels + 1)])
-    return mask
-
-
 def fresh_sampler(seed: int, width: int) -> mi.Sampler:
     """Independent random numbers; the seed is data, so that another seed needs no other kernel."""
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
@@ -121,18 +110,10 @@ class PrimaryRays:
 
     def ray(self, number: mi.UInt32) -> mi.Ray3f:
         """The rays of these numbers."""
-        film = self._sensor.film()
-        width = int(film.crop_size()[0])
-        flat = dr.gather(mi.UInt32, self._flat, self.position(number))
-        y = flat // width
-        x = flat - y * width
         offset, _ = self._offset(number)
-        crop = film.crop_offset()
-        on_film = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
-        on_film /= mi.Point2f(mi.ScalarVector2f(film.size()))
         on_lens = mi.Point2f(0.5) if self._on_lens is None else dr.gather(mi.Point2f, self._on_lens, number)
-        ray, _ = self._sensor.sample_ray(0.5 * self._sensor.shutter_open_time(), 0.5, on_film, on_lens)
-        return ray
+        flat = dr.gather(mi.UInt32, self._flat, self.position(number))
+        return camera_ray(self._sensor, flat, offset, on_lens)
 
     def _own_weight(self, number: mi.UInt32) -> mi.Float:
         side = dr.gather(mi.Float, self._side, number // self._each)
@@ -152,16 +133,30 @@ class PrimaryRays:
         return self._through(corner + side * point)
 
 
+def camera_ray(sensor: mi.Sensor, pixel: mi.UInt32, offset: mi.Point2f, on_lens: mi.Point2f) -> mi.Ray3f:
+    """Rays through positions `offset` pixels away from the centres of pixels, by their flat indices."""
+    film = sensor.film()
+    width = dr.opaque(mi.UInt32, int(film.crop_size()[0]))  # no part of the kernel
+    y = pixel // width
+    x = pixel - y * width
+    crop = film.crop_offset()
+    on_film = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
+    on_film /= dr.opaque(mi.Point2f, tuple(int(n) for n in film.size()))
+    ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, on_film, on_lens)
+    return ray
+
+
 def through_filter(
     rfilter: mi.ReconstructionFilter,
 ) -> Callable[[mi.Point2f], tuple[mi.Point2f, mi.Float | None]]:
     """What makes of points in the unit square offsets from the pixel centre with density |filter|, and the filter's
-    sign where it has one."""
+    sign there over the mean of its signs, None for a filter without negative parts."""
     if rfilter.is_box_filter():
         return lambda u: (u - 0.5, None)
     edges = np.linspace(-rfilter.radius(), rfilter.radius(), 1025, dtype=np.float32)
     value = np.array(rfilter.eval(own_memory(0.5 * (edges[1:] + edges[:-1]), mi.Float)))
     cumulative = np.concatenate([[0.0], np.cumsum(np.abs(value))])
+    mean = 1.0 if (value >= 0.0).all() else float(value.sum() / cumulative[-1])  # of the signs along an axis
     quantiles = own_memory(np.interp(np.linspace(0, 1, 4097), cumulative / cumulative[-1], edges), mi.Float)
 
     def inverse(t: mi.Float) -> mi.Float:
@@ -171,6 +166,6 @@ def through_filter(
 
     def offset(u: mi.Point2f) -> tuple[mi.Point2f, mi.Float | None]:
         away = mi.Point2f(inverse(u.x), inverse(u.y))
-        return away, None if (value >= 0.0).all() else dr.sign(rfilter.eval(away.x) * rfilter.eval(away.y))
+        return away, None if mean == 1.0 else dr.sign(rfilter.eval(away.x) * rfilter.eval(away.y)) / mean**2
 
     return offset

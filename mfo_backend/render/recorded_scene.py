@@ -25,12 +25,13 @@ from .lamps.met_lamps import lights_have_no_extent
 from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
 from .packed_lanes import LaneReader, Lanes
-from .primary_rays import tile_order, widened
+from .primary_rays import tile_order
 from .proposal import DefensiveProposal
 from .record_paths import RecordSettings, record_paths
 from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths
+from .widened_mask import widened
 
 # Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
 # noise of 64 samples a pixel.

@@ -32,7 +32,7 @@ from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable
 from .lamps.met_lamps import SceneLamps, alone
 from .mitsuba_renderer import MitsubaRenderer
-from .primary_rays import through_filter
+from .primary_rays import camera_ray, through_filter
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
@@ -175,18 +175,8 @@ class TracedPaths:
 
     def _camera(self, pixel: mi.UInt32, rng: PathRandom) -> tuple[mi.Ray3f, mi.Float]:
         sensor = self.renderer.scene.sensors()[0]
-        film = sensor.film()
-        width = int(film.crop_size()[0])
-        y = pixel // width
-        x = pixel - y * width
-        offset, sign = through_filter(film.rfilter())(rng.pair(0))
-        crop = film.crop_offset()
-        position = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
-        position /= mi.Point2f(mi.ScalarVector2f(film.size()))
-        ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, position, rng.pair(1))
-        if sign is None:
-            return ray, mi.Float(1.0)
-        return ray, sign / dr.mean(sign)
+        offset, sign = through_filter(sensor.film().rfilter())(rng.pair(0))
+        return camera_ray(sensor, pixel, offset, rng.pair(1)), mi.Float(1.0) if sign is None else sign
 
     def _trace(self, ray, rng, theta, offset, jacobian) -> list[mi.Color3f]:
         """Radiance along the rays and its derivatives in all directions."""

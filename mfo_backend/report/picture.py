@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..metrics.tone_mapping import View
 from ..types.image import Encoding, Image, Pixels
@@ -25,8 +26,26 @@ def displayed_linear(pixels: Pixels, view: View) -> Pixels:
 
 def png_bytes(display: Pixels) -> bytes:
     """An 8-bit PNG of display values (height, width, 3) in [0, 1]."""
+    return _png(np.rint(np.clip(display, 0.0, 1.0) * 255).astype(np.uint8))
+
+
+def mask_png(mask: NDArray[np.bool_]) -> bytes:
+    """A PNG that is white where `mask` (height, width) is True and black elsewhere."""
+    return _png(np.where(mask, np.uint8(255), np.uint8(0)))
+
+
+def mask_from_png(data: bytes) -> NDArray[np.bool_]:
+    """What `mask_png` was given."""
+    from PIL import Image as Pillow
+
+    with Pillow.open(io.BytesIO(data)) as picture:
+        return np.asarray(picture.convert("L")) > 127
+
+
+def _png(values: NDArray[np.uint8]) -> bytes:
     from PIL import Image as Pillow  # slow to import; only what writes pictures pays for it
 
     file = io.BytesIO()
-    Pillow.fromarray(np.rint(np.clip(display, 0.0, 1.0) * 255).astype(np.uint8), "RGB").save(file, "PNG")
+    # a third of the time of Pillow's 6, and a tenth more space
+    Pillow.fromarray(values).save(file, "PNG", compress_level=2)
     return file.getvalue()

@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.verified_end import (
+    BLURRED,
     FIRST_SAMPLES,
     FIRST_SAMPLES_EXACT,
     MOST_EVEN,
+    MOST_FURTHER,
+    MOST_WHOLE,
     PATHS_OF_A_PART,
-    START_SAMPLES,
     Verification,
 )
 from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.render.widened_mask import widened
 from mfo_backend.types.image import Encoding, Image
 
 SHAPE = (32, 32, 3)
@@ -29,22 +32,22 @@ class Renderer:
     def __init__(self, noise: float = NOISE, shape=SHAPE) -> None:
         self.passes, self.taken, self._noise, self._shape = 0.0, [], noise, shape
 
-    def image_later(self, vector, *, seed, spp, even):
-        assert even
-        self.taken.append((float(vector[0]), seed, spp))
+    def pixels_later(self, vector, pixels, *, seed, spp):
+        assert len(pixels) * spp <= MOST_WHOLE
+        self.taken.append((float(vector[0]), seed, spp, len(pixels)))
         self.passes += 1.0
-        noise = np.random.default_rng(seed).normal(size=self._shape) * self._noise / np.sqrt(spp)
+        noise = np.random.default_rng(seed).normal(size=(len(pixels), 3)) * self._noise / np.sqrt(spp)
         return lambda: (vector[0] + noise).astype(np.float32)
 
 
-def verification(renderer, reference, most=MOST, shape=SHAPE, **more):
+def verification(renderer, reference, most=MOST, shape=SHAPE, mask=None, **more):
     image = Image(np.broadcast_to(np.float32(reference), shape).astype(np.float32), Encoding.LINEAR)
-    mask = np.ones(shape[:2], bool)
+    mask = np.ones(shape[:2], bool) if mask is None else mask
     return Verification(renderer, image, mask, DisplayView(), seed=7, most=most, **more)
 
 
 def samples_of(renderer, value):
-    return sum(spp for shown, _, spp in renderer.taken if shown == value)
+    return sum(spp for shown, _, spp, _ in renderer.taken if shown == value)
 
 
 def found(renderer, reference, start, ends, **more):
@@ -99,7 +102,7 @@ def test_noise_that_is_not_seen_takes_no_samples():
 def test_samples_are_independent_and_weighted_alike():
     renderer = Renderer()
     end = found(renderer, 0.4, 0.9, [0.4])[1]
-    seeds = [seed for value, seed, _ in renderer.taken if value == 0.4]
+    seeds = [seed for value, seed, *_ in renderer.taken if value == 0.4]
     assert len(set(seeds)) == len(seeds)
     np.testing.assert_allclose(end.image, 0.5 * (end.halves[0] + end.halves[1]), atol=1e-6)
     # 3072 values: the standard deviation of their standard deviation is 1.3 %
@@ -126,9 +129,47 @@ def test_large_pictures_come_in_parts_that_a_stop_is_heard_between():
     side = 1 << 9
     shape = (side, side, 3)
     renderer = Renderer(shape=shape)
-    found(renderer, 0.4, 0.9, [], shape=shape)
-    assert max(side * side * spp for _, _, spp in renderer.taken) <= PATHS_OF_A_PART
-    assert samples_of(renderer, 0.9) == START_SAMPLES
+    found(renderer, 0.4, 0.9, [0.5], shape=shape)
+    parts = [count * spp for value, _, spp, count in renderer.taken if value == 0.5]
+    assert max(parts[:2]) <= MOST_WHOLE // 2
+    assert max(parts[2:]) <= PATHS_OF_A_PART
+    assert samples_of(renderer, 0.9) == FAR
     renderer = Renderer(shape=shape)
     found(renderer, 0.4, 0.9, [0.4], shape=shape, should_stop=lambda: len(renderer.taken) > 6)
     assert len(renderer.taken) == 8  # a part of each half of the start and three of the end
+
+
+def test_only_what_is_looked_at_and_a_few_pixels_around_it_takes_further_samples():
+    mask = np.zeros(SHAPE[:2], bool)
+    mask[10:20, 4:12] = True
+    renderer = Renderer()
+    start, end = found(renderer, 0.4, 0.9, [0.4], mask=mask)
+    counts = [count for value, _, _, count in renderer.taken if value == 0.4]
+    assert counts[:2] == [32 * 32] * 2
+    assert set(counts[2:]) == {(10 + 2 * BLURRED) * (4 + 8 + BLURRED)}  # the picture ends at its left edge
+    further = MOST - FAR
+    assert renderer.passes == pytest.approx((2 * FAR + further * counts[2] / 32**2) / MOST)
+    noise = [np.square(end.image[where] - 0.4).mean() ** 0.5 for where in (mask, ~widened(mask, BLURRED))]
+    # 240 and 2300 values
+    assert noise[0] == pytest.approx(NOISE / np.sqrt(MOST), rel=0.15)
+    assert noise[1] == pytest.approx(NOISE / np.sqrt(FAR), rel=0.06)
+    assert end.image.shape == start.image.shape == SHAPE
+
+
+@pytest.mark.parametrize(
+    ("size", "share", "whole", "most"),
+    [
+        ((256, 256), 1.0, 8, 64),  # as if there were no limits
+        ((1080, 1920), 0.13, 2, 32),
+        ((1080, 1920), 1.0, 2, 4),
+        ((2160, 3840), 0.01, 2, 64),
+    ],
+)
+def test_huge_pictures_have_a_limit_for_all_their_samples(size, share, whole, most):
+    mask = np.zeros(size, bool)
+    mask[: int(size[0] * share)] = True
+    check = verification(Renderer(), 0.4, shape=(*size, 3), mask=mask)
+    assert 2 * check._begun == whole
+    assert 2 * check._most_here == most
+    paths = 2 * (mask.size * check._begun + len(check._looked_at) * (check._most_here - check._begun))
+    assert paths <= max(MOST_WHOLE, 2 * mask.size) + MOST_FURTHER

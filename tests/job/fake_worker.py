@@ -49,7 +49,8 @@ def fake_fit(folder, request, reference, view, *, listener, should_stop):
     best = curve[-1].loss if curve else 0.1
     listener(StageEnd("mse-hdr", status.value, status.sentence, len(curve), 0.1, best))
     stage = StageReport("mse-hdr", status, 0.1, best, len(curve), 0.1, {"roughness": roughness}, tuple(curve))
-    return JobOutcome(fake_result(status, roughness, stage), start, reference.pixels, "fake_variant")
+    counted = np.ones(start.shape[:2], bool)
+    return JobOutcome(fake_result(status, roughness, stage), start, reference.pixels, counted, "fake_variant")
 
 
 def fake_result(status, roughness, *stages):

@@ -97,7 +97,8 @@ def test_a_finished_job_leaves_pictures_report_and_result(start_worker, job: Pat
     assert result["notes"] == ["Light 'Sun' <b>: specular factor is ignored."]
     assert result["partial"] is False
     names = {path.name for path in (job / "pictures").iterdir()}
-    assert names == {"reference.png", "start.png", "result.png", "difference.png", "curve.png", "result.exr"}
+    pictures = ("reference", "start", "result", "difference", "curve", "counted")
+    assert names == {"result.exr", *(f"{name}.png" for name in pictures)}
     assert "Glaze on Vase" in (job / "index.html").read_text("utf-8")
     assert not [path for path in job.rglob("*") if path.suffix == ".tmp"]
 

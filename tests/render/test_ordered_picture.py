@@ -112,26 +112,6 @@ def test_parts_have_samples_of_their_own_and_add_up_to_the_picture(
     assert np.abs(split - exact).mean() < 1.5 * np.abs(whole - exact).mean()
 
 
-@pytest.mark.parametrize("spp", [2, 4, 8, 16])
-def test_even_samples_have_the_same_mean_and_less_noise(tmp_path: Path, spp: int) -> None:
-    renderer = load(tmp_path, "box")
-    exact = renderer.image(renderer.start, seed=99, spp=4096)
-    squares, means = {}, {}
-    for even in (False, True):
-        pictures = [renderer.image_later(renderer.start, seed=k, spp=spp, even=even)() for k in range(64)]
-        squares[even] = np.mean([np.square(picture - exact) for picture in pictures])
-        means[even] = np.mean(pictures)
-    # of 64 spp pictures of 408 pixels three channels share their noise
-    assert means[True] == pytest.approx(exact.mean(), abs=4 * np.sqrt(squares[True] / (64 * 24 * 17)))
-    assert squares[True] < 0.9 * squares[False]
-
-
-def test_a_number_of_samples_that_does_not_fill_a_pixel_evenly_is_refused(tmp_path: Path) -> None:
-    renderer = load(tmp_path, "box")
-    with pytest.raises(ValueError, match="5 even samples"):
-        renderer.image_later(renderer.start, seed=1, spp=5, even=True)
-
-
 def test_the_pullback_follows_the_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from mfo_backend.render import ordered_picture
 

@@ -256,7 +256,7 @@ def test_negative_parts_of_a_pixel_filter_are_in_every_technique(tmp_path):
 def test_a_mask_is_widened_as_by_scipy():
     from scipy.ndimage import binary_dilation
 
-    from mfo_backend.render.primary_rays import widened
+    from mfo_backend.render.widened_mask import widened
 
     mask = np.random.default_rng(3).random((17, 23)) < 0.03
     for reach in (1, 3):

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures at a fraction of their size, where the noise of few samples a pixel does not show."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types.image import Encoding, Image
+from .colour import linear_from_srgb, srgb_from_linear
+
+MOST_COUNTED = 1 << 17  # pixels; what fills more is compared at a fraction of the size
+
+
+def block_side(counted: NDArray[np.bool_]) -> int:
+    """Pixels along each side of the blocks that are one pixel of a comparison, for so many `counted` pixels."""
+    return max(1, math.ceil(math.sqrt(np.count_nonzero(counted) / MOST_COUNTED)))
+
+
+def block_means(image: Image, side: int) -> Image:
+    """The picture from so many times as far away: means of light over blocks, incomplete ones at the edges left out."""
+    if side == 1:
+        return image
+    linear = image.encoding is Encoding.LINEAR
+    light = image.pixels if linear else linear_from_srgb(image.pixels)
+    mean = _blocks(light, side).mean((1, 3), dtype=np.float64).astype(np.float32)
+    return Image(mean if linear else srgb_from_linear(mean), image.encoding)
+
+
+def full_blocks(mask: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
+    """Blocks of which at least half is in the mask, or those that have most of it where there are none."""
+    share = _blocks(mask[..., None], side).mean((1, 3))[..., 0]
+    return share >= min(0.5, float(share.max()))
+
+
+def _blocks(pixels: NDArray, side: int) -> NDArray:
+    height, width = (n // side * side for n in pixels.shape[:2])
+    return pixels[:height, :width].reshape(height // side, side, width // side, side, pixels.shape[2])
