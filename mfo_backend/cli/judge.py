@@ -15,15 +15,12 @@ from ..job.job_folder import JobFolder
 from ..job.job_view import view_of
 from ..job.request import read_request
 from ..job.run_job import read_reference
-from ..metrics.block_means import block_means, block_side, full_blocks
-from ..metrics.compare import Comparison, compare_images
-from ..metrics.flip_error import flip_error, shown
+from ..metrics.block_means import block_side, compared, full_blocks
+from ..metrics.compare import compare_images
 from ..metrics.pixel_check import check_mask, check_pair
-from ..metrics.tone_mapping import View
 from ..report.difference_map import magma
 from ..report.picture import displayed, mask_from_png, png_bytes
 from ..scene.image_file import read_image
-from ..types.image import Encoding, Image
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -49,29 +46,22 @@ def run(arguments: argparse.Namespace) -> int:
     reference, _notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
     picture = read_image(arguments.picture)
-    difference = flip_error(reference, picture, display=view)
-    comparison = _compared_as_the_job_was(folder, reference, picture, view)
+    # at the size and over the pixels of `fit.picture_errors`; the whole picture if there is no result
+    check_pair(reference.pixels, picture.pixels)
+    side, mask = 1, None
+    if folder.counted.is_file():
+        counted = mask_from_png(folder.counted.read_bytes())
+        check_mask(counted, reference.pixels.shape[:2])
+        side = block_side(counted)
+        mask = full_blocks(counted, side)
+    comparison = compare_images(*compared(reference, picture, side, view), mask=mask, display=view)
     folder.pictures.mkdir(exist_ok=True)
     name = Path(arguments.name).name
     write_atomically(folder.pictures / f"{name}.png", png_bytes(displayed(picture, view)))
-    write_atomically(folder.pictures / f"{name}_difference.png", png_bytes(magma(difference.map)))
+    write_atomically(folder.pictures / f"{name}_difference.png", png_bytes(magma(comparison.maps["flip"])))
     if arguments.json:
         print(json.dumps({"status": "ok", "metrics": comparison.metrics, "notes": list(comparison.notes)}))
         return 0
     for metric, value in comparison.metrics.items():
         print(f"{metric:13} {'-' if value is None else f'{value:.6g}':>12}")
     return 0
-
-
-def _compared_as_the_job_was(folder: JobFolder, reference: Image, picture: Image, view: View) -> Comparison:
-    """Over the same pixels and at the same size as `fit.picture_errors`; the whole picture without a result."""
-    if not folder.counted.is_file():
-        return compare_images(reference, picture, display=view)
-    counted = mask_from_png(folder.counted.read_bytes())
-    check_mask(counted, reference.pixels.shape[:2])
-    check_pair(reference.pixels, picture.pixels)
-    side = block_side(counted)
-    if reference.encoding is Encoding.SRGB:
-        picture = Image(shown(picture, view), Encoding.SRGB)
-    reference, picture = (block_means(image, side) for image in (reference, picture))
-    return compare_images(reference, picture, mask=full_blocks(counted, side), display=view)

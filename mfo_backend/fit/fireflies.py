@@ -10,6 +10,7 @@ from ..metrics.colour import luminance
 from ..types.image import Pixels
 
 FACTOR = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
+_AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
 
 def without_fireflies(image: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, int]:
@@ -17,12 +18,15 @@ def without_fireflies(image: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, i
 
     Only for finding a start: the mean of the picture loses what they carry.
     """
-    padded = np.pad(image, ((1, 1), (1, 1), (0, 0)), mode="edge")
     height, width = mask.shape
-    shifts = [(dy, dx) for dy in range(3) for dx in range(3) if (dy, dx) != (1, 1)]
-    around = np.stack([padded[dy : dy + height, dx : dx + width] for dy, dx in shifts])
     level = luminance(image)
-    near = luminance(around).max(0)
+    padded = np.pad(level, 1, mode="edge")
+    near = np.zeros_like(level)
+    for dy, dx in _AROUND:
+        np.maximum(near, padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width], out=near)
     floor = 0.1 * float(level[mask].mean()) if mask.any() else 0.0
-    found = mask & (level > FACTOR * np.maximum(near, floor))
-    return np.where(found[..., None], around.mean(0), image).astype(np.float32), int(found.sum())
+    row, column = np.nonzero(mask & (level > FACTOR * np.maximum(near, floor)))
+    around = [image[np.clip(row + dy, 0, height - 1), np.clip(column + dx, 0, width - 1)] for dy, dx in _AROUND]
+    calm = image.astype(np.float32)
+    calm[row, column] = np.mean(around, axis=0)
+    return calm, len(row)

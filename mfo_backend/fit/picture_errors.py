@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics.block_means import block_means, block_side, full_blocks
+from ..metrics.block_means import block_side, compared, full_blocks
 from ..metrics.exposure_range import lit_exposures
-from ..metrics.flip_error import flip_error, shown
+from ..metrics.flip_error import flip_error
 from ..metrics.flip_filters import DEFAULT_PIXELS_PER_DEGREE, flip_reach
 from ..metrics.hdr_flip import HdrFlip
 from ..metrics.squared_loss import mean_squared_error
@@ -38,14 +38,9 @@ def picture_errors(
     near = box_around(counted, side * flip_reach(DEFAULT_PIXELS_PER_DEGREE))
     chosen = full_blocks(counted[near], side)
 
-    def seen(pixels: Pixels, encoding: Encoding) -> Image:
-        picture = Image(pixels[near], encoding)
-        if not linear and encoding is Encoding.LINEAR:
-            picture = Image(shown(picture, view), Encoding.SRGB)
-        return block_means(picture, side)
-
-    target = seen(reference.pixels, reference.encoding)
-    pictures = [seen(picture, Encoding.LINEAR) for picture in (start, result)]
+    shown = Image(reference.pixels[near], reference.encoding)
+    pairs = [compared(shown, Image(pixels[near], Encoding.LINEAR), side, view) for pixels in (start, result)]
+    target, pictures = pairs[0][0], [picture for _, picture in pairs]
 
     def means(maps: Iterator[NDArray]) -> tuple[float, float]:
         first, second = (float(of_picture[chosen].mean(dtype=np.float64)) for of_picture in maps)

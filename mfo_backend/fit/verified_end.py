@@ -94,7 +94,8 @@ class Verification:
     ) -> None:
         self._renderer, self._mask, self._view, self._should_stop = renderer, mask, view, should_stop
         linear = reference.encoding is Encoding.LINEAR
-        self._reference = view.display(np.maximum(reference.pixels, 0.0)) if linear else reference.pixels
+        masked = reference.pixels[mask]
+        self._reference = view.display(np.maximum(masked, 0.0)) if linear else masked
         self._seed = seed ^ VERIFY_STREAM
         self._whole, self._looked_at = np.arange(mask.size), np.flatnonzero(widened(mask, BLURRED))
         # of one half, as all counts of samples from here on
@@ -106,7 +107,7 @@ class Verification:
 
     def begin(self, vector: Vector) -> Callable[[], GrowingPicture]:
         """Start the first samples of a picture; returns what waits for it."""
-        shape = self._reference.shape
+        shape = (*self._mask.shape, 3)
         later = self._halves_later(vector, self._whole, 0, self._begun)
         return lambda: GrowingPicture(vector, [half.reshape(shape) for half in later()], self._begun)
 
@@ -159,7 +160,7 @@ class Verification:
         noise = np.square(first - second) / 4.0  # of their mean
         if np.median(noise) < UNSEEN**2:
             return False
-        difference = np.square(0.5 * (first + second) - self._reference[self._mask])
+        difference = np.square(0.5 * (first + second) - self._reference)
         return bool(noise.mean() > NOISE_SHARE * difference.mean())
 
     def _samples_of_a_part(self, most: int) -> int:

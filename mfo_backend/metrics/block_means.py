@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..types.image import Encoding, Image
 from .colour import linear_from_srgb, srgb_from_linear
+from .tone_mapping import View
 
 MOST_COUNTED = 1 << 17  # pixels; what fills more is compared at a fraction of the size
 
@@ -27,6 +28,13 @@ def block_means(image: Image, side: int) -> Image:
     light = image.pixels if linear else linear_from_srgb(image.pixels)
     mean = _blocks(light, side).mean((1, 3), dtype=np.float64).astype(np.float32)
     return Image(mean if linear else srgb_from_linear(mean), image.encoding)
+
+
+def compared(reference: Image, picture: Image, side: int, view: View) -> tuple[Image, Image]:
+    """Both pictures from so many times as far away; beside display values a linear one is seen through `view` first."""
+    if reference.encoding is Encoding.SRGB and picture.encoding is Encoding.LINEAR:
+        picture = Image(view.display(picture.pixels), Encoding.SRGB)
+    return block_means(reference, side), block_means(picture, side)
 
 
 def full_blocks(mask: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
