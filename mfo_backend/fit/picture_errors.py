@@ -35,7 +35,8 @@ def picture_errors(
     linear = reference.encoding is Encoding.LINEAR
     view = display or (DisplayView.for_scene(reference.pixels, mask) if linear else DisplayView())
     side = block_side(counted)
-    near = box_around(counted, side * flip_reach(DEFAULT_PIXELS_PER_DEGREE))
+    box = box_around(counted, side * flip_reach(DEFAULT_PIXELS_PER_DEGREE))
+    near = tuple(slice(span.start // side * side, span.stop) for span in box)  # blocks of the whole picture
     chosen = full_blocks(counted[near], side)
 
     shown = Image(reference.pixels[near], reference.encoding)

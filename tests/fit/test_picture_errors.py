@@ -67,3 +67,13 @@ def test_many_pixels_are_compared_at_a_fraction_of_their_size(monkeypatch: pytes
     assert found["mse"][1] == pytest.approx(whole["mse"][1] / 9, rel=0.15)
     assert found["flip"][1] < 0.6 * whole["flip"][1]
     assert found["flip"][0] == pytest.approx(whole["flip"][0], rel=1e-3)
+
+
+def test_blocks_are_those_of_the_whole_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    reference, start, result = pictures()
+    counted = np.roll(MASK, (16, 15), (0, 1))  # whose box begins within a block
+    monkeypatch.setattr(blocks, "MOST_COUNTED", np.count_nonzero(counted) // 4 + 1)
+    found = picture_errors(Image(reference, Encoding.LINEAR), start, result, counted, counted, VIEW)
+    seen = [blocks.block_means(Image(picture, Encoding.LINEAR), 2) for picture in (reference, result)]
+    whole = flip_error(*seen, display=VIEW).map[blocks.full_blocks(counted, 2)].mean()
+    assert found["flip"][1] == pytest.approx(whole, rel=1e-5)
