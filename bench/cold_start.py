@@ -73,13 +73,13 @@ def make_job(name: str, folder: Path, size: int) -> Path:
             ("export", folder / "start.blend", "--object", "Suzanne", "--reference", folder / "reference.exr",
              "--job", folder / "job"),
         ):  # fmt: skip
-            _child(["-m", "blender_addon.headless", *map(str, words)])
+            child(["-m", "blender_addon.headless", *map(str, words)])
         return folder / "job"
     code = (
         "from bench.cold_start import write_bench_job\nfrom pathlib import Path\n"
         f"write_bench_job({scenario!r}, {number}, Path({str(folder)!r}), {size})"
     )
-    _child(["-c", code])
+    child(["-c", code])
     return folder / "job"
 
 
@@ -121,11 +121,11 @@ def measure(name: str, job: Path, repeat: int) -> dict[str, Any]:
         found[state] = {key: sorted(r[key] for r in runs)[len(runs) // 2] for key in ("wall", "cpu")}
         if state == "cold":
             shutil.rmtree(caches / "kernels")
-        found[state]["parts"] = json.loads(_child(inside, caches))
+        found[state]["parts"] = json.loads(child(inside, caches))
         if name == "demo":
             if state == "cold":
                 shutil.rmtree(caches / "kernels")
-            found[state]["Blender"] = json.loads(_child([__file__, "--blender", str(job)], caches))
+            found[state]["Blender"] = json.loads(child([__file__, "--blender", str(job)], caches))
     found["kernels"] = [len(list((caches / "kernels").glob("*.bin")))]
     found["kilobytes"] = sum(path.stat().st_size for path in (caches / "kernels").iterdir()) // 1000
     return found
@@ -156,13 +156,13 @@ def _busy() -> float:
 def _timed(words: list[str], caches: Path) -> dict[str, float]:
     """Wall and CPU seconds of a Python with these arguments."""
     began, busy = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    _child(words, caches)
+    child(words, caches)
     now = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = now.ru_utime + now.ru_stime - busy.ru_utime - busy.ru_stime
     return {"wall": time.monotonic() - began, "cpu": cpu}
 
 
-def _child(words: list[str], caches: Path | None = None) -> str:
+def child(words: list[str], caches: Path | None = None) -> str:
     """The last line of what a Python with these arguments says, with caches of its own."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     if caches is not None:

@@ -20,6 +20,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
+
+from bench.cold_start import child  # noqa: E402
+
 _FRAME = """import bpy, sys
 source, width, height, lens, target = sys.argv[1:]
 bpy.ops.wm.open_mainfile(filepath=source)
@@ -45,7 +48,7 @@ def main() -> None:
                 runs = [run_job(job) for _ in range(1 + chosen.repeat)][1:]
                 said = json.loads((job / "result.json").read_text())
                 share = share_counted(job)
-            seconds, gib = (min(run[k] for run in runs) for k in (0, 1))
+            seconds, gib = min(run[0] for run in runs), max(run[1] for run in runs)
             before, after = said["errors"]["flip"]
             print(
                 f"{frame}, lens {lens}: target {100 * share:.0f} % of the frame; {seconds:.1f} s, {gib:.2f} GiB; "
@@ -59,7 +62,7 @@ def make_job(folder: Path, frame: list[str], lens: str, samples: int) -> Path:
     _blender("demo-scene", folder, "--scene-seed", 1)
     for name in ("truth", "start"):
         blend = str(folder / f"{name}.blend")
-        _python("-c", _FRAME, blend, *frame, lens, blend)
+        child(["-c", _FRAME, blend, *frame, lens, blend])
     reference = folder / "reference.exr"
     _blender("render", folder / "truth.blend", "--out", reference, "--samples", samples)
     words = ("--object", "Suzanne", "--reference", reference, "--job", folder / "job")
@@ -87,13 +90,7 @@ def share_counted(job: Path) -> float:
 
 
 def _blender(*words: object) -> None:
-    _python("-m", "blender_addon.headless", *map(str, words))
-
-
-def _python(*words: str) -> None:
-    done = subprocess.run([sys.executable, *words], cwd=ROOT, text=True, capture_output=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{' '.join(words)[:200]} ended with {done.returncode}:\n{done.stderr[-2000:]}")
+    child(["-m", "blender_addon.headless", *map(str, words)])
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from ..job.job_folder import JobFolder
 from ..job.job_view import view_of
 from ..job.request import read_request
 from ..job.run_job import read_reference
-from ..metrics.block_means import block_side, compared, full_blocks
+from ..metrics.block_means import block_means, block_side, full_blocks, means_beside
 from ..metrics.compare import compare_images
 from ..metrics.pixel_check import check_mask, check_pair
 from ..report.difference_map import magma
@@ -54,7 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_mask(counted, reference.pixels.shape[:2])
         side = block_side(counted)
         mask = full_blocks(counted, side)
-    comparison = compare_images(*compared(reference, picture, side, view), mask=mask, display=view)
+    seen = means_beside(reference.encoding, picture, side, view)
+    comparison = compare_images(block_means(reference, side), seen, mask=mask, display=view)
     folder.pictures.mkdir(exist_ok=True)
     name = Path(arguments.name).name
     write_atomically(folder.pictures / f"{name}.png", png_bytes(displayed(picture, view)))

@@ -28,7 +28,7 @@ from .verification import VERIFY_STREAM, check_reference, counted_pixels, stage_
 class FitOutcome:
     """The result of a fit with the pictures of its start and its end, scene-linear and under one seed.
 
-    Both have few samples outside of the pixels that are `counted`, True (height, width): the fit looked at those.
+    The fit looked at the pixels that are `counted`, True (height, width); others may have fewer samples.
     `result_halves` are two pictures of the end whose random numbers have nothing in common, where there are such.
     """
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metrics.block_means import block_sums
 from ..metrics.colour import linear_from_srgb
 from ..metrics.tone_mapping import View
 from ..types.image import Encoding, Image, Pixels
@@ -36,24 +37,18 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
         first, second = view.light(first), view.light(second)
     weight = mask.astype(np.float64)[..., None]
     even = (np.indices(mask.shape).sum(axis=0) % 2 == 0)[..., None]
-    full = _block_sums(weight)[..., 0] == BLOCK * BLOCK
+    full = block_sums(weight, BLOCK)[..., 0] == BLOCK * BLOCK
     if np.count_nonzero(full) < LEAST_BLOCKS:
         return None
     half = BLOCK * BLOCK / 2
     a, b = (
-        _block_sums((np.asarray(render, np.float64) - target) * weight * chosen)[full] / half
+        block_sums((np.asarray(render, np.float64) - target) * weight * chosen, BLOCK)[full] / half
         for render, chosen in ((first, even), (second, ~even))
     )
-    level = _block_sums(np.asarray(first, np.float64) + second)[full] / (2 * BLOCK * BLOCK)
+    level = block_sums(np.asarray(first, np.float64) + second, BLOCK)[full] / (2 * BLOCK * BLOCK)
     level = level.mean(axis=-1, keepdims=True)
     scale = np.maximum(level, 0.0) + FLOOR * max(float(level.mean()), 1e-12)
     squares = (a * b / scale**2).mean(axis=-1)
     square, sd = float(squares.mean()), float(squares.std()) / squares.size**0.5
     found = max(square, 0.0) ** 0.5 if square > SIGNIFICANT * sd else 0.0
     return ModelGap(found, max(square + CONFIDENCE * sd, 0.0) ** 0.5)
-
-
-def _block_sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    height, width = (n // BLOCK for n in values.shape[:2])
-    cut = values[: height * BLOCK, : width * BLOCK]
-    return cut.reshape(height, BLOCK, width, BLOCK, values.shape[2]).sum(axis=(1, 3))

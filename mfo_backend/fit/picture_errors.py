@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics.block_means import block_side, compared, full_blocks
+from ..metrics.block_means import block_means, block_side, full_blocks, means_beside
 from ..metrics.exposure_range import lit_exposures
 from ..metrics.flip_error import flip_error
 from ..metrics.flip_filters import DEFAULT_PIXELS_PER_DEGREE, flip_reach
@@ -39,9 +39,9 @@ def picture_errors(
     near = tuple(slice(span.start // side * side, span.stop) for span in box)  # blocks of the whole picture
     chosen = full_blocks(counted[near], side)
 
-    shown = Image(reference.pixels[near], reference.encoding)
-    pairs = [compared(shown, Image(pixels[near], Encoding.LINEAR), side, view) for pixels in (start, result)]
-    target, pictures = pairs[0][0], [picture for _, picture in pairs]
+    target = block_means(Image(reference.pixels[near], reference.encoding), side)
+    linear_ones = (Image(pixels[near], Encoding.LINEAR) for pixels in (start, result))
+    pictures = [means_beside(reference.encoding, picture, side, view) for picture in linear_ones]
 
     def means(maps: Iterator[NDArray]) -> tuple[float, float]:
         first, second = (float(of_picture[chosen].mean(dtype=np.float64)) for of_picture in maps)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metrics.block_means import block_sums
 from ..render.primary_rays import TILE
 from ..render.recorded_paths import LaneGroups, RecordedPaths
 from ..types.image import Pixels
@@ -61,7 +62,7 @@ def tile_noise(
     shown[at] = model * keep[:, None]
     rows, columns = (np.minimum(line.index, n - 1) for line, n in zip(lines, reference.shape[:2], strict=True))
     reference = np.where(inside, reference[np.ix_(rows, columns)], np.float32(0.0))
-    level = _tiles(shown, side) / np.maximum(_tiles(inside, side), 1) + DARK * max(
+    level = block_sums(shown, side) / np.maximum(block_sums(inside, side), 1) + DARK * max(
         float(reference[inside[..., 0]].mean()), 1e-12
     )
     residual = (reference - shown) / np.repeat(np.repeat(level, side, 0), side, 1)
@@ -72,7 +73,7 @@ def tile_noise(
         both = inside[here] & inside[there] & lines[axis].followed(axis)
         squares[here] += 0.5 * np.square(residual[here] - residual[there]) * both
         pairs[here] += both
-    squares, pairs = _tiles(squares, side), _tiles(pairs, side)
+    squares, pairs = block_sums(squares, side), block_sums(pairs, side)
     counted = pairs[..., 0] > 0
     if not counted.any():
         return TileNoise(np.ones((len(groups), 3)), 0.0)
@@ -108,12 +109,6 @@ class _Lines:
     def followed(self, axis: int) -> NDArray[np.bool_]:
         """Whether the next line is the next one of the picture, too; for arrays that have the lines along `axis`."""
         return np.expand_dims(np.diff(self.index) == 1, tuple(a for a in range(3) if a != axis))
-
-
-def _tiles(pixels: NDArray, side: int) -> NDArray[np.float64]:
-    """Sums over tiles of an image (height, width, channels) of whole ones."""
-    height, width, channels = pixels.shape
-    return pixels.reshape(height // side, side, width // side, side, channels).sum((1, 3), dtype=np.float64)
 
 
 def _around(tiles: NDArray, reach: int) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..metrics.block_means import block_side, compared
+from ..metrics.block_means import block_means, block_side, means_beside
 from ..metrics.flip_error import flip_error
 from ..metrics.tone_mapping import View
 from ..report.curve_picture import curve_png
@@ -39,8 +39,8 @@ def write_outputs(
         If the folder cannot be written or the disk is full.
     """
     side = block_side(outcome.counted)  # as `fit.picture_errors`
-    shown = compared(reference, Image(outcome.result_image, Encoding.LINEAR), side, view)
-    difference = flip_error(*shown, display=view)
+    seen = means_beside(reference.encoding, Image(outcome.result_image, Encoding.LINEAR), side, view)
+    difference = flip_error(block_means(reference, side), seen, display=view)
     pictures = {
         "reference": png_bytes(displayed(reference, view)),
         "start": png_bytes(displayed_linear(outcome.start_image, view)),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..types.image import Encoding, Image
 from .colour import linear_from_srgb, srgb_from_linear
+from .flip_error import shown
 from .tone_mapping import View
 
 MOST_COUNTED = 1 << 17  # pixels; what fills more is compared at a fraction of the size
@@ -26,23 +27,25 @@ def block_means(image: Image, side: int) -> Image:
         return image
     linear = image.encoding is Encoding.LINEAR
     light = image.pixels if linear else linear_from_srgb(image.pixels)
-    mean = _blocks(light, side).mean((1, 3), dtype=np.float64).astype(np.float32)
+    mean = (block_sums(light, side) / side**2).astype(np.float32)
     return Image(mean if linear else srgb_from_linear(mean), image.encoding)
 
 
-def compared(reference: Image, picture: Image, side: int, view: View) -> tuple[Image, Image]:
-    """Both pictures from so many times as far away; beside display values a linear one is seen through `view` first."""
-    if reference.encoding is Encoding.SRGB and picture.encoding is Encoding.LINEAR:
-        picture = Image(view.display(picture.pixels), Encoding.SRGB)
-    return block_means(reference, side), block_means(picture, side)
+def means_beside(encoding: Encoding, picture: Image, side: int, view: View) -> Image:
+    """`block_means` of a picture for a reference of this encoding: seen through `view` first beside display values."""
+    if encoding is Encoding.SRGB:
+        picture = Image(shown(picture, view), Encoding.SRGB)
+    return block_means(picture, side)
 
 
 def full_blocks(mask: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
     """Blocks of which at least half is in the mask, or those that have most of it where there are none."""
-    share = _blocks(mask[..., None], side).mean((1, 3))[..., 0]
+    share = block_sums(mask[..., None], side)[..., 0] / side**2
     return share >= min(0.5, float(share.max()))
 
 
-def _blocks(pixels: NDArray, side: int) -> NDArray:
-    height, width = (n // side * side for n in pixels.shape[:2])
-    return pixels[:height, :width].reshape(height // side, side, width // side, side, pixels.shape[2])
+def block_sums(pixels: NDArray, side: int) -> NDArray[np.float64]:
+    """Sums over blocks of pixels (height, width, channels), incomplete ones left out."""
+    rows, columns = (n // side for n in pixels.shape[:2])
+    cut = pixels[: rows * side, : columns * side]
+    return cut.reshape(rows, side, columns, side, pixels.shape[2]).sum((1, 3), dtype=np.float64)

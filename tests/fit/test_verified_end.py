@@ -33,7 +33,7 @@ class Renderer:
         self.passes, self.taken, self._noise, self._shape = 0.0, [], noise, shape
 
     def pixels_later(self, vector, pixels, *, seed, spp):
-        assert len(pixels) * spp <= MOST_WHOLE
+        assert spp == 1 or len(pixels) * spp <= MOST_WHOLE
         self.taken.append((float(vector[0]), seed, spp, len(pixels)))
         self.passes += 1.0
         noise = np.random.default_rng(seed).normal(size=(len(pixels), 3)) * self._noise / np.sqrt(spp)
@@ -173,3 +173,19 @@ def test_huge_pictures_have_a_limit_for_all_their_samples(size, share, whole, mo
     assert 2 * check._most_here == most
     paths = 2 * (mask.size * check._begun + len(check._looked_at) * (check._most_here - check._begun))
     assert paths <= max(MOST_WHOLE, 2 * mask.size) + MOST_FURTHER
+
+
+def test_no_piece_of_a_whole_frame_repeats_the_numbers_of_further_samples():
+    from mfo_backend.render.variant import load_variant
+
+    load_variant()
+    from mfo_backend.render.pixel_pictures import pieces_of
+
+    mask = np.zeros((2160, 3840), bool)
+    mask[:100, :100] = True
+    renderer = Renderer()
+    found(renderer, 0.4, 0.9, [0.4], shape=(*mask.shape, 3), mask=mask)
+    taken = [(seed, spp, count) for value, seed, spp, count in renderer.taken if value == 0.4]
+    seeds = [piece.seed for seed, spp, count in taken for piece in pieces_of(np.arange(count), seed, spp)]
+    assert len(seeds) > len(taken)  # there are pieces
+    assert len(set(seeds)) == len(seeds)
