@@ -149,6 +149,7 @@ def fit_recorded(
     listener(Preview(pictures[-1].image))
     counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
     best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
+    pictures[best] = end = verification.finished(pictures[best])
     status = Status.CANCELLED if should_stop() else Status.CONVERGED
     if best == 1 and len(ends) > 2:
         notes.append(SQUARES_KEPT.format(stage="refine"))
@@ -158,13 +159,13 @@ def fit_recorded(
         best,
         status=status,
         stages=course.reports,
-        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, counted, display),
+        errors=picture_errors(reference, pictures[0].image, end.image, mask, counted, display),
         began=began,
         certainty=kept.certainty if kept else {},
         notes=notes,
         weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image, counted, pictures[best].halves)
+    return FitOutcome(result, pictures[0].image, end.image, counted, end.halves)
 
 
 def best_of(errors: Sequence[float]) -> int:

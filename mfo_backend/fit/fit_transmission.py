@@ -34,7 +34,7 @@ from .traced_perception import FLIP, lower_seen_error
 from .transmission_plan import TransmissionPlan
 from .transmission_stages import TransmissionFit
 from .uncertainty import WEAK_BELOW, certainties
-from .verification import VERIFY_STREAM, check_reference, counted_pixels, stage_losses
+from .verification import VERIFY_STREAM, check_reference, counted_pixels
 from .verified_end import Verification
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -119,14 +119,15 @@ def fit_transmission(
         renderer, reference, counted, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
     )
     pictures = verification.pictures(verification.begin(renderer.start), [*found, *nearer])
-    loss = stage_losses([name], reference, pictures[0].image, mask, settings, view)[0]
-    seen = [loss.value(picture.image) for picture in pictures]
+    plain = PictureJudge(name, reference, pictures[0].image, mask, settings, view, blurred=False)
+    seen = [plain.value(picture.image) for picture in pictures]
     kept = len(found) == 2 and seen[1] <= seen[2] + VISIBLE
     best = 1 if kept else len(found)
     if judge and nearer and best == 1 and judge.value(pictures[-1].image) < judge.value(pictures[1].image):
         best = len(pictures) - 1
-    listener(Preview(pictures[best].image))
     best = best if seen[best] < seen[0] else 0
+    pictures[best] = end = verification.finished(pictures[best])
+    listener(Preview(end.image))
     if nearer and best == 1:
         notes.append(SQUARES_KEPT.format(stage="polish"))
     if ends:
@@ -148,12 +149,12 @@ def fit_transmission(
         best,
         status=status,
         stages=course.reports,
-        errors=picture_errors(reference, pictures[0].image, pictures[best].image, mask, counted, display),
+        errors=picture_errors(reference, pictures[0].image, end.image, mask, counted, display),
         began=began,
         certainty=certainty,
         notes=notes,
     )
-    return FitOutcome(result, pictures[0].image, pictures[best].image, counted, pictures[best].halves)
+    return FitOutcome(result, pictures[0].image, end.image, counted, end.halves)
 
 
 def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:

@@ -19,6 +19,8 @@ from ..material.own_memory import own_memory
 from .pixel_cells import PixelCells
 
 TILE = 4  # pixels along each side
+# Row and column of a tile's pixels, quarter by quarter
+_WITHIN = np.indices((TILE, TILE)).reshape(2, 2, TILE // 2, 2, TILE // 2).swapaxes(2, 3).reshape(2, TILE**2)
 
 
 def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -26,12 +28,11 @@ def tile_order(width: int, height: int, stride: int = 1) -> tuple[NDArray[np.int
 
     Within a tile they are ordered by its quarters, so that those are runs of pixels, too.
     """
-    row, column = np.divmod(np.arange(width * height), width)
-    tile_row, tile_column = row // TILE, column // TILE
-    tile = tile_row * -(-width // TILE) + tile_column
-    kept = np.flatnonzero((tile_row % stride == stride // 2) & (tile_column % stride == stride // 2))
-    order = kept[np.argsort(4 * tile[kept] + quarter(kept, width), kind="stable")]
-    return order, tile[order]
+    tile_row, tile_column = (np.arange(stride // 2, -(-n // TILE), stride) for n in (height, width))
+    row, column = tile_row[:, None, None] * TILE + _WITHIN[0], tile_column[:, None] * TILE + _WITHIN[1]
+    inside = (row < height) & (column < width)
+    tile = tile_row[:, None, None] * -(-width // TILE) + tile_column[:, None]
+    return (row * width + column)[inside], np.broadcast_to(tile, inside.shape)[inside]
 
 
 def quarter(pixel: NDArray[np.int64], width: int) -> NDArray[np.int64]:

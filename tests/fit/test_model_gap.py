@@ -50,6 +50,19 @@ def test_noise_alone_is_no_gap():
     assert max(gap.at_most for gap in found) < 0.04
 
 
+@pytest.mark.parametrize("shape", [0.05, 0.2])
+def test_few_samples_with_fireflies_are_no_gap(shape):
+    """Gamma noise, whose relative variance is 1 / shape. One picture in forty may exceed its bounds by chance."""
+
+    def gap(seed):
+        draw = np.random.default_rng(seed)
+        reference, renders = pictures()
+        noisy = tuple((r * draw.gamma(shape, 1 / shape, r.shape)).astype(np.float32) for r in renders)
+        return gap_of(reference, noisy)
+
+    assert sum(gap(seed).relative > 0 for seed in range(20)) <= 3
+
+
 def test_only_the_target_counts():
     reference, renders = pictures()
     mask = np.zeros((SIZE, SIZE), bool)

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from mfo_backend.fit.flip_stage import minimise_flip
 from mfo_backend.fit.picture_judge import PictureJudge, _MaskedBlur
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.metrics import block_means
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 
@@ -52,6 +55,47 @@ def test_gradient_is_that_of_the_value(blurred):
         slopes.append((up - down) / (2 * step))
     assert gradient @ slopes / (np.linalg.norm(gradient) * np.linalg.norm(slopes)) > 0.99
     assert np.linalg.norm(gradient) == pytest.approx(np.linalg.norm(slopes), rel=0.1)
+
+
+def smaller_judge(monkeypatch, encoding=Encoding.LINEAR, *, blurred=False, most=40):
+    """A judge that compares at a third of the size."""
+    monkeypatch.setattr(block_means, "MOST_COUNTED", most)
+    shown = DisplayView().display(picture(TRUTH)[0])
+    reference = picture(TRUTH)[0] if encoding is Encoding.LINEAR else shown
+    name = "flip-hdr" if encoding is Encoding.LINEAR else "flip-ldr"
+    background, view = picture(TRUTH)[0], DisplayView()
+    return PictureJudge(name, Image(reference, encoding), background, MASK, FitSettings(), view, blurred=blurred)
+
+
+@pytest.mark.parametrize(("encoding", "blurred"), [*product(Encoding, [False]), (Encoding.LINEAR, True)])
+def test_gradient_at_a_fraction_of_the_size_is_that_of_the_value(monkeypatch, encoding, blurred):
+    measure = smaller_judge(monkeypatch, encoding, blurred=blurred)
+    x, step = np.array([0.5, 0.8, 0.3]), 5e-3
+    image, pullback = picture(x)
+    gradient = pullback(measure.value_and_gradient(image)[1])
+    slopes = [
+        (measure.value(picture(x + step * unit)[0]) - measure.value(picture(x - step * unit)[0])) / (2 * step)
+        for unit in np.eye(3)
+    ]
+    assert gradient @ slopes / (np.linalg.norm(gradient) * np.linalg.norm(slopes)) > 0.99
+    assert np.linalg.norm(gradient) == pytest.approx(np.linalg.norm(slopes), rel=0.1)
+
+
+@pytest.mark.parametrize("encoding", Encoding)
+def test_noise_counts_less_at_a_fraction_of_the_size(monkeypatch, encoding):
+    noisy = picture(TRUTH)[0] * (1 + 0.1 * RNG.normal(size=(SIZE, SIZE, 3))).astype(np.float32)
+    whole = smaller_judge(monkeypatch, encoding, most=10**6)
+    smaller = smaller_judge(monkeypatch, encoding)
+    assert smaller.value(noisy) < 0.6 * whole.value(noisy)
+    other = picture(1.2 * TRUTH)[0]
+    assert smaller.value(other) == pytest.approx(whole.value(other), rel=0.15)
+
+
+@pytest.mark.parametrize("encoding", Encoding)
+def test_only_the_target_counts_at_a_fraction_of_the_size(monkeypatch, encoding):
+    measure = smaller_judge(monkeypatch, encoding)
+    elsewhere = np.where(MASK[..., None], picture(TRUTH)[0], RNG.random((SIZE, SIZE, 3))).astype(np.float32)
+    assert measure.value(elsewhere) == pytest.approx(0.0, abs=1e-4)
 
 
 def test_blur_has_its_own_adjoint():

@@ -14,6 +14,7 @@ from mfo_backend.fit.verified_end import (
     MOST_FURTHER,
     MOST_WHOLE,
     PATHS_OF_A_PART,
+    SHOWN_SAMPLES,
     Verification,
 )
 from mfo_backend.metrics.tone_mapping import DisplayView
@@ -27,13 +28,13 @@ FAR = 2 * MOST_EVEN  # samples of a start that is far away: a part of each half
 
 
 class Renderer:
-    """Grey pictures of the vector's first value with the noise of their samples, as independent as their seeds."""
+    """Grey pictures of the vector's first value with noise that seeds and places in a launch decide."""
 
     def __init__(self, noise: float = NOISE, shape=SHAPE) -> None:
         self.passes, self.taken, self._noise, self._shape = 0.0, [], noise, shape
 
     def pixels_later(self, vector, pixels, *, seed, spp):
-        assert spp == 1 or len(pixels) * spp <= MOST_WHOLE
+        assert spp == 1 or len(pixels) * spp <= 2 * MOST_WHOLE
         self.taken.append((float(vector[0]), seed, spp, len(pixels)))
         self.passes += 1.0
         noise = np.random.default_rng(seed).normal(size=(len(pixels), 3)) * self._noise / np.sqrt(spp)
@@ -47,7 +48,8 @@ def verification(renderer, reference, most=MOST, shape=SHAPE, mask=None, **more)
 
 
 def samples_of(renderer, value):
-    return sum(spp for shown, _, spp, _ in renderer.taken if shown == value)
+    """Samples a pixel that is looked at: a launch holds both halves of a picture."""
+    return sum(2 * spp for shown, _, spp, _ in renderer.taken if shown == value)
 
 
 def found(renderer, reference, start, ends, **more):
@@ -129,14 +131,14 @@ def test_large_pictures_come_in_parts_that_a_stop_is_heard_between():
     side = 1 << 9
     shape = (side, side, 3)
     renderer = Renderer(shape=shape)
-    found(renderer, 0.4, 0.9, [0.5], shape=shape)
-    parts = [count * spp for value, _, spp, count in renderer.taken if value == 0.5]
-    assert max(parts[:2]) <= MOST_WHOLE // 2
-    assert max(parts[2:]) <= PATHS_OF_A_PART
+    found(renderer, 0.4, 0.9, [0.4], shape=shape)
+    parts = [count * spp for value, _, spp, count in renderer.taken if value == 0.4]
+    assert parts[0] <= MOST_WHOLE
+    assert max(parts[1:]) <= 2 * PATHS_OF_A_PART
     assert samples_of(renderer, 0.9) == FAR
     renderer = Renderer(shape=shape)
-    found(renderer, 0.4, 0.9, [0.4], shape=shape, should_stop=lambda: len(renderer.taken) > 6)
-    assert len(renderer.taken) == 8  # a part of each half of the start and three of the end
+    found(renderer, 0.4, 0.9, [0.4], shape=shape, should_stop=lambda: len(renderer.taken) > 3)
+    assert len(renderer.taken) == 4  # a part of the start and three of the end
 
 
 def test_only_what_is_looked_at_and_a_few_pixels_around_it_takes_further_samples():
@@ -145,10 +147,10 @@ def test_only_what_is_looked_at_and_a_few_pixels_around_it_takes_further_samples
     renderer = Renderer()
     start, end = found(renderer, 0.4, 0.9, [0.4], mask=mask)
     counts = [count for value, _, _, count in renderer.taken if value == 0.4]
-    assert counts[:2] == [32 * 32] * 2
-    assert set(counts[2:]) == {(10 + 2 * BLURRED) * (4 + 8 + BLURRED)}  # the picture ends at its left edge
+    assert counts[0] == 2 * 32 * 32
+    assert set(counts[1:]) == {2 * (10 + 2 * BLURRED) * (4 + 8 + BLURRED)}  # the picture ends at its left edge
     further = MOST - FAR
-    assert renderer.passes == pytest.approx((2 * FAR + further * counts[2] / 32**2) / MOST)
+    assert renderer.passes == pytest.approx((2 * FAR + further * counts[1] / (2 * 32**2)) / MOST)
     noise = [np.square(end.image[where] - 0.4).mean() ** 0.5 for where in (mask, ~widened(mask, BLURRED))]
     # 240 and 2300 values
     assert noise[0] == pytest.approx(NOISE / np.sqrt(MOST), rel=0.15)
@@ -160,9 +162,9 @@ def test_only_what_is_looked_at_and_a_few_pixels_around_it_takes_further_samples
     ("size", "share", "whole", "most"),
     [
         ((256, 256), 1.0, 8, 64),  # as if there were no limits
-        ((1080, 1920), 0.13, 2, 32),
+        ((1080, 1920), 0.13, 2, 16),
         ((1080, 1920), 1.0, 2, 4),
-        ((2160, 3840), 0.01, 2, 64),
+        ((2160, 3840), 0.01, 2, 32),
     ],
 )
 def test_huge_pictures_have_a_limit_for_all_their_samples(size, share, whole, most):
@@ -173,6 +175,63 @@ def test_huge_pictures_have_a_limit_for_all_their_samples(size, share, whole, mo
     assert 2 * check._most_here == most
     paths = 2 * (mask.size * check._begun + len(check._looked_at) * (check._most_here - check._begun))
     assert paths <= max(MOST_WHOLE, 2 * mask.size) + MOST_FURTHER
+
+
+@pytest.mark.parametrize(("noise", "samples"), [(NOISE / 2, 2), (2 * NOISE, 4)])
+def test_pixels_that_are_compared_as_blocks_need_fewer_samples(noise, samples):
+    """Blocks of 4 x 4 pixels have 32 samples when their pixels have 2; where they say too little there are more."""
+    size = (1200, 1600)
+    renderer = Renderer(noise, (*size, 3))
+    start, end = found(renderer, 0.4, 1.9, [0.5], shape=(*size, 3))
+    assert 2 * start.samples == SHOWN_SAMPLES
+    assert 2 * end.samples == samples == samples_of(renderer, 0.5)
+
+
+def halves_of(picture, where):
+    return [half[where] for half in picture.halves]
+
+
+def test_ends_see_the_random_numbers_of_a_start_that_is_whole():
+    mask = np.zeros(SHAPE[:2], bool)
+    mask[10:20, 4:12] = True
+    for ends in ([0.5], [0.5, 0.6]):
+        pictures = found(Renderer(), 0.4, 0.9, ends, mask=mask, most=FAR)
+        first, *others = (np.array(halves_of(picture, mask)) - picture.vector[0] for picture in pictures)
+        for noise in others:
+            np.testing.assert_allclose(noise, first, atol=1e-6)
+
+
+@pytest.mark.parametrize("region", ["box", "all"])
+def test_one_of_several_ends_is_finished_with_surroundings_of_its_own(region):
+    mask = np.zeros(SHAPE[:2], bool)
+    mask[10:20, 4:12] = True
+    mask |= region == "all"
+    around = ~widened(mask, BLURRED)
+    renderer = Renderer()
+    check = verification(renderer, 0.4, mask=mask)
+    start, one, other = check.pictures(check.begin(np.array([0.9])), [np.array([0.5]), np.array([0.6])])
+    for end in (one, other):  # nobody has looked there yet
+        np.testing.assert_array_equal(halves_of(end, around), halves_of(start, around))
+    taken = len(renderer.taken)
+    finished = check.finished(one)
+    further = [launch[:1] + launch[2:] for launch in renderer.taken[taken:]]
+    assert further == [(0.5, MOST_EVEN, 2 * np.count_nonzero(around))][: around.sum()]
+    seeds = [seed for value, seed, *_ in renderer.taken if value == 0.5]
+    assert len(set(seeds)) == len(seeds)
+    np.testing.assert_array_equal(halves_of(finished, ~around), halves_of(one, ~around))
+    np.testing.assert_allclose(finished.image, 0.5, atol=5 * NOISE / np.sqrt(FAR))
+    np.testing.assert_array_equal(one.image[around], start.image[around])  # as it was
+    assert check.finished(finished) is finished
+    assert check.finished(start) is start
+
+
+@pytest.mark.parametrize(("size", "shown"), [((1200, 1600), SHOWN_SAMPLES), ((1500, 2000), 2)])
+def test_what_is_shown_has_some_more_samples_within_the_limit(size, shown):
+    renderer = Renderer(0.001, (*size, 3))
+    check = verification(renderer, 0.4, shape=(*size, 3))
+    _, end = check.pictures(check.begin(np.array([0.9])), [np.array([0.5])])
+    assert 2 * end.samples == 2
+    assert 2 * check.finished(end).samples == shown == samples_of(renderer, 0.5)
 
 
 def test_no_piece_of_a_whole_frame_repeats_the_numbers_of_further_samples():

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.metrics.block_means import MOST_COUNTED, block_means, block_side, full_blocks
+from mfo_backend.metrics.block_means import MOST_COUNTED, block_means, block_side, block_sums, full_blocks, spread
 from mfo_backend.types.image import Encoding, Image
 
 
@@ -42,3 +42,22 @@ def test_blocks_of_which_half_is_in_the_mask_count() -> None:
     thin = np.zeros((4, 4), bool)
     thin[1, 2] = True
     np.testing.assert_array_equal(full_blocks(thin, 2), [[False, True], [False, False]])
+
+
+@pytest.mark.parametrize("kind", [bool, np.float32, np.float64])
+@pytest.mark.parametrize("side", [1, 2, 3, 4])
+def test_sums_are_those_of_each_block(kind: type, side: int) -> None:
+    pixels = (np.random.default_rng(0).random((10, 13, 2)) * 2).astype(kind)
+    found = block_sums(pixels, side)
+    assert found.dtype == np.float64
+    assert found.shape == (10 // side, 13 // side, 2)
+    for row, column in np.ndindex(found.shape[:2]):
+        block = pixels[row * side :][:side, column * side :][:, :side]
+        np.testing.assert_allclose(found[row, column], block.astype(np.float64).sum((0, 1)), rtol=1e-12)
+
+
+def test_spreading_is_the_adjoint_of_the_mean() -> None:
+    draw = np.random.default_rng(0)
+    pixels, blocks = draw.random((7, 10, 3)).astype(np.float32), draw.random((2, 3, 3)).astype(np.float32)
+    mean = block_sums(pixels, 3) / 9
+    assert np.vdot(mean, blocks) == pytest.approx(np.vdot(pixels, spread(blocks, 3, pixels.shape)), rel=1e-6)

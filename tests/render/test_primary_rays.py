@@ -29,6 +29,24 @@ def rays(sensor="pinhole", rfilter="box", four=False, seed=3):
     return mi, PrimaryRays(loaded, PixelCells.grid(per_axis), order, tile, seed, four=four), per_axis
 
 
+@pytest.mark.parametrize("stride", [1, 2, 3, 9])
+@pytest.mark.parametrize(("width", "height"), [(12, 8), (13, 7), (1, 1), (50, 33)])
+def test_pixels_are_ordered_by_tile_and_its_quarters(width, height, stride):
+    from mfo_backend.render.variant import load_variant
+
+    load_variant()
+    from mfo_backend.render.primary_rays import TILE, quarter, tile_order
+
+    row, column = np.divmod(np.arange(width * height), width)
+    across, down = column // TILE, row // TILE
+    kept = np.flatnonzero((down % stride == stride // 2) & (across % stride == stride // 2))
+    number = (down * -(-width // TILE) + across)[kept]
+    expected = kept[np.lexsort((kept, quarter(kept, width), number))]
+    order, tile = tile_order(width, height, stride)
+    np.testing.assert_array_equal(order, expected)
+    np.testing.assert_array_equal(tile, np.sort(number))
+
+
 @pytest.mark.parametrize("four", [False, True])
 @pytest.mark.parametrize("rfilter", ["box", "gaussian", "lanczos"])
 @pytest.mark.parametrize("sensor", SENSORS)
