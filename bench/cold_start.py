@@ -261,7 +261,8 @@ def phases_of(job: Path) -> dict[str, Any]:
         stages.wrap(owner, name, "verify")
     stages.wrap(fit_scene, "_model_gap", "verify")
     stages.wrap(run_job, "write_outputs", "write")
-    stages.wrap(Verification, "pictures", "verify")
+    for name in ("pictures", "finished"):
+        stages.wrap(Verification, name, "verify")
     begin = Verification.begin
 
     def begun(*values: Any, **named: Any) -> Any:
