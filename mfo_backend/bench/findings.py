@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .stopwatch import PARTS
 from .summary import SOLVED_FLIP, comparable_seconds, error_of, grouped, is_at_noise, quantile
 from .table import Table, number
 
+TOGETHER = "all"  # scenarios of a table
 # a normal error is inside 1, 2 and 3 standard deviations in these shares
 _NORMAL = {1: 0.683, 2: 0.954, 3: 0.997}
 
@@ -76,32 +77,39 @@ def against_the_loop(rows: Sequence[Row]) -> Table | None:
 
     Nearer: scenes in which the loop's result has the smaller FLIP. Times longer: median ratio of `comparable_seconds`,
     and of the loop's to what the preset takes to the end of its first stage with no more than the loop's last FLIP.
+    Last, all scenarios together, each scene counting once.
     """
     _, seconds_of = comparable_seconds(rows)
     lines = []
     groups = grouped(rows)
+    together: dict[str, list[tuple[Row, Row]]] = {}
     for (scenario, method), theirs in groups.items():
         ours = {row.scene: row for row in groups.get((scenario, "balanced"), ())}
         both = [(ours[row.scene], row) for row in theirs if method in PAPER_METHODS and row.scene in ours]
-        if not both:
-            continue
-        cells = []
-        for side in zip(*both, strict=True):
-            mean = np.mean([error_of(row.flip) for row in side])
-            cells += [f"{sum(map(is_at_noise, side))} of {len(both)}", number(float(mean))]
-        nearer = sum(error_of(its.flip) < error_of(own.flip) for own, its in both)
-        times = [(seconds_of(own), seconds_of(its)) for own, its in both]
-        ratio = quantile([long / short for short, long in times if short and long], 0.5)
-        to_it = [(row.processor_seconds, _seconds_to(error_of(row.flip), own)) for own, row in both]
-        same = [long / short for long, short in to_it if long and short]
-        lines.append(
-            (scenario, method, *cells, str(nearer), number(ratio), number(quantile(same, 0.5)) if same else "–")
-        )
+        if both:
+            lines.append((scenario, method, *_beside(both, seconds_of)))
+            together.setdefault(method, []).extend(both)
+    if len({scenario for scenario, *_ in lines}) > 1:
+        lines += [(TOGETHER, method, *_beside(both, seconds_of)) for method, both in together.items()]
     heads = (
         "scenario", "loop with", "`balanced`: at the noise", "mean FLIP", "loop: at the noise", "mean FLIP",
         "loop nearer", "times longer", "to the same FLIP",
     )  # fmt: skip
     return Table(heads, lines) if lines else None
+
+
+def _beside(both: Sequence[tuple[Row, Row]], seconds_of: Callable[[Row], float | None]) -> list[str]:
+    """What `against_the_loop` says of runs of the preset and the loop on the same scenes."""
+    cells = []
+    for side in zip(*both, strict=True):
+        mean = np.mean([error_of(row.flip) for row in side])
+        cells += [f"{sum(map(is_at_noise, side))} of {len(both)}", number(float(mean))]
+    nearer = sum(error_of(its.flip) < error_of(own.flip) for own, its in both)
+    times = [(seconds_of(own), seconds_of(its)) for own, its in both]
+    ratio = quantile([long / short for short, long in times if short and long], 0.5)
+    to_it = [(row.processor_seconds, _seconds_to(error_of(row.flip), own)) for own, row in both]
+    same = [long / short for long, short in to_it if long and short]
+    return [*cells, str(nearer), number(ratio), number(quantile(same, 0.5)) if same else "–"]
 
 
 def _seconds_to(flip: float, row: Row) -> float | None:

@@ -4,10 +4,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from mfo_backend.bench.findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
+from mfo_backend.bench.findings import (
+    TOGETHER,
+    ablations,
+    against_the_loop,
+    calibration,
+    promises,
+    stage_gains,
+    time_parts,
+)
 from mfo_backend.bench.hard_section import hard_section
 from mfo_backend.bench.paper_figures import PAPER_NAMES, paper_figure
 from mfo_backend.bench.paper_tables import paper_tables
@@ -71,6 +80,19 @@ def test_the_loops_time_is_held_against_the_stage_that_is_as_near():
         table = against_the_loop([*ours, *chosen])
         assert table is not None
         assert table.rows[0][-1] == ratio
+
+
+def test_every_scene_counts_once_where_scenarios_are_taken_together():
+    tasks = [Task("noise", 0, ""), Task("noise", 1, ""), Task("base", 0, "")]
+    ours = [row(replace(task, method="balanced"), flip=0.01, processor_seconds=1.0) for task in tasks]
+    loop = [
+        row(replace(task, method="mfo-hdr"), flip=flip, processor_seconds=seconds)
+        for task, flip, seconds in zip(tasks, (0.04, 0.005, 0.06), (10.0, 20.0, 90.0), strict=True)
+    ]
+    table = against_the_loop([*ours, *loop])
+    assert table is not None
+    assert table.rows[-1] == (TOGETHER, "mfo-hdr", "3 of 3", "0.01", "3 of 3", "0.035", "1", "20", "–")
+    assert {line[0] for line in table.rows[:-1]} == {"noise", "base"}
 
 
 def test_an_ablation_is_compared_on_common_scenes():
