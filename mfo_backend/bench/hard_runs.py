@@ -18,6 +18,7 @@ from ..metrics.tone_mapping import DisplayView
 from ..render.highlight_cells import Highlights
 from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Renderer, load_renderer
+from ..render.widened_mask import widened
 from ..types.certainty import Level
 from ..types.errors import MfoError
 from ..types.image import Encoding, Image, Pixels
@@ -121,7 +122,10 @@ class ExactPicture:
         for _ in range(2):
             self._paths = scene.record(vector, grid=grid, seed=_JUDGE_SEED, near=False, highlights=_FINE)
             self._evaluate = scene.evaluator(self._paths, self._paths.pixel_groups())
-            grid = 2 * detail_grid(self(vector), mask) + 2
+            picture = self(vector)
+            lit = picture.max(axis=2) > 0.0
+            # where light ends, at silhouettes and shadows, a sliver of a pixel may be all that is lit
+            grid = 2 * detail_grid(picture, mask, widened(lit, 1) & widened(~lit, 1)) + 2
 
     def __call__(self, vector: NDArray[np.float64]) -> Pixels:
         """The linear picture; black beside the target."""

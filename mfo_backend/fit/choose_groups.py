@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 from ..metrics.colour import luminance
 from ..render.recorded_paths import LaneGroups, RecordedPaths
+from ..render.widened_mask import widened
 from ..types.image import Pixels
 
 # A pixel with background in it depends on the exact positions of its samples, which the reference does not share
 MINIMUM_INTERIOR_SHARE = 0.3
+MINIMUM_LIGHT_SHARE = 0.5
 MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target lights the silhouette and little else
 
 
-def all_groups(paths: RecordedPaths, side: int) -> LaneGroups:
+def all_groups(paths: RecordedPaths, side: int, reference: Pixels | None = None) -> LaneGroups:
     """All pixels or tiles of this `side` without background; those on the silhouette too where the target is small or
-    hardly lit elsewhere."""
+    hardly lit elsewhere, or if most of the target's light in `reference` is there."""
     interior = paths.interior
 
     def make(keep: NDArray[np.bool_] | None = None) -> LaneGroups:
@@ -30,6 +32,9 @@ def all_groups(paths: RecordedPaths, side: int) -> LaneGroups:
     groups = make(interior)
     enough = len(groups.pixels) >= MINIMUM_INTERIOR_SHARE * len(paths.pixel)
     enough = enough and groups.lanes > MINIMUM_LIT_SHARE * paths.lanes
+    if enough and reference is not None:
+        light = luminance((reference - paths.constant).reshape(-1, 3)[paths.pixel])
+        enough = light[interior].sum() > MINIMUM_LIGHT_SHARE * light.sum()
     return groups if enough else make()
 
 
@@ -59,10 +64,26 @@ MOST_THINNED, BRIGHTEST, LIT = 0.6, 100, 0.01
 FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
 
 
-def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+def edges_of_light(paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.bool_] | None:
+    """Pixels (height, width) of the silhouette, and between lit ones and others; None where the groups have none of it.
+
+    There a sliver of a pixel may be all that is lit.
+    """
+    if paths.interior[groups.member].all():
+        return None
+    lit, silhouette = (np.zeros(paths.constant.shape[:2], bool) for _ in range(2))
+    lit.reshape(-1)[paths.pixel[np.diff(paths.first[0]) > 0]] = True
+    silhouette.reshape(-1)[paths.pixel[~paths.interior]] = True
+    return silhouette | (widened(lit, 1) & widened(~lit, 1))
+
+
+def detail_grid(
+    reference: Pixels, mask: NDArray[np.bool_], edges: NDArray[np.bool_] | None = None
+) -> NDArray[np.int64]:
     """Camera rays along each axis for the pixels (height, width) of a picture, more where it has detail on the target.
 
-    The finest grid is not for pixels at the silhouette, whose change is that to the background.
+    The finest grid is not for pixels at the silhouette, whose change is that to the background, unless `edges` are
+    given, which have it.
     """
     value = luminance(reference)
     lit = value[mask & (value > 0.0)]
@@ -76,21 +97,27 @@ def detail_grid(reference: Pixels, mask: NDArray[np.bool_]) -> NDArray[np.int64]
     grid = np.full(level.shape, GRID_PLAIN)
     grid[mask & (change > 0.1)] = GRID_DETAIL
     grid[inside & (change > 0.5)] = GRID_EDGE
+    if edges is not None:
+        grid[edges] = GRID_EDGE
     if mask.sum() <= FEW_PIXELS:
         grid[mask] = GRID_EDGE
     return grid
 
 
 def solution_grid(
-    reference: Pixels, mask: NDArray[np.bool_], picture: Callable[[], Pixels]
+    reference: Pixels,
+    mask: NDArray[np.bool_],
+    picture: Callable[[], Pixels],
+    edges: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64] | None:
     """Camera rays along each axis of a recording at the solution, whose `picture` is asked for its detail; None where
-    that would be too many."""
-    grid = detail_grid(reference, mask)
-    if _rays(_finer(grid), mask) > MOST_FINE_RAYS:
+    that would be too many. `edges` are those of `detail_grid`."""
+    counted = mask if edges is None else mask | edges
+    grid = detail_grid(reference, mask, edges)
+    if _rays(_finer(grid), counted) > MOST_FINE_RAYS:
         return None
     grid = _finer(np.maximum(grid, detail_grid(picture(), mask)))
-    return None if _rays(grid, mask) > MOST_FINE_RAYS else grid
+    return None if _rays(grid, counted) > MOST_FINE_RAYS else grid
 
 
 def thinned_grid(grid: NDArray[np.int64], reference: Pixels, mask: NDArray[np.bool_], rays: int) -> NDArray[np.int64]:

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ..types.image import Pixels
+from .flip_stage import minimise_flip
 from .picture_judge import PictureJudge
 from .problem import End, Problem
 from .recorded_stages import MakeResidual, RecordedFit, Vector
@@ -54,7 +56,28 @@ def perceptual_ends(
         for x in sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(fit.picture(x))):
             if all(np.max(np.abs(x - other) / width) > BASIN for other in nearest):
                 nearest.append(x)
-        ends += [End("flip", x) for x in fit.lower_flip(judge, nearest[:FLIP_STARTS])]
+        ends += [End("flip", x) for x in _lower_flip(fit, judge, nearest[:FLIP_STARTS])]
     if len(ends) <= FINALISTS:
         return ends
     return sorted(ends, key=lambda end: judge.value(fit.picture(end.x)))[:FINALISTS]
+
+
+def _lower_flip(fit: RecordedFit, judge: PictureJudge, starts: list[Vector]) -> list[Vector]:
+    """Stage `flip`: the mean error of the recorded picture itself, from each start."""
+    paths, course = fit.paths, fit.course
+    evaluate = fit.scene.evaluator(paths, paths.pixel_groups())
+
+    def picture(x: Vector) -> tuple[Pixels, Callable[[Pixels], Vector]]:
+        table = evaluate(x)
+
+        def pullback(gradient: Pixels) -> Vector:
+            rows = gradient.reshape(-1, 3)[paths.pixel].astype(np.float64)
+            return np.einsum("gck,gc->k", table[:, :, 1:], rows, optimize=True)
+
+        return fit.shown(table[:, :, 0]), pullback
+
+    with course.stage("flip") as stage:
+        told, stop = course.values(stage), course.should_stop
+        ends = [minimise_flip(judge, picture, x, *fit.box, on_value=told, should_stop=stop) for x in starts]
+        stage.vector = min(ends, key=lambda end: end[1])[0]
+    return [x for x, _ in ends]

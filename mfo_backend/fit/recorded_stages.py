@@ -17,14 +17,12 @@ from ..render.recorded_scene import MOST_LANES, RecordedScene
 from ..solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..types.errors import UnrecordableError
 from ..types.image import Pixels
-from .choose_groups import all_groups, detail_grid, fewer_groups, solution_grid, thinned_grid
+from .choose_groups import all_groups, detail_grid, edges_of_light, fewer_groups, solution_grid, thinned_grid
 from .course import Course, Stage
 from .finer_grid import finer_grid
 from .fireflies import without_fireflies
-from .flip_stage import minimise_flip
 from .global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
 from .other_basins import best_basin, metal_rivals
-from .picture_judge import PictureJudge
 from .problem import Problem, Refined
 from .race import CLEARLY_LOWER, race
 from .recorded_plan import RecordedPlan
@@ -79,6 +77,7 @@ class RecordedFit:
         self.noise: TileNoise | None = None  # of the reference, known after `refine` or `misfit`
         self.table = scene.renderer.table
         self.recordings = 0
+        self._edges: NDArray[np.bool_] | None = None  # of light, where the fit looks at the silhouette
         self._thinned = False  # whether the present recording leaves pixels out that no stage has needed so far
         # light with extent is noisy: what a start is found on and noise is measured on; elsewhere a highlight may well
         # be a pixel wide
@@ -94,9 +93,10 @@ class RecordedFit:
     def picture(self, x: Vector) -> Pixels:
         """The recorded picture of a vector, linear; the reference where nothing is recorded."""
         self.record_whole(x)
-        return self._shown(self._pixels(x))
+        return self.shown(self._pixels(x))
 
-    def _shown(self, pixels: NDArray[np.float32]) -> Pixels:
+    def shown(self, pixels: NDArray[np.float32]) -> Pixels:
+        """The picture that these covered pixels are part of, which is the reference elsewhere."""
         image = self.reference.astype(np.float32).copy()
         image.reshape(-1, 3)[self.paths.pixel] = pixels
         return image
@@ -138,7 +138,12 @@ class RecordedFit:
                 self.course.picture = None
             enough = SPARE * plan.start_lanes if sampled else MOST_LANES
             self.paths = self.scene.record(renderer.start, grid=grid, seed=self.seed, near=False, enough=enough)
-            groups = all_groups(self.paths, TILE if sampled else 1)
+            groups = all_groups(self.paths, TILE) if sampled else all_groups(self.paths, 1, self.reference)
+            if not (sampled or self._thinned):
+                self._edges = edges_of_light(self.paths, groups)
+            if self._edges is not None:
+                self._record(renderer.start, detail_grid(self.reference, self.mask, self._edges), near=False)
+                groups = all_groups(self.paths, 1, self.reference)
             lanes = plan.scan_lanes if sampled else plan.exact_scan_lanes
             few = self.problem(fewer_groups(groups, self.reference, lanes), make, calm=True)
             starts = []
@@ -235,10 +240,13 @@ class RecordedFit:
         return refined
 
     def _refine_exact(self, stage: Stage, start: Vector, make: MakeResidual) -> Refined:
-        grid = None if self._thinned else solution_grid(self.reference, self.mask, lambda: self.picture(start))
+        grid = None
+        if not self._thinned:
+            grid = solution_grid(self.reference, self.mask, lambda: self.picture(start), self._edges)
         if grid is not None:
             self._record(start, grid)
-        groups = fewer_groups(all_groups(self.paths, 1), self.reference, self.plan.refine_lanes)
+        groups = all_groups(self.paths, 1, self.reference)
+        groups = fewer_groups(groups, self.reference, self.plan.refine_lanes)
         problem = self.problem(groups, make)
 
         def solve_below(x: Vector, wanted: float) -> Solution:
@@ -376,23 +384,3 @@ class RecordedFit:
             stage.vector = min(found, key=lambda solution: solution.equations.cost).x
         finite = [solution.x for solution in found if np.isfinite(solution.equations.cost)]
         return finite or None
-
-    def lower_flip(self, judge: PictureJudge, starts: list[Vector]) -> list[Vector]:
-        """Stage `flip`: the mean error of the recorded picture itself, from each start."""
-        evaluate = self.scene.evaluator(self.paths, self.paths.pixel_groups())
-
-        def picture(x: Vector) -> tuple[Pixels, Callable[[Pixels], Vector]]:
-            table = evaluate(x)
-
-            def pullback(gradient: Pixels) -> Vector:
-                rows = gradient.reshape(-1, 3)[self.paths.pixel].astype(np.float64)
-                return np.einsum("gck,gc->k", table[:, :, 1:], rows, optimize=True)
-
-            return self._shown(table[:, :, 0]), pullback
-
-        with self.course.stage("flip") as stage:
-            told = self.course.values(stage)
-            stop = self.course.should_stop
-            ends = [minimise_flip(judge, picture, x, *self.box, on_value=told, should_stop=stop) for x in starts]
-            stage.vector = min(ends, key=lambda end: end[1])[0]
-        return [x for x, _ in ends]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from ..metrics.block_means import block_means, block_side, means_beside
 from ..metrics.flip_error import flip_error
+from ..metrics.side_by_side import side_by_side
 from ..metrics.tone_mapping import View
 from ..report.curve_picture import curve_png
 from ..report.difference_map import magma
@@ -41,12 +42,14 @@ def write_outputs(
     side = block_side(outcome.counted)  # as `fit.picture_errors`
     seen = means_beside(reference.encoding, Image(outcome.result_image, Encoding.LINEAR), side, view)
     difference = flip_error(block_means(reference, side), seen, display=view)
-    pictures = {
-        "reference": png_bytes(displayed(reference, view)),
-        "start": png_bytes(displayed_linear(outcome.start_image, view)),
-        "result": png_bytes(displayed_linear(outcome.result_image, view)),
-        "difference": png_bytes(magma(difference.map)),
+    shown = {
+        "reference": lambda: displayed(reference, view),
+        "start": lambda: displayed_linear(outcome.start_image, view),
+        "result": lambda: displayed_linear(outcome.result_image, view),
+        "difference": lambda: magma(difference.map),
     }
+    files = side_by_side(lambda picture: png_bytes(picture()), list(shown.values()))
+    pictures = dict(zip(shown, files, strict=True))
     folder.pictures.mkdir(exist_ok=True)
     for name, data in pictures.items():
         write_atomically(folder.pictures / f"{name}.png", data)

@@ -39,6 +39,13 @@ def test_sheen_is_lit_from_behind(name, tmp_path):
         assert 90.0 < angle < 165.0  # Mitsuba's sheen goes with (1 - cos(angle / 2))^5
 
 
+def test_light_at_the_silhouette_is_as_exact_as_elsewhere(tmp_path):
+    """Most light is in pixels of which slivers are lit: an error of 0.05 without them, or with few rays in each."""
+    run = run_hard_case(HARD_CASES["blender-sheen"], 9, 64, tmp_path)
+    assert run.solved
+    assert not run.wrong
+
+
 @pytest.mark.parametrize("name", ["mirror-like", "blender-black", "soft-light", "fireflies", "tiny", "glass-0.6"])
 def test_scenes_follow_from_name_and_seed(name, tmp_path):
     first, again, other = (

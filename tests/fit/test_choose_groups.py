@@ -10,7 +10,9 @@ from mfo_backend.fit.choose_groups import (
     GRID_DETAIL,
     GRID_EDGE,
     GRID_PLAIN,
+    all_groups,
     detail_grid,
+    edges_of_light,
     solution_grid,
     thinned_grid,
 )
@@ -56,6 +58,53 @@ def test_the_solution_is_recorded_more_finely_where_it_has_detail_unless_that_is
         raise AssertionError("not asked for")
 
     assert solution_grid(np.full((400, 400, 3), 0.5, np.float32), wide, never) is None
+
+
+def recorded(inside_lanes, silhouette_lanes):
+    """A target of 8 x 8 pixels in a frame of 12 x 12, whose border is half background."""
+    from mfo_backend.render.variant import load_variant
+
+    load_variant()
+    from mfo_backend.render.recorded_paths import RecordedPaths
+
+    pixel = np.arange(144).reshape(12, 12)[2:10, 2:10].ravel()
+    border = np.ones((8, 8), bool)
+    border[1:-1, 1:-1] = False
+    border = border.ravel()
+    lanes = np.where(border, silhouette_lanes, inside_lanes)
+    first = np.concatenate([[0], np.cumsum(lanes)])[None]
+    coverage = np.where(border, 0.5, 1.0).astype(np.float32)
+    return RecordedPaths(
+        None, None, None, pixel, pixel // 16, first, coverage, np.zeros((12, 12, 3), np.float32)
+    ), border
+
+
+@pytest.mark.parametrize(("inside", "at_silhouette", "whole"), [(1.0, 0.5, False), (0.1, 1.0, True)])
+def test_the_silhouette_counts_where_most_of_the_light_is(inside, at_silhouette, whole):
+    paths, border = recorded(4, 4)
+    reference = np.zeros((12, 12, 3), np.float32)
+    reference.reshape(-1, 3)[paths.pixel] = np.where(border, at_silhouette, inside)[:, None]
+    assert len(all_groups(paths, 1, reference)) == (64 if whole else 36)
+    assert len(all_groups(paths, 1)) == 36
+    paths.constant.reshape(-1, 3)[paths.pixel[border]] = at_silhouette  # all of it light of other things
+    assert len(all_groups(paths, 1, reference)) == 36
+
+
+def test_light_ends_at_the_silhouette_and_beside_what_is_dark():
+    paths, _ = recorded(0, 4)
+    groups = all_groups(paths, 1)
+    assert len(groups) == 64  # hardly lit elsewhere
+    edges = edges_of_light(paths, groups)
+    expected = np.zeros((12, 12), bool)
+    expected[1:11, 1:11] = True  # a pixel beyond the silhouette as well, for a sliver there
+    expected[4:8, 4:8] = False
+    np.testing.assert_array_equal(edges, expected)
+    grid = detail_grid(np.full((12, 12, 3), 0.5, np.float32), np.ones((12, 12), bool), edges)
+    np.testing.assert_array_equal(grid == GRID_EDGE, expected)
+    finer = solution_grid(np.full((12, 12, 3), 0.5, np.float32), expected, lambda: np.zeros((12, 12, 3)), edges)
+    assert (finer[expected] == 2 * GRID_EDGE).all()
+    paths, _ = recorded(4, 4)
+    assert edges_of_light(paths, all_groups(paths, 1)) is None
 
 
 def wide_target():
