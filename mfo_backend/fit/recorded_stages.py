@@ -30,6 +30,7 @@ from .residuals import OneSidedResidual, Residual, WeightedResidual
 from .simplest_end import OtherEnds, SimplestEnd
 from .tile_noise import TileNoise, tile_noise
 from .unneeded_lobes import Box, solve_without_unneeded
+from .width_rivals import width_rivals
 
 Vector = NDArray[np.float64]
 MakeResidual = Callable[[NDArray[np.float32]], Residual]
@@ -237,6 +238,8 @@ class RecordedFit:
             else:
                 refined = self._refine_exact(stage, start, make)
             stage.vector = refined.x
+        if self.scene.model.limited_width:
+            refined = replace(refined, rivals=(*refined.rivals, *width_rivals(refined.all, refined.x, self.table)))
         return refined
 
     def _refine_exact(self, stage: Stage, start: Vector, make: MakeResidual) -> Refined:

@@ -29,12 +29,15 @@ class RecordedModel(Protocol):
         Values a global start scans: the main lobe's width first.
     two_sided
         Whether back faces reflect like front faces without a wrapper.
+    limited_width
+        Whether the larger width of an anisotropic lobe is at most 1, as in Cycles.
     """
 
     name: str
     table: ParameterTable
     scanned: tuple[str, ...]
     two_sided: bool
+    limited_width: bool
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """Every value `bind` needs besides the free ones, from those of a material; None is one of a texture.
@@ -62,6 +65,7 @@ class BlenderPrincipledModel:
     table: ParameterTable = BLENDER_PRINCIPLED
     scanned: tuple[str, ...] = ("roughness", "coat_roughness")
     two_sided: bool = True
+    limited_width: bool = True
 
     def __init__(self, cycles: CyclesModel = BLENDER_5_0) -> None:
         self._cycles = cycles
