@@ -15,7 +15,7 @@ from ..types.image import Pixels
 
 # A pixel with background in it depends on the exact positions of its samples, which the reference does not share
 MINIMUM_INTERIOR_SHARE = 0.3
-MINIMUM_LIGHT_SHARE = 0.5
+MINIMUM_LIGHT_SHARE = 0.5  # of the target's light in the reference
 MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target lights the silhouette and little else
 
 

@@ -12,7 +12,7 @@ from ..metrics.tone_mapping import View
 from ..types.image import Encoding, Image, Pixels
 from ..types.model_gap import ModelGap
 from .neighbours import sums_around
-from .region import box_around
+from .region import blocks_around
 
 BLOCK = 4  # pixels along each side of what is compared
 LEAST_BLOCKS = 32  # fewer say too little
@@ -30,7 +30,7 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
     itself. Noise that is not independent from pixel to pixel, as after denoising, counts as a difference; so does
     anything else that is wider than a pixel. None if the target fills too few blocks.
     """
-    near = tuple(slice(s.start // BLOCK * BLOCK, -(-s.stop // BLOCK) * BLOCK) for s in box_around(mask, 0))
+    near = blocks_around(mask, BLOCK)
     mask, target = mask[near], reference.pixels[near]
     first, second = (render[near] for render in renders)
     if reference.encoding is Encoding.SRGB:  # what a display cannot show is not known of the reference

@@ -16,7 +16,7 @@ from ..metrics.hdr_flip import HdrFlip
 from ..metrics.squared_loss import mean_squared_error
 from ..metrics.tone_mapping import DisplayView, View
 from ..types.image import Encoding, Image, Pixels
-from .region import box_around
+from .region import blocks_around
 
 
 def picture_errors(
@@ -35,8 +35,7 @@ def picture_errors(
     linear = reference.encoding is Encoding.LINEAR
     view = display or (DisplayView.for_scene(reference.pixels, mask) if linear else DisplayView())
     side = block_side(counted)
-    box = box_around(counted, side * flip_reach(DEFAULT_PIXELS_PER_DEGREE))
-    near = tuple(slice(span.start // side * side, span.stop) for span in box)  # blocks of the whole picture
+    near = blocks_around(counted, side, side * flip_reach(DEFAULT_PIXELS_PER_DEGREE))
     chosen = full_blocks(counted[near], side)
 
     target = block_means(Image(reference.pixels[near], reference.encoding), side)

@@ -25,14 +25,18 @@ def fill_outside(
     return replace(reference, pixels=np.where(mask[..., None], reference.pixels, shown).astype(np.float32))
 
 
-def box_around(mask: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
-    """Rows and columns of the least rectangle around the pixels of `mask`, and `margin` more on each side."""
+def blocks_around(mask: NDArray[np.bool_], side: int, margin: int = 0) -> tuple[slice, slice]:
+    """Rows and columns of the least rectangle of blocks around the pixels of `mask`, and `margin` pixels on each side.
+
+    Blocks of `side` pixels lie as in the whole picture; the last one may reach beyond it.
+    """
     rows, columns = (np.flatnonzero(mask.any(axis=1 - axis)) for axis in (0, 1))
-    return _span(rows, margin), _span(columns, margin)
+    return _span(rows, side, margin), _span(columns, side, margin)
 
 
-def _span(lines: NDArray[np.int64], margin: int) -> slice:
-    return slice(max(int(lines[0]) - margin, 0), int(lines[-1]) + 1 + margin)
+def _span(lines: NDArray[np.int64], side: int, margin: int) -> slice:
+    first, last = max(int(lines[0]) - margin, 0), int(lines[-1]) + 1 + margin
+    return slice(first // side * side, -(-last // side) * side)
 
 
 class MaskedLoss:

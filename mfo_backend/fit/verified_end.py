@@ -18,7 +18,7 @@ from ..render.mitsuba_renderer import MitsubaRenderer
 from ..render.renderer import Vector
 from ..render.widened_mask import widened
 from ..types.image import Encoding, Image, Pixels
-from .region import box_around
+from .region import blocks_around
 from .stages import Candidate
 from .verification import VERIFY_STREAM
 
@@ -40,7 +40,6 @@ PATHS_OF_A_PART = 1 << 19  # after twice as many, those of both halves, a reques
 
 _AROUND = 0x00A50000
 _NEXT_SAMPLE = 0x9E3779B9  # as between the parts of one picture, so that none repeats another's numbers
-
 
 # Parts of a picture: flat indices of their pixels, and radiance (pixels, 3) of each half
 _Halves = list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]]
@@ -119,7 +118,7 @@ class Verification:
     ) -> None:
         self._renderer, self._mask, self._view, self._should_stop = renderer, mask, view, should_stop
         self._side, self._encoding = block_side(mask), reference.encoding
-        self._near = tuple(slice(span.start // self._side * self._side, span.stop) for span in box_around(mask, 0))
+        self._near = blocks_around(mask, self._side)
         self._compared = full_blocks(mask[self._near], self._side)
         self._reference = self._displayed(reference)
         self._seed = seed ^ VERIFY_STREAM

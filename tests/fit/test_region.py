@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from mfo_backend.fit.region import MaskedLoss, fill_outside
+from mfo_backend.fit.region import MaskedLoss, blocks_around, fill_outside
 from mfo_backend.metrics.loss import make_loss
 from mfo_backend.types.image import Encoding, Image
 
@@ -30,3 +31,13 @@ def test_a_display_reference_gets_a_display_background() -> None:
     assert shown.encoding is Encoding.SRGB
     np.testing.assert_array_equal(shown.pixels[mask], 0.5)
     np.testing.assert_array_equal(shown.pixels[~mask], 0.25)
+
+
+@pytest.mark.parametrize(
+    ("side", "margin", "rows", "columns"),
+    [(1, 0, (5, 8), (9, 10)), (4, 0, (4, 8), (8, 12)), (4, 1, (4, 12), (8, 12)), (3, 7, (0, 15), (0, 18))],
+)
+def test_blocks_around_a_mask_lie_as_in_the_picture(side, margin, rows, columns) -> None:
+    mask = np.zeros((16, 16), bool)
+    mask[5:8, 9] = True
+    assert blocks_around(mask, side, margin) == (slice(*rows), slice(*columns))
