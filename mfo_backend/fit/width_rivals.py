@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Materials that look alike, as their anisotropic lobe is as wide as can be.
 
-Cycles clamps the larger of the lobe's two widths, roughness^2 / stretch, at 1 (`material/layers.py`). Past that only the
-other one counts, roughness^2 x stretch, and a fit that ends short of it knows nothing of the flat part: its derivatives
-call both values determined.
+Cycles clamps the larger of the lobe's two widths, roughness^2 / stretch, at 1 (`material/layers.py`). Past that only
+the other one counts, roughness^2 x stretch, and a fit that ends short of it knows nothing of the flat part: its
+derivatives call both values determined.
 """
 
 from __future__ import annotations
