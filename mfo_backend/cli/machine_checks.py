@@ -90,7 +90,8 @@ def _renderer() -> Iterator[Check]:
     try:
         yield Check("Mitsuba variant", "ok", load_variant())
     except SetupError as error:
-        yield Check("Mitsuba variant", "problem", str(error), _sentence(llvm_cure()) if needs_llvm() else "")
+        of_llvm = needs_llvm() and not os.environ.get("MFO_VARIANT")
+        yield Check("Mitsuba variant", "problem", str(error), _sentence(llvm_cure()) if of_llvm else "")
 
 
 def _gpu() -> Check:

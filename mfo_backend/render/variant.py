@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from ..types.errors import SetupError
@@ -15,8 +16,8 @@ CANDIDATES = ("llvm_ad_rgb", "metal_ad_rgb") if sys.platform != "darwin" else ("
 def load_variant(name: str | None = None) -> str:
     """Import Mitsuba and set a variant; returns its name. A variant that is set already is kept unless named otherwise.
 
-    Without a name the CPU comes first (on a Mac: Metal, which needs no LLVM): at the sizes of a fit the start-up of a
-    GPU costs more than it saves.
+    Without a name it is that of the environment's `MFO_VARIANT`, else the CPU comes first (on a Mac: Metal, which needs
+    no LLVM): a broken driver is not met, and what a GPU would save of a fit that takes seconds was not measured.
 
     Raises
     ------
@@ -30,6 +31,8 @@ def load_variant(name: str | None = None) -> str:
             f"Mitsuba cannot be imported ({error}): install mitsuba 3.9.1, then run `mfo doctor`."
         ) from None
     trust_only_mitsuba()
+    wanted = os.environ.get("MFO_VARIANT") if name is None else None
+    name = name or wanted or None
     current = mi.variant()
     if current is not None and "_ad_rgb" in current and name in (None, current):
         return current
@@ -46,7 +49,8 @@ def load_variant(name: str | None = None) -> str:
             if threads := threads_wanted():
                 use_threads(threads)
             return candidate
-    raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): run `mfo doctor` for what to install.")
+    cure = "unset MFO_VARIANT, which asks for it" if wanted else "run `mfo doctor` for what to install"
+    raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): {cure}.")
 
 
 def use_threads(count: int) -> None:
