@@ -47,7 +47,7 @@ def test_names_the_variant_that_does_not_exist() -> None:
 def test_the_environment_may_name_a_variant(monkeypatch: pytest.MonkeyPatch) -> None:
     before = load_variant()
     monkeypatch.setenv("MFO_VARIANT", "cuda_ad_purple")
-    with pytest.raises(SetupError, match="cuda_ad_purple is not built into this Mitsuba.*unset MFO_VARIANT"):
+    with pytest.raises(SetupError, match=r"cuda_ad_purple is not built into this Mitsuba.*unset MFO_VARIANT"):
         load_variant()
     assert load_variant(before) == before  # a name given comes first
     monkeypatch.setenv("MFO_VARIANT", "")
