@@ -78,10 +78,14 @@ class End:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another material that explains the picture about as well, and its share of the probability."""
+    """Another material that explains the picture about as well, and its share of the probability.
+
+    It is `last` where all that lies on the way to it does so, too; the share is then the mean square of the way.
+    """
 
     x: Vector
     share: float
+    last: bool = False
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,10 @@ def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: Paramete
         if rival.share < TOLD_FROM or not told:
             continue
         instead = ", ".join(f"{name} {_shown(rival.x, name, table)} (not {_shown(x, name, table)})" for name in told)
-        notes.append(f"With a probability of {100 * rival.share:.0f} % it is another material: {instead}.")
+        if rival.last:
+            notes.append(f"Every material from the result to this one looks the same: {instead}.")
+        else:
+            notes.append(f"With a probability of {100 * rival.share:.0f} % it is another material: {instead}.")
     return tuple(notes)
 
 

@@ -43,7 +43,7 @@ def width_rivals(problem: Problem, x: Vector, table: ParameterTable) -> tuple[Ri
     noise = max(cost, 0.5 * MODEL_ERROR**2)
     if problem.equations(alike(past)).cost > cost + HOPELESS * noise / problem.independent:
         return ()
-    return (Rival(alike(least), SHARE),)
+    return (Rival(alike(least), SHARE, last=True),)
 
 
 def _stretch(anisotropic: float) -> float:

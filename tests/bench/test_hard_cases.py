@@ -40,7 +40,7 @@ def test_sheen_is_lit_from_behind(name, tmp_path):
 
 
 def test_light_at_the_silhouette_is_as_exact_as_elsewhere(tmp_path):
-    """Most light is in pixels of which slivers are lit: an error of 0.05 without them, or with few rays in each."""
+    """Most light is in pixels of which slivers are lit: an error of 0.05 without them."""
     run = run_hard_case(HARD_CASES["blender-sheen"], 9, 64, tmp_path)
     assert run.solved
     assert not run.wrong

@@ -25,6 +25,13 @@ def test_values_that_differ_are_told_the_most_different_first():
     )  # without a coat its roughness says nothing
 
 
+def test_the_last_of_many_that_look_alike_has_no_probability_of_its_own():
+    last = Rival(TABLE.pack({**TABLE.unpack(FOUND), "roughness": 0.9}), 1.0 / 3.0, last=True)
+    assert rival_notes((last,), FOUND, TABLE) == (
+        "Every material from the result to this one looks the same: roughness 0.9 (not 0.3).",
+    )
+
+
 def test_a_colour_is_told_whole():
     (note,) = rival_notes((rival(0.2, base_color=(0.5, 0.3, 0.1)),), FOUND, TABLE)
     assert note.endswith("base_color (0.5, 0.3, 0.1) (not (0.5, 0.2, 0.1)).")

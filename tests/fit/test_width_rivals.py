@@ -36,6 +36,7 @@ def test_a_fit_short_of_the_widest_lobe_has_the_far_end_of_what_looks_alike_as_i
     short = np.sqrt(narrow / 0.995)  # of the stretch with which the larger width is 0.995
     x = np.array([np.sqrt(narrow / short), (1.0 - short**2) / 0.9])
     (rival,) = width_rivals(line, x, BRUSHED)
+    assert rival.last
     assert widths(rival.x) == pytest.approx((1.0, narrow), rel=1e-6)
     least = max(narrow, np.sqrt(0.1))
     assert rival.x == pytest.approx([np.sqrt(narrow / least), (1.0 - least**2) / 0.9])
