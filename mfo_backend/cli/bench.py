@@ -9,15 +9,15 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from ..bench.assets import Assets
-from ..bench.headline import fill, has_block
-from ..bench.method import DEFAULT_METHODS, METHODS, missing_for
-from ..bench.report import write_report
-from ..bench.row import Row
-from ..bench.row_file import RowFile, keep_setup
-from ..bench.run_bench import all_tasks, run_bench
-from ..bench.scatter import FitRecipe, run_scattered
-from ..bench.scenario import SCENARIOS
+from ..bench.report.headline import fill, has_block
+from ..bench.report.report import write_report
+from ..bench.rows.row import Row
+from ..bench.rows.row_file import RowFile, keep_setup
+from ..bench.runs.method import DEFAULT_METHODS, METHODS, missing_for
+from ..bench.runs.run_bench import all_tasks, run_bench
+from ..bench.runs.scatter import FitRecipe, run_scattered
+from ..bench.scenes.assets import Assets
+from ..bench.scenes.scenario import SCENARIOS
 from ..job.atomic_file import write_atomically
 from ..job.cluster import open_client, threads_each
 from ..job.progress_bar import terminal_columns
@@ -67,8 +67,8 @@ def run(arguments: argparse.Namespace) -> int:
         with open_client(arguments.scheduler, arguments.workers) as client:
             return work(arguments, lambda tasks, file, **common: run_scattered(tasks, file, client, recipe, **common))
 
-    from ..bench.fit_runner import FitRunner
-    from ..bench.machine import machine_facts
+    from ..bench.runs.fit_runner import FitRunner
+    from ..bench.runs.machine import machine_facts
 
     runner = FitRunner(arguments.out / "scenes", arguments.size, assets, pictures, host=_blender())
     machine = machine_facts(runner.variant, threads=runner.threads, import_seconds=runner.import_seconds)

@@ -12,10 +12,10 @@ from ..render.renderer import Renderer
 from ..types.errors import UnrecordableError
 from ..types.event import Listener
 from ..types.image import Image
-from .fit_material import FitOutcome, fit_material
-from .fit_recorded import fit_recorded
-from .fit_transmission import fit_transmission
+from .paper.fit import FitOutcome, fit_material
+from .recorded.fit import fit_recorded
 from .settings import FitSettings
+from .traced.fit import fit_transmission
 
 
 def recover_material(

@@ -21,7 +21,7 @@ from .job_folder import JobFolder
 from .request import Request, request_to_json
 
 if TYPE_CHECKING:
-    from ..fit.fit_material import FitOutcome
+    from ..fit.paper.fit import FitOutcome
     from ..render.renderer import Renderer
 
 _WITHOUT_LIGHT_PATHS = (
@@ -133,7 +133,7 @@ def _model_gap(
 
     The halves of the verification picture will do: it only chose the result among a few ends.
     """
-    from ..fit.model_gap import model_gap
+    from ..fit.judge.model_gap import model_gap
     from ..render.interruptible import Interrupted
 
     if outcome.result_halves is not None:

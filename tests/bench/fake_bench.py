@@ -9,9 +9,9 @@ import time
 from functools import partial
 from pathlib import Path
 
-from mfo_backend.bench.run_bench import run_bench
+from mfo_backend.bench.runs.run_bench import run_bench
 from mfo_backend.cli.bench import work
-from tests.bench.rows import FakeRunner
+from tests.bench.made_up_rows import FakeRunner
 
 
 class SlowRunner(FakeRunner):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from mfo_backend.bench.row_file import RowFile
+from mfo_backend.bench.rows.row_file import RowFile
 from mfo_backend.types.errors import BadInputError
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mfo_backend.bench import fit_runner
-from mfo_backend.bench.assets import Assets
-from mfo_backend.bench.fit_runner import FitRunner
-from mfo_backend.bench.row import Task
+from mfo_backend.bench.rows.row import Task
+from mfo_backend.bench.runs import fit_runner
+from mfo_backend.bench.runs.fit_runner import FitRunner
+from mfo_backend.bench.scenes.assets import Assets
 
 
 @pytest.fixture(scope="module")

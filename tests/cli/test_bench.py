@@ -8,11 +8,11 @@ from functools import partial
 
 import pytest
 
-from mfo_backend.bench.row_file import RowFile
-from mfo_backend.bench.run_bench import all_tasks, run_bench
+from mfo_backend.bench.rows.row_file import RowFile
+from mfo_backend.bench.runs.run_bench import all_tasks, run_bench
 from mfo_backend.cli.bench import work
 from mfo_backend.cli.main import main
-from tests.bench.rows import FakeRunner
+from tests.bench.made_up_rows import FakeRunner
 
 
 def arguments(folder) -> argparse.Namespace:

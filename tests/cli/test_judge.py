@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mfo_backend.cli.main import main
-from mfo_backend.fit.picture_errors import picture_errors
+from mfo_backend.fit.judge.picture_errors import picture_errors
 from mfo_backend.metrics import block_means
 from mfo_backend.metrics.flip_error import flip_error
 from mfo_backend.metrics.tone_mapping import DisplayView

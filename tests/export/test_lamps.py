@@ -10,9 +10,9 @@ from typing import Any
 import bpy
 import pytest
 
-from bench.light_parity import TABLE, measure, measure_scene
-from bench.light_scene import FLOORS, MATT, SHINY, add_light, build
 from blender_addon.export.job import ExportError, check_export
+from studies.parity.light_parity import TABLE, measure, measure_scene
+from studies.parity.light_scene import FLOORS, MATT, SHINY, add_light, build
 
 from .scenes import world_color
 

@@ -31,7 +31,7 @@ def corner(scene: Any) -> Any:
 
 
 def picture_of(report: Any, rounds: int = 6) -> np.ndarray:
-    from bench.cycles_parity import render_job
+    from studies.parity.cycles_parity import render_job
 
     halves = render_job(report.folder, rounds * 64)
     return (halves[0] + halves[1]) / 2

@@ -10,7 +10,7 @@ import pytest
 
 from blender_addon.export.ply_file import TriangleMesh
 from blender_addon.export.ply_file import write_ply as write_addon_ply
-from mfo_backend.bench.bumpy_sphere import bumpy_sphere, write_ply
+from mfo_backend.bench.scenes.bumpy_sphere import bumpy_sphere, write_ply
 from mfo_backend.scene.ply_file import check_ply
 from mfo_backend.types.errors import BadInputError
 

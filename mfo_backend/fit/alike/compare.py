@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a picture tells two materials apart, by how their squared residuals differ from tile to tile.
+
+Two materials that are no neighbours need no truth between them: both may miss it, by what renderers differ in or by the
+recording's own noise, which no chi squared knows of. Their difference of chi squared is a sum over tiles, whose scatter
+says how sure it is (Q. H. Vuong, "Likelihood Ratio Tests for Model Selection and Non-Nested Hypotheses", 1989).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..squares.problem import Problem
+from ..squares.recording_noise import rows_of_samples
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How much more chi squared another material has, the standard deviation of that, and the squared distance of their
+    pictures in the same unit."""
+
+    more: float
+    deviation: float
+    distance: float
+
+    @property
+    def inflation(self) -> float:
+        """How much larger the noise of the difference is than residuals of pure noise would make it."""
+        return max(self.deviation**2 / max(4.0 * self.distance, 1e-12), 1.0)
+
+    @property
+    def better(self) -> float:
+        """The probability that the other material explains the picture better than the first."""
+        return NormalDist().cdf(-self.more / max(self.deviation, 1e-12))
+
+
+def compare(problem: Problem, first: Vector, other: Vector, model_error: float = 0.0) -> Comparison:
+    """Compare two vectors on the tiles of a problem; its residuals of noise at `first` count as one each.
+
+    `model_error` is the least root mean square error of a residual, for problems without noise.
+    """
+    (rows, own), (other_rows, other_own) = (
+        rows_of_samples(problem.evaluate.samples(x), problem.residual) for x in (first, other)
+    )
+    here, there = rows[:, :, 0], other_rows[:, :, 0]
+    squares, away = there**2 - here**2, (there - here) ** 2
+    if own is not None and other_own is not None:
+        squares -= other_own[:, :, 0] ** 2 - own[:, :, 0] ** 2
+        away -= (other_own[:, :, 0] - own[:, :, 0]) ** 2
+    cost, more = problem.equations(first).cost, problem.equations(other).cost
+    unit = max(cost, 1e-30) / problem.independent
+    tiles = squares.mean(1) / (2.0 * len(squares) * unit)
+    distance = max(float(away.mean() / (2.0 * unit)), 0.0)
+    # errors of the picture as large as the model's let the difference of the squares of two others vary by so much
+    least = 4.0 * distance * model_error**2 / (2.0 * unit * problem.independent)
+    deviation = float(np.sqrt(max(np.sum((tiles - tiles.mean()) ** 2), least)))
+    return Comparison((more - cost) / unit, deviation, distance)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other basins than the one in which a fit under exact lights has ended.
+
+The race of starts ends as soon as one comes near, and with Blender's lobes wrong materials come within a thousandth:
+a coat's highlight for the base's, a rougher coat, a sheen for none. So further solves start from what it is taken for;
+they are given up where they promise no less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solve.bounded_least_squares import Solution
+from ...types.parameter import ParameterTable
+from ..certainty.covariance import MODEL_ERROR
+from ..search.global_start import OPPOSITE
+from ..search.race_starts import CLEARLY_LOWER
+from ..squares.problem import Problem, Rival
+from .compare import compare
+from .simplest import APART, HOPELESS, exchangeable, exchanged
+
+Vector = NDArray[np.float64]
+# of a start, given up where it promises no less than this cost
+SolveBelow = Callable[[Vector, float], Solution]
+
+SOLVED = 1e-8  # a relative error of 1.4e-4 a pixel: no wrong basin of 128 hard cases came as near
+MOST_MOVES = 3  # from basin to basin
+HALF = 0.5
+SHEENS = (0.1, 0.5)  # roughnesses of a sheen to begin with
+F0_OF_LEVEL = 0.08  # of a specular level of 1 (Burley 2012; Blender's at an index of 1.5)
+DARK_ALBEDO, DARK_F0 = 0.05, 0.1  # black plastic and grey metal look alike below
+
+
+def best_basin(solve: SolveBelow, found: Solution, table: ParameterTable) -> Solution:
+    """`found`, or a solution that costs clearly less."""
+    for _ in range(MOST_MOVES):
+        better = _better(solve, found, table)
+        if better is None:
+            break
+        found = better
+    return found
+
+
+def _better(solve: SolveBelow, found: Solution, table: ParameterTable) -> Solution | None:
+    known = found.equations.cost
+    if known <= SOLVED:
+        return None
+    limit = CLEARLY_LOWER * known
+    solutions = (solve(np.clip(start, table.lower, table.upper), limit) for start in moved(found.x, table))
+    return next((other for other in solutions if other.equations.cost < limit), None)
+
+
+def moved(x: Vector, table: ParameterTable) -> Iterator[Vector]:
+    """Materials that may be taken for `x`, of Blender's lobes only, in the order in which they are worth a trial."""
+    if not exchangeable(table):
+        return
+    yield exchanged(x, table)
+    yield _with(x, table, roughness=HALF * _value(x, table, "roughness"))
+    yield _with(x, table, coat_roughness=HALF)
+    yield _with(x, table, coat_weight=HALF)
+    if "sheen_weight" in table.names:
+        for roughness in SHEENS:
+            yield _with(x, table, sheen_weight=HALF, sheen_roughness=roughness)
+
+
+def metal_rivals(
+    problem: Problem, solve: SolveBelow, found: Solution, table: ParameterTable
+) -> tuple[Solution, tuple[Rival, ...]]:
+    """The better of `found` and its like among metals or dielectrics, and the other one as a rival of it.
+
+    Nothing but the reflectance at normal incidence tells a black dielectric from a dark metal. Where neither is dark
+    there is no rival.
+    """
+    start = metal_exchanged(found.x, table)
+    if start is None:
+        return found, ()
+    cost = found.equations.cost
+    noise = max(cost, 0.5 * MODEL_ERROR**2)
+    most = cost + HOPELESS * noise / problem.independent
+    other = solve(np.clip(start, table.lower, table.upper), most)
+    away = np.max(np.abs(other.x - found.x) / (table.upper - table.lower))
+    if other.equations.cost > most or away < APART:
+        return found, ()
+    if other.equations.cost < cost:
+        found, other = other, found
+    return found, (Rival(other.x, compare(problem, found.x, other.x, MODEL_ERROR).better),)
+
+
+def metal_exchanged(x: Vector, table: ParameterTable) -> Vector | None:
+    """The dark metal that reflects as much as a black dielectric, or the other way round; None where `x` is neither."""
+    level = next((name for name in ("specular", "specular_ior_level") if name in table.names), None)
+    if level is None or not {"base_color", "metallic"} <= set(table.names):
+        return None
+    color, metallic = x[table.slice_of("base_color")], _value(x, table, "metallic")
+    f0 = (1.0 - metallic) * F0_OF_LEVEL * _value(x, table, level) + metallic * color
+    if np.max((1.0 - metallic) * color) > DARK_ALBEDO or np.max(f0) > DARK_F0:
+        return None
+    dielectric, metal = OPPOSITE
+    if metallic < HALF:
+        return _with(x, table, metallic=metal, base_color=f0)
+    return _with(x, table, metallic=dielectric, base_color=0.0, **{level: float(f0.mean()) / F0_OF_LEVEL})
+
+
+def _value(x: Vector, table: ParameterTable, name: str) -> float:
+    return float(x[table.slice_of(name)][0])
+
+
+def _with(x: Vector, table: ParameterTable, **values: float | Vector) -> Vector:
+    y = x.copy()
+    for name, value in values.items():
+        if name in table.names:
+            y[table.slice_of(name)] = value
+    return y

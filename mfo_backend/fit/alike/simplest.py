@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simplest of several materials between which the picture does not decide.
+
+A highlight may be the base's own or a coat's, a dim broad one that of a rough metal or of another lobe. Such materials
+are basins of their own: a quadratic around one knows nothing of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solve.bounded_least_squares import Solution
+from ...types.parameter import ParameterTable
+from ..squares.problem import Problem, Refined, Rival
+from .compare import compare
+from .unneeded_lobes import SIGNIFICANT, Box, box_holding, is_off, values_off
+
+Vector = NDArray[np.float64]
+
+BASE, COAT = ("specular_ior_level", "roughness"), ("coat_weight", "coat_roughness")
+SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the same index does (Blender 4.0)
+EVALUATIONS = 12
+APART = 0.02  # of the box, in some value: another material
+# More chi squared is not looked at: in nine scenes that Cycles had rendered, such differences were 2.6 to 17 standard
+# deviations by the scatter between tiles, and smaller ones at most 2.3
+HOPELESS = 60.0
+
+
+class Solve(Protocol):
+    """A bounded solve of a problem from a start, given up where it promises no less than the `wanted` cost."""
+
+    def __call__(self, problem: Problem, start: Vector, evaluations: int, *, box: Box, wanted: float) -> Solution:
+        """Its solution, which may cost more than is wanted."""
+        ...
+
+
+@dataclass(frozen=True)
+class SimplestEnd:
+    """The material chosen, the names of values held at the user's in it, and what else it might be."""
+
+    end: Solution
+    off: tuple[str, ...]
+    rivals: tuple[Rival, ...] = ()
+
+
+class OtherEnds:
+    """Solutions in other basins than that of a fit's last problem."""
+
+    def __init__(self, refined: Refined, solve: Solve, user: Vector, table: ParameterTable) -> None:
+        self._few, self._all, self._solve, self._user, self._table = refined.few, refined.all, solve, user, table
+
+    def simplest(self, found: SimplestEnd) -> SimplestEnd:
+        """What the picture does not tell from `found`: with base and coat exchanged, without lobes that are new."""
+        return self._without_lobes(self._exchanged(found))
+
+    def _exchanged(self, found: SimplestEnd) -> SimplestEnd:
+        """With the highlights of base and coat exchanged, where that is better, or as good and nearer to the user's."""
+        x, table = found.end.x, self._table
+        if not exchangeable(table) or COAT[0] in found.off or is_off(COAT[0], x, table):
+            return found
+        box = box_holding(table, self._user, found.off)
+        end = self._attempt(found.end, np.clip(exchanged(x, table), *box), box)
+        width = table.upper - table.lower
+        if end is None or np.max(np.abs(end.x - x) / width) < APART:
+            return found
+        if is_off(COAT[0], end.x, table) and COAT[0] in values_off(table, self._user):
+            return found  # which is simpler: `_without_lobes` comes there, too
+        it = compare(self._all, x, end.x)
+        nearer = np.linalg.norm((end.x - self._user) / width) < np.linalg.norm((x - self._user) / width)
+        if it.more / it.inflation < -SIGNIFICANT or (nearer and it.more < SIGNIFICANT):
+            return replace(found, end=end, rivals=(*found.rivals, Rival(x, 1.0 - it.better)))
+        return replace(found, rivals=(*found.rivals, Rival(end.x, it.better)))
+
+    def _without_lobes(self, found: SimplestEnd) -> SimplestEnd:
+        """Without the lobes that `found` has and the user's material lacks, where no more than chance is against it.
+
+        Each of them counts three standard deviations against a material: what it would need to come in alone.
+        """
+        x, table = found.end.x, self._table
+        lobes = [n for n in values_off(table, self._user) if n not in found.off and not is_off(n, x, table)]
+        if not lobes:
+            return found
+        off, price = (*found.off, *lobes), SIGNIFICANT * len(lobes)
+        box = box_holding(table, self._user, off)
+        starts = [np.clip(start, *box) for start in self._without_coat(x, lobes)]
+        end = self._attempt(found.end, min(starts, key=lambda start: self._few.equations(start).cost), box)
+        if end is None:
+            return found
+        it = compare(self._all, x, end.x)
+        against = it.more / it.inflation - price
+        if against > 0.0:
+            return found
+        share = float(1.0 / (1.0 + np.exp(-0.5 * against)))  # of all materials with these lobes
+        others = [Rival(rival.x, share * rival.share) for rival in found.rivals]
+        rest = share - sum(rival.share for rival in others)
+        return SimplestEnd(end, off, (*others, Rival(x, rest)))
+
+    def _without_coat(self, x: Vector, lobes: list[str]) -> Iterator[Vector]:
+        yield x
+        if COAT[0] in lobes and exchangeable(self._table):
+            yield coat_to_base(x, self._table)
+
+    def _attempt(self, found: Solution, start: Vector, box: Box) -> Solution | None:
+        """The end of another solve on all tiles, first tried on some of them; None where it is hopeless."""
+        if self._few is not self._all:
+            trial = self._solve_below(self._few, found, start, box)
+            if trial is None:
+                return None
+            start = trial.x
+        return self._solve_below(self._all, found, start, box)
+
+    def _solve_below(self, problem: Problem, found: Solution, start: Vector, box: Box) -> Solution | None:
+        most = problem.equations(found.x).cost * (1.0 + HOPELESS / problem.independent)
+        end = self._solve(problem, start, EVALUATIONS, box=box, wanted=most)
+        return end if end.equations.cost <= most else None
+
+
+def exchanged(x: Vector, table: ParameterTable) -> Vector:
+    """The material whose base has the coat's highlight and whose coat has the base's."""
+    level, roughness, weight, coat_roughness = (float(x[table.slice_of(name)][0]) for name in (*BASE, *COAT))
+    return _with(x, table, weight / SAME_F0, coat_roughness, level * SAME_F0, roughness)
+
+
+def coat_to_base(x: Vector, table: ParameterTable) -> Vector:
+    """The material without a coat whose base has the coat's highlight, as bright as both."""
+    level, _, weight, coat_roughness = (float(x[table.slice_of(name)][0]) for name in (*BASE, *COAT))
+    return _with(x, table, level + weight / SAME_F0, coat_roughness, 0.0, coat_roughness)
+
+
+def _with(x: Vector, table: ParameterTable, *values: float) -> Vector:
+    """`x` with these values of base and coat, and their highlights without a tint."""
+    y = x.copy()
+    for name, value in zip((*BASE, *COAT), values, strict=True):
+        y[table.slice_of(name)] = value
+    for name in ("specular_tint", "coat_tint"):
+        if name in table.names:
+            y[table.slice_of(name)] = 1.0
+    return np.clip(y, table.lower, table.upper)
+
+
+def exchangeable(table: ParameterTable) -> bool:
+    """Whether both highlights are free, so that either may be the other's."""
+    return all(name in table.names for name in (*BASE, *COAT))

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Standard deviations of recovered values from the last Jacobian, in float64.
+
+Sandwich estimate clustered by group (P. Huber 1967; H. White 1980): Cov = H^-1 (sum_g q_g q_g^T) H^-1 with
+q_g = J_g^T r_g. It needs no model of the noise, unlike s^2 H^-1, which is several times too small where neighbouring
+pixels or channels share their noise. Where a few pixels rule a value, as those of a highlight do, they count with the
+residual that a solution without them would leave (`solve.leverage`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solve.leverage import residuals_left_out
+from ...types.certainty import Certainty, Level
+from ...types.parameter import ParameterTable
+from ..squares.problem import Rival
+from ..squares.recording_noise import without_own_noise
+
+Vector = NDArray[np.float64]
+
+DETERMINED_BELOW = 0.02  # of a value that spans [0, 1]: two such steps are hard to tell apart by eye
+WEAK_BELOW = 0.15
+# Relative error a picture has even where the residual says 0: float32, quantisation, small differences of renderers
+MODEL_ERROR = 0.002
+INFLATION = 1.2  # where own noise in the derivatives is not known
+PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite
+
+
+def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:
+    """Covariance (k, k) in widths of the box from weighted residuals and their derivatives (g, 3, 1 + k).
+
+    `own` is the recording's noise in them, half the difference of two samples (None for none): squares of derivatives
+    hold it, too, and would make every value look better determined. `model_error` is the least error of a residual;
+    the default is for relative ones.
+    """
+    g, _, columns = rows.shape
+    k = columns - 1
+    width = table.upper - table.lower
+    scaled, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
+    noise = np.maximum(np.abs(residual), model_error)
+    gram, own_products = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True), 0.0
+    if own is not None:
+        half = own[:, :, 1:] * width
+        gram, inflation = without_own_noise(gram, np.einsum("gck,gcl->kl", half, half, optimize=True)), 1.0
+        own_products = np.einsum("gck,gc->gk", half, own[:, :, 0], optimize=True)
+    # a prior as wide as the box, in units of the mean noise
+    prior = float(np.mean(noise**2)) / PRIOR_SD**2
+    inverse = np.linalg.inv(gram + prior * np.eye(k))
+    left_out = residuals_left_out(scaled, np.where(residual < 0.0, -noise, noise)[:, :, None], inverse)[:, :, 0]
+    q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True) - own_products
+    found = inverse @ (q.T @ q + prior * prior * PRIOR_SD**2 * np.eye(k)) @ inverse
+    return inflation**2 * g / max(g - k / 3, 1) * found
+
+
+def with_rivals(spread: Vector, x: Vector, rivals: Sequence[Rival], width: Vector) -> Vector:
+    """A covariance (k, k) in widths of the box around `x`, with those materials that it might be instead."""
+    for rival in rivals:
+        away = (rival.x - x) / width
+        spread = spread + rival.share * np.outer(away, away)
+    return spread
+
+
+def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:
+    """Standard deviation (k,) of each value, in its own unit, from a `covariance`."""
+    return (table.upper - table.lower) * np.sqrt(np.maximum(np.diag(spread), 0.0))
+
+
+def certainties(sd: Vector, table: ParameterTable) -> dict[str, Certainty]:
+    """Certainty of each value; a colour is as sure as its worst channel."""
+    result = {}
+    for parameter in table:
+        part = sd[table.slice_of(parameter.name)]
+        worst = float(part.max()) / (parameter.upper - parameter.lower)
+        if worst < DETERMINED_BELOW:
+            level = Level.DETERMINED
+        else:
+            level = Level.WEAK if worst < WEAK_BELOW else Level.NOT_VISIBLE
+        result[parameter.name] = Certainty(tuple(float(v) for v in part), level)
+    return result

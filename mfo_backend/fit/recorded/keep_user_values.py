@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which values go back to the user's: lobes that only noise asked for, and values the picture does not determine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solve.bounded_least_squares import step_in_box
+from ...types.certainty import Certainty, Level
+from ...types.image import Pixels
+from ...types.parameter import ParameterTable
+from ..alike.rival_notes import rival_notes
+from ..alike.unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
+from ..certainty.covariance import MODEL_ERROR, certainties, covariance, standard_deviations, with_rivals
+from ..squares.problem import Problem, Refined
+from ..squares.recording_noise import rows_of_samples
+from ..squares.residuals import RelativeResidual
+from .stages import RecordedFit, Vector
+
+# Values the picture does not determine go back to the user's if that costs no more than this share of the residual
+KEEP_TOLERANCE = 1.01
+HOPELESS = 1.1  # the same, by some of the groups
+VISIBLE = 0.002  # mean FLIP; values that the picture does not show change it by less than half of this
+# Mean change of a picture's pixels, relative to them and to a hundredth of their median, that FLIP need not be asked
+# about: even where both were equal, where FLIP is steepest, it rises by 0.0013 at most
+UNSEEN_CHANGE = 5e-5
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A vector, how sure each value is, their covariance in widths of the box, and sentences for the report.
+
+    `held` names the values that are the user's again; later stages leave them alone.
+    """
+
+    x: Vector
+    held: tuple[str, ...]
+    certainty: dict[str, Certainty]
+    spread: NDArray[np.float64]
+    notes: tuple[str, ...]
+
+
+def keep_values(
+    fit: RecordedFit, refined: Refined, *, weighted: bool, seen: Callable[[Pixels], float] | None = None
+) -> Kept:
+    """The refined vector with unneeded lobes switched off again and undetermined values given back.
+
+    `weighted` says that the problem's residuals are in standard deviations of the noise. Others have a floor, below
+    which a change may be seen all the same: `seen`, the mean error of a picture to the eye, must not grow either.
+    """
+    table, user = fit.table, fit.scene.renderer.start
+    found, problem = refined.x, refined.all
+    judged, unseen_change = _Judged(fit, refined, weighted), _UnseenChange(fit, refined, seen)
+    cost, certainty, spread = judged(found)
+    off = list(refined.off)
+    if not off:
+        least = 0.0 if weighted else MODEL_ERROR
+        off = unneeded_lobes(problem.equations(found), problem.independent, found, user, table, least)
+    moved = moved_to_user(off, found, user, table)
+    if moved:
+        allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
+        simpler = _solve_holding(fit, refined, found, off)
+        if simpler is not None and (again := judged(simpler))[0] <= allowed + 1e-12 and unseen_change(simpler):
+            found, (cost, certainty, spread) = simpler, again
+        else:
+            off = [name for name in off if name not in moved]
+
+    notes: list[str] = []
+    unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
+    if unseen and len(unseen) < len(table):
+        for back in _sets_to_return(unseen, off, problem, found, user, table):
+            held = [*back, *(name for name in off if name not in back)]
+            kept = _solve_holding(fit, refined, found, held)
+            if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
+                found, off = kept, held
+                notes.append(kept_note(back))
+                break
+    notes += rival_notes(refined.rivals, found, table)
+    return Kept(found, tuple(off), certainty, spread, tuple(notes))
+
+
+def kept_note(names: Iterable[str]) -> str:
+    """The sentence on values that went back to the user's."""
+    return f"The picture does not determine {', '.join(names)}: kept as in the scene."
+
+
+def _sets_to_return(
+    unseen: list[str], off: list[str], problem: Problem, found: Vector, user: Vector, table: ParameterTable
+) -> Iterator[list[str]]:
+    """All values the picture does not determine, then those of them that go back without any sign of it.
+
+    One of them alone may be free where all together are not: they trade against each other.
+    """
+    yield unseen
+    equations = problem.equations(found)
+
+    def change(names: list[str]) -> float:
+        return step_in_box(equations, found, *box_holding(table, user, [*names, *off]))[1]
+
+    limit = SIGNIFICANT * equations.cost / problem.independent
+    others = [name for name in unseen if name not in off]
+    some = dispensable(others, change, limit)
+    if len(some) == len(others):  # these have just been tried
+        some = some[: len(some) // 2]
+    while some:
+        yield some
+        some = some[: len(some) // 2]  # the cheapest
+
+
+class _Judged:
+    """Mean square residual, certainty and covariance at a vector."""
+
+    def __init__(self, fit: RecordedFit, refined: Refined, weighted: bool) -> None:
+        self._fit, self._problem, self._weighted, self._rivals = fit, refined.all, weighted, refined.rivals
+
+    def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
+        problem, table = self._problem, self._fit.table
+        residual = problem.residual
+        if not self._weighted:
+            residual = RelativeResidual(problem.groups.average(self._fit.reference))
+        rows, own = rows_of_samples(problem.evaluate.samples(x), residual)
+        spread = covariance(rows, own, table, model_error=0.0 if self._weighted else MODEL_ERROR)
+        spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
+        return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table), spread
+
+    def noise(self, cost: float) -> float:
+        """Mean square of a residual that is noise."""
+        return cost if self._weighted else max(cost, MODEL_ERROR**2)
+
+
+class _UnseenChange:
+    """Whether the recorded picture of a vector is no worse to the eye than that of the solution."""
+
+    def __init__(self, fit: RecordedFit, refined: Refined, seen: Callable[[Pixels], float] | None) -> None:
+        self._fit, self._found, self._evaluate, self._seen = fit, refined.x, refined.all.evaluate, seen
+
+    def __call__(self, x: Vector) -> bool:
+        if self._seen is None:
+            return True
+        # of the problem's pixels, evenly spread and the brightest: those that see nothing of the target do not change
+        before, after = (self._evaluate(vector)[:, :, 0] for vector in (self._found, x))
+        if relative_change(before, after) * self._fit.mask.mean() <= UNSEEN_CHANGE:
+            return True
+        return self._seen(self._fit.picture(x)) <= self._error + VISIBLE
+
+    @cached_property
+    def _error(self) -> float:
+        assert self._seen is not None
+        return self._seen(self._fit.picture(self._found))
+
+
+def relative_change(before: NDArray[np.floating], after: NDArray[np.floating]) -> float:
+    """Mean change of linear values, relative to each of them and to a hundredth of their median."""
+    dim = max(0.01 * float(np.median(before)), 1e-30)
+    return float(np.mean(np.abs(after - before) / (np.abs(before) + dim)))
+
+
+def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: list[str]) -> Vector | None:
+    """The best vector with these names at the user's values; None where it is hopeless by some of the groups alone.
+
+    The quadratic around `found` mostly tells where it is: what goes back hardly shows.
+    """
+    lower, upper = box_holding(fit.table, fit.scene.renderer.start, names)
+    start = np.clip(found, lower, upper)
+    if np.all(lower >= upper):
+        return start
+    if refined.few is not refined.all:
+        around = refined.all.equations(found)
+        step, rise = step_in_box(around, found, lower, upper)
+        if rise > around.cost:
+            return None
+        guess, cost = found + step, refined.few.equations
+        before = cost(found).cost
+        if cost(guess).cost <= KEEP_TOLERANCE * before:
+            start = guess
+        else:
+            nearer, hopeless = min(start, guess, key=lambda x: cost(x).cost), HOPELESS * before
+            start = fit.solve_within(refined.few, nearer, lower, upper, wanted=hopeless)
+            if cost(start).cost > hopeless:
+                return None
+    return fit.solve_within(refined.all, start, lower, upper)

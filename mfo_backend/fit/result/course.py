@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The course of a second-order fit: least-squares stages turned into events and reports."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...render.renderer import Renderer
+from ...solve.bounded_least_squares import NormalEquations
+from ...types.event import Listener, Preview, Progress, StageEnd
+from ...types.image import Pixels
+from ...types.result import CurvePoint, StageReport
+from ...types.status import Status
+from .best_so_far import BestSoFar
+
+Vector = NDArray[np.float64]
+_QUIET_SECONDS = 0.05  # between two progress events; an iteration takes about a millisecond
+_PREVIEW_SECONDS = 1.0  # no more than one preview in this time
+
+# What the stages take of the time of a fit, and how many evaluations they need: rough means for the time left
+_EXPECTED = {
+    "scan": (2.0, 90),
+    "start": (3.0, 80),
+    "refine": (3.0, 20),
+    "display": (1.0, 10),
+    "itp": (1.0, 10),
+    "pu21": (1.0, 10),
+    "flip": (4.0, 20),
+    "race": (2.0, 5),
+    "polish": (4.0, 10),
+}
+_VERIFICATION = 1.5  # the pictures after the last stage, in the same unit
+
+
+@dataclass
+class Stage:
+    """What a running stage has seen: the root mean square of its residual at every evaluation."""
+
+    name: str
+    curve: list[CurvePoint] = field(default_factory=list)
+    status: Status = Status.CONVERGED
+    vector: Vector | None = None
+    loss_start: float = np.nan
+    loss_best: float = np.inf
+    best: Vector | None = None  # of the lowest loss, until it has been shown
+
+
+class Course:
+    """Runs the named stages one after another and tells the listener."""
+
+    def __init__(
+        self,
+        renderer: Renderer,
+        stages: tuple[str, ...],
+        listener: Listener,
+        should_stop: Callable[[], bool],
+        began: float,
+    ) -> None:
+        self.names = stages
+        self.should_stop = should_stop
+        self.reports: list[StageReport] = []
+        self._renderer, self._listener, self._began = renderer, listener, began
+        self._told = self._shown = -np.inf
+        self._best = BestSoFar(renderer, listener, began)
+        self.picture: Callable[[Vector], Pixels] | None = None  # of a vector, for previews
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Stage]:
+        """Open a stage; its end event and report follow when the block is left."""
+        entered = time.monotonic()
+        stage = Stage(name)
+        yield stage
+        if self.should_stop():
+            stage.status = Status.CANCELLED
+        if stage.vector is not None:
+            self._best.found(name, stage.vector)
+        self._best.tell(at_once=True)
+        vector = self._renderer.start if stage.vector is None else stage.vector
+        best = float(min(stage.loss_best, stage.loss_start))
+        self._listener(
+            StageEnd(name, stage.status.value, stage.status.sentence, len(stage.curve), stage.loss_start, best)
+        )
+        self.reports.append(
+            StageReport(
+                name=name,
+                status=stage.status,
+                loss_start=stage.loss_start,
+                loss_best=best,
+                iterations=len(stage.curve),
+                seconds=time.monotonic() - entered,
+                values=self._renderer.table.unpack(vector),
+                curve=tuple(stage.curve),
+            )
+        )
+
+    def watch(
+        self, stage: Stage, residuals: Callable[[Vector], NormalEquations]
+    ) -> Callable[[Vector], NormalEquations]:
+        """`residuals`, with every evaluation noted in `stage`."""
+
+        noted = self.values(stage)
+
+        def watched(x: Vector) -> NormalEquations:
+            equations = residuals(x)
+            noted(x, float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf)
+            return equations
+
+        return watched
+
+    def values(self, stage: Stage) -> Callable[[Vector, float], None]:
+        """A function that notes the loss of every vector it is told in `stage`."""
+
+        def noted(x: Vector, loss: float) -> None:
+            if loss < stage.loss_best:
+                stage.best = x.copy()
+                self._best.found(stage.name, x)
+            self.note(stage, loss)
+            self._show(stage, time.monotonic())
+
+        return noted
+
+    def _show(self, stage: Stage, now: float) -> None:
+        """Tell a preview of the stage's best, where that is new."""
+        if self._shown == -np.inf:
+            self._shown = self._began
+        if self.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
+            return
+        passes = self._renderer.passes
+        self._listener(Preview(self.picture(stage.best)))
+        self._renderer.passes = passes  # how many previews there are depends on the clock, and the fit needs none
+        stage.best, self._shown = None, time.monotonic()
+
+    def reached(self, stage: Stage, x: Vector, loss: float) -> None:
+        """Note an evaluation whose vector is the best so far whatever its loss, which noise has a part in."""
+        stage.best = x.copy()
+        self._best.found(stage.name, x)
+        self.note(stage, loss)
+        self._show(stage, time.monotonic())
+
+    def note(self, stage: Stage, loss: float) -> None:
+        """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard."""
+        if not stage.curve:
+            stage.loss_start = loss
+        stage.loss_best = min(stage.loss_best, loss)
+        now = time.monotonic()
+        seconds = now - self._began
+        stage.curve.append(CurvePoint(len(stage.curve) + 1, loss, stage.loss_best, seconds, self._renderer.passes))
+        self._best.tell(now)
+        if now - self._told > _QUIET_SECONDS:
+            self._told = now
+            self._tell(stage, loss, seconds)
+
+    def _tell(self, stage: Stage, loss: float, seconds: float) -> None:
+        index = self.names.index(stage.name)
+        shares = [_EXPECTED.get(name, (1.0, 10))[0] for name in self.names]
+        count = len(stage.curve)
+        within = count / (count + _EXPECTED.get(stage.name, (1.0, 10))[1])
+        fraction = (sum(shares[:index]) + shares[index] * within) / (sum(shares) + _VERIFICATION)
+        self._listener(
+            Progress(
+                stage=stage.name,
+                stage_index=index,
+                stage_count=len(self.names),
+                iteration=count,
+                loss=loss,
+                best=stage.loss_best,
+                fraction=fraction,
+                seconds=seconds,
+                remaining_seconds=seconds * (1.0 - fraction) / fraction,
+            )
+        )

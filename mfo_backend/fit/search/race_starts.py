@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bounded fits from several starts of one problem: the best end, and other basins that cost little more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solve.bounded_least_squares import Solution
+from ..recorded_plan import RecordedPlan
+
+Vector = NDArray[np.float64]
+# of a start, at most so many evaluations, and the cost of the best solution so far, which it has to be better than
+Solve = Callable[[Vector, int, float], Solution]
+
+# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
+# weights, which come from the solution that it is compared with, are only about right
+CLEARLY_LOWER = 0.97
+_LONGER = 40  # evaluations of those that their trial has not finished
+_APART = 0.1  # of the box, in some value: another basin
+
+
+def race(
+    solve: Solve,
+    starts: Sequence[Vector],
+    width: Vector,
+    plan: RecordedPlan,
+    should_stop: Callable[[], bool],
+) -> list[Solution]:
+    """The best solution, then the others that differ from it and from each other and cost little more.
+
+    Starts that fall behind are given up, and all others once one has solved the problem. `width` is that of the box.
+    """
+    found: list[Solution] = []
+    for start in starts:
+        best = min((solution.equations.cost for solution in found), default=0.0)
+        found.append(solve(start, plan.trial_evaluations, best))
+        if _within(found[-1], plan.solved_rms) or should_stop():
+            break
+    found.sort(key=lambda solution: solution.equations.cost)
+    leader = found[0]
+    for place, candidate in enumerate(list(found)):
+        near = _within(leader, plan.seen_rms)
+        behind = candidate.equations.cost > (1.0 if near else plan.keep_factor) * leader.equations.cost
+        if candidate.converged or behind or _within(leader, plan.solved_rms) or should_stop():
+            continue
+        longer = solve(candidate.x, _LONGER, 0.0 if candidate is leader else leader.equations.cost)
+        found[place] = longer
+        if longer.equations.cost < leader.equations.cost:
+            leader = longer
+    alone = _within(leader, plan.solved_rms)
+    others = [] if alone else sorted(found, key=lambda solution: solution.equations.cost)
+    return _different([leader, *others], width, plan)
+
+
+def _different(solutions: Sequence[Solution], width: Vector, plan: RecordedPlan) -> list[Solution]:
+    chosen = [solutions[0]]
+    for solution in solutions[1:]:
+        apart = all(np.max(np.abs(solution.x - other.x) / width) > _APART for other in chosen)
+        if apart and solution.equations.cost <= plan.basin_factor * chosen[0].equations.cost:
+            chosen.append(solution)
+    return chosen[: plan.basins]
+
+
+def _within(solution: Solution, rms: float) -> bool:
+    return bool(np.sqrt(2.0 * solution.equations.cost) < rms)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From pixels and their Jacobian to normal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.response import ChannelResponse, Logarithmic, Response
+from ...solve.bounded_least_squares import NormalEquations
+
+Vector = NDArray[np.float64]
+Rows = NDArray[np.float32]
+ImageAndJacobian = Callable[[Vector], Rows]  # (g, 3, 1 + k): the image and its derivatives
+LEAST_MEDIAN = 0.1
+
+
+class Residual(Protocol):
+    """The signed difference of an image (g, 3) to a reference, and its derivative by the image.
+
+    The derivative is (g, 3) when each output depends on its own channel only, else (g, 3 outputs, 3 channels).
+    """
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """Values (g, 3) and derivative."""
+        ...
+
+
+class ResponseResidual:
+    """The difference of a pointwise response to image and reference (g, 3)."""
+
+    def __init__(self, response: Response, reference: Rows) -> None:
+        self._response = response
+        self._target = response.apply(reference)
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values = self._response.apply(image) - self._target
+        if isinstance(self._response, ChannelResponse):
+            return values, self._response.slope(image)
+        unit = np.broadcast_to(np.eye(3, dtype=image.dtype)[:, None, :], (3, *image.shape))
+        return values, np.moveaxis(self._response.push(image, unit), 0, 2)
+
+
+def log_residual(reference: Rows) -> ResponseResidual:
+    """log(1 + 3 L / median): compressive, so highlights and shadows both count; the median lies mid-curve.
+
+    It is the mean's `LEAST_MEDIAN` at least. A metal under one lamp is black but for its highlight: there a smaller
+    scale would weigh differences that nobody sees as much as the highlight.
+    """
+    lit = reference[reference > 0.0]
+    median = max(float(np.median(lit)), LEAST_MEDIAN * float(lit.mean())) if lit.size else 1.0
+    return ResponseResidual(Logarithmic(median / 3.0), reference)
+
+
+class RelativeResidual:
+    """(I - R) / (I + 0.1 mean R), the weight held constant in the derivative.
+
+    Unbiased under noise of the reference, where a compressive residual is not: the weight may not come from noisy
+    pixels.
+    """
+
+    def __init__(self, reference: Rows) -> None:
+        self._reference = reference
+        self._floor = np.float32(max(0.1 * float(reference.mean()), 1e-12))
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        weight = 1.0 / (np.maximum(image, 0.0) + self._floor)
+        return (image - self._reference) * weight, weight
+
+
+class WeightedResidual:
+    """(I - R) x `weight`, both (g, 3), growing only like the root of a logarithm beyond `LIMIT` standard deviations.
+
+    A weight is one over the deviation of the noise. The influence of a residual falls beyond the limit, so that one
+    firefly in the reference outweighs neither its neighbours nor what is known of the noise.
+    """
+
+    LIMIT = 4.0
+
+    def __init__(self, reference: Rows, weight: Rows) -> None:
+        self._reference = reference
+        self._weight = weight.astype(np.float32)
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values = (image - self._reference) * self._weight
+        size = np.maximum(np.abs(values), self.LIMIT)
+        bounded = self.LIMIT * np.sqrt(1.0 + 2.0 * np.log(size / self.LIMIT))
+        far = size > self.LIMIT
+        slope = np.where(far, self._weight * (self.LIMIT**2 / (size * bounded)), self._weight)
+        return np.where(far, np.copysign(bounded, values), values), slope
+
+
+class CensoredResidual:
+    """Another residual that does not look above `limit` where the reference (g, 3) is clipped there.
+
+    Elsewhere the image stays unclipped: a clipped one would have no slope to come back by.
+    """
+
+    def __init__(self, residual: Residual, reference: Rows, limit: float) -> None:
+        self._residual = residual
+        self._limit = np.float32(limit)
+        self._clipped = reference >= 0.99 * limit
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        over = self._clipped & (image > self._limit)
+        values, slope = self._residual(np.where(over, self._limit, image))
+        return values, slope * np.where(over, np.float32(0.0), np.float32(1.0))
+
+
+class OneSidedResidual:
+    """Another residual that does not look above the reference where `at_least` (g, 3) says that it is a lower bound.
+
+    Such is the mean of pixels some of which are clipped.
+    """
+
+    def __init__(self, residual: Residual, at_least: NDArray[np.bool_]) -> None:
+        self._residual = residual
+        self._at_least = at_least
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`."""
+        values, slope = self._residual(image)
+        keep = ~(self._at_least & (values > 0))
+        return values * keep, slope * (keep if slope.ndim == 2 else keep[..., None])
+
+
+def residual_rows(table: Rows, residual: Residual) -> NDArray[np.float64]:
+    """Values and derivatives (g, 3, 1 + k) of the residual from those of the image."""
+    return rows_and_slope(table, residual)[0]
+
+
+def rows_and_slope(table: Rows, residual: Residual) -> tuple[NDArray[np.float64], Rows]:
+    """The same, and the residual's derivative by the image."""
+    values, slope = residual(table[:, :, 0])
+    rows = sloped(table, slope)
+    rows[:, :, 0] = values
+    return rows, slope
+
+
+def sloped(table: Rows, slope: Rows) -> NDArray[np.float64]:
+    """Rows of image and derivatives (g, 3, 1 + k) times the derivative of a residual by the image."""
+    if slope.ndim == 2:
+        return np.multiply(table, slope[..., None], dtype=np.float64)
+    return np.matmul(slope, table).astype(np.float64)
+
+
+def normal_equations(evaluate: ImageAndJacobian, residual: Residual) -> Callable[[Vector], NormalEquations]:
+    """The least-squares problem of `residual` over the images of `evaluate`, per residual; sums in float64."""
+
+    def at(x: Vector) -> NormalEquations:
+        gram = gram_of(residual_rows(evaluate(x), residual))
+        return NormalEquations(0.5 * float(gram[0, 0]), gram[1:, 0], gram[1:, 1:])
+
+    return at
+
+
+def gram_of(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean products (1 + k, 1 + k) of the columns of rows (g, 3, 1 + k)."""
+    rows = rows.reshape(-1, rows.shape[-1])
+    return (rows.T @ rows) / len(rows)

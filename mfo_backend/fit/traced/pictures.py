@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Traced pictures and their derivatives as rows of tiles of the reference, for a fit on whole light paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...types.image import Pixels
+from .noise_excess import NoiseComparison
+from .recount import Recount, recount
+from .sample_count import EqualCounts, TwoPictures, equal_counts
+from .tile_rows import BLOCK, TileRows
+
+if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
+    from ...render.traced_paths import TracedPaths
+
+Vector = NDArray[np.float64]
+Samples = list[NDArray[np.float32]]
+
+GEOMETRIC = ("roughness", "ior")  # they move the paths
+SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
+# Wide ones blur what they look at, narrow ones are noisy (docs/glass.md has those of 0.03 and 0.06 of the index)
+SECANTS = {"roughness": 0.12, "ior": 0.045}
+
+
+class TracedTiles:
+    """Pictures of `paths` against a scene-linear `reference` (height, width, 3), in pixels of the `mask`.
+
+    `clipped` is 1 where the reference is only a lower bound. Once `count_samples` has found it noisy, all pictures and
+    tiles are compressed.
+    """
+
+    def __init__(
+        self,
+        paths: TracedPaths,
+        reference: Pixels,
+        mask: NDArray[np.bool_],
+        clipped: NDArray[np.float32] | None,
+        should_stop: Callable[[], bool],
+    ) -> None:
+        self.paths, self.reference, self.mask, self.clipped = paths, reference, mask, clipped
+        self.counts: EqualCounts | None = None
+        self.should_stop = should_stop
+
+    def tiles(self, size: int, most: int) -> TileRows:
+        """Tiles of the reference, compressed where pictures are compared so."""
+        if self.counts is None:
+            return TileRows.of(self.reference, self.mask, size, self.clipped, most)
+        return TileRows.of(self.counts.reference, self.mask, size, most=most, noise=self.counts.noise)
+
+    def halves(
+        self,
+        tiles: TileRows,
+        xs: Vector,
+        *,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        moving: bool = True,
+    ) -> list[Samples]:
+        """For each vector the weighted rows (3 t, 1 + k) of two independent halves of its paths.
+
+        Without `moving` the derivatives by roughness and index stay those of fixed paths.
+        """
+        tables = self.tables(tiles.pixels, xs, seed, samples, jacobian, moving)
+        return [[tiles.rows(half) for half in np.split(table, 2)] for table in tables]
+
+    def tables(
+        self,
+        pixels: NDArray[np.int64],
+        xs: Vector,
+        seed: int,
+        samples: int,
+        jacobian: bool = True,
+        moving: bool = True,
+    ) -> NDArray[np.float32]:
+        """Pictures with derivatives (m, 2 p, 3, 1 + k), the pixels twice."""
+        pixels = np.concatenate([pixels, pixels])  # the second time with other random numbers
+
+        def trace(vectors: Vector, derivatives: bool) -> NDArray[np.float32]:
+            images = self.paths.images(
+                vectors, pixels, seed=seed, samples=samples, jacobian=derivatives, should_stop=self.should_stop
+            )
+            return images if self.counts is None else self.counts.compress(images)
+
+        tables = trace(xs, jacobian)
+        if jacobian and moving:
+            self._secants(tables, xs, trace)
+        return tables
+
+    def _secants(self, tables: NDArray[np.float32], xs: Vector, trace: Callable) -> None:
+        """Replace the derivatives of sharp materials by what shifts the paths: secants with the same random numbers."""
+        moved, where = [], []
+        for i, x in enumerate(xs):
+            if self.paths.roughness(x) >= SECANT_BELOW:
+                continue
+            for name in GEOMETRIC:
+                if name not in self.paths.table.names:
+                    continue
+                k = self.paths.table.slice_of(name).start
+                h = SECANTS[name]
+                h = -h if x[k] + h > self.paths.table.upper[k] else h
+                trial = x.copy()
+                trial[k] += h
+                moved.append(trial)
+                where.append((i, k, h))
+        if moved:
+            images = trace(np.array(moved), False)[..., 0]
+            for image, (i, k, h) in zip(images, where, strict=True):
+                tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
+
+    def count_samples(self, x: Vector, most: int, seed: int) -> EqualCounts | None:
+        """Compare from now on as the reference's noise asks for, judged by pictures of `x` in about `most` pixels."""
+        self.counts = None
+        pixels = self.tiles(BLOCK, most).pixels
+
+        self.counts = equal_counts(self.reference, self.mask, pixels, self.clipped, self._linear(x, pixels, seed))
+        return self.counts
+
+    def recount(self, x: Vector, pixels: NDArray[np.int64], seed: int) -> Recount | None:
+        """What the noise in these pixels says at the end `x` of a fit; None where pictures are not compared so."""
+        if self.counts is None:
+            return None
+        comparison = NoiseComparison(self.reference, pixels, self.mask.shape, self.counts.level, self.counts.top)
+        return recount(self.counts, comparison, self._linear(x, pixels, seed))
+
+    def _linear(self, x: Vector, pixels: NDArray[np.int64], seed: int) -> TwoPictures:
+        twice = np.concatenate([pixels, pixels])
+
+        def pictures(samples: int, stream: int) -> NDArray[np.float32]:
+            images = self.paths.images(
+                x[None], twice, seed=seed + stream, samples=samples, jacobian=False, should_stop=self.should_stop
+            )
+            return images[0, ..., 0].reshape(2, -1, 3)
+
+        return pictures

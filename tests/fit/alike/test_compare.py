@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How sure a difference of chi squared is; oracle: its scatter over many pictures of one truth."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.alike.compare import compare
+from mfo_backend.render.recorded_image import TwoSamples
+from mfo_backend.solve.bounded_least_squares import NormalEquations
+
+TILES = 1200
+PICTURES = 200
+
+
+def picture(rng, truth, materials, *, structure=0.0, own=0.0):
+    """A problem with unit noise in each tile; its `structure` is noise that the channels share."""
+    noise = rng.normal(size=(TILES, 3)) + structure * rng.normal(size=(TILES, 1))
+    data = truth[:, None] + noise
+    rows = {}
+    for name, model in materials.items():
+        halves = model[:, None, None] + own * rng.normal(size=(2, TILES, 3, 1))
+        mean, half_difference = 0.5 * (halves[0] + halves[1]), 0.5 * (halves[0] - halves[1])
+        rows[name] = TwoSamples(mean, half_difference if own else None)
+
+    def residual(image):
+        return image - data, np.ones_like(data)
+
+    def equations(name):
+        two = rows[name]
+        square = np.mean((two.mean[:, :, 0] - data) ** 2)
+        if two.half_difference is not None:
+            square -= np.mean(two.half_difference**2)
+        return NormalEquations(0.5 * float(square), np.zeros(0), np.zeros((0, 0)))
+
+    evaluate = SimpleNamespace(samples=rows.__getitem__)
+    return SimpleNamespace(evaluate=evaluate, residual=residual, equations=equations, independent=1.5 * TILES)
+
+
+@pytest.mark.parametrize(
+    ("structure", "own"), [(0.0, 0.0), (1.0, 0.0), (0.0, 0.5)], ids=["noise", "shared by channels", "own noise"]
+)
+def test_the_deviation_is_the_scatter_between_pictures(structure, own):
+    rng = np.random.default_rng(7)
+    first, other = 0.1 * rng.normal(size=(2, TILES))
+    truth = 0.5 * (first + other)  # both miss it by as much
+    materials = {"first": first, "other": other}
+    found = [
+        compare(picture(rng, truth, materials, structure=structure, own=own), "first", "other") for _ in range(PICTURES)
+    ]
+    more = np.array([it.more for it in found])
+    # the scatter of 200 numbers is known to 5 % (one deviation)
+    assert np.median([it.deviation for it in found]) == pytest.approx(more.std(), rel=0.15)
+    assert abs(more.mean()) < 3.0 * more.std() / np.sqrt(PICTURES)
+    # as good as each other: either wins in half of the pictures, and a probability is uniform
+    better = np.array([it.better for it in found])
+    assert np.mean(better) == pytest.approx(0.5, abs=3.0 * 0.29 / np.sqrt(PICTURES))
+    assert np.mean((better > 0.05) & (better < 0.95)) == pytest.approx(0.9, abs=0.07)
+    # in units of residuals; the recording's own noise does not count
+    unit = 1.0 + structure**2
+    distance = np.sum((first - other) ** 2) * 1.5 / unit
+    assert np.median([it.distance for it in found]) == pytest.approx(distance, rel=0.1)
+
+
+def test_noise_that_channels_share_inflates_the_difference():
+    rng = np.random.default_rng(3)
+    first, other = 0.1 * rng.normal(size=(2, TILES))
+    pure = compare(picture(rng, first, {"a": first, "b": other}), "a", "b")
+    shared = compare(picture(rng, first, {"a": first, "b": other}, structure=3.0), "a", "b")
+    # three channels of independent noise count as 1.5 residuals, those of shared noise should count as one
+    assert pure.inflation == pytest.approx(1.0, abs=0.1)
+    assert shared.inflation == pytest.approx(1.5, rel=0.25)
+
+
+def test_a_material_that_is_clearly_further_away_is_told_apart():
+    rng = np.random.default_rng(5)
+    first, other = np.zeros(TILES), np.full(TILES, 0.3)
+    it = compare(picture(rng, first, {"a": first, "b": other}), "a", "b")
+    assert it.more == pytest.approx(0.09 * 1.5 * TILES, rel=0.3)
+    assert it.more > 5.0 * it.deviation
+    assert it.better < 1e-4
+
+
+def test_a_material_compared_with_itself():
+    rng = np.random.default_rng(1)
+    it = compare(picture(rng, np.zeros(TILES), {"a": np.zeros(TILES)}), "a", "a")
+    assert (it.more, it.deviation, it.distance, it.better) == (0.0, 0.0, 0.0, 0.5)
+    assert it.inflation == 1.0
+
+
+def test_materials_nearer_than_the_model_s_own_error_are_not_told_apart():
+    rng = np.random.default_rng(2)
+    zero = np.zeros(TILES)
+    problem = picture(rng, zero, {"a": zero, "b": rng.normal(size=TILES)})
+    assert compare(problem, "a", "b").better < 1e-4
+    # a systematic error of a hundred times the noise may be what sets them apart
+    assert 0.1 < compare(problem, "a", "b", model_error=100.0).better < 0.5

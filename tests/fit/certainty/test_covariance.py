@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Oracle: the scatter of repeated linear fits with known noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.certainty.covariance import INFLATION, certainties, covariance, standard_deviations
+from mfo_backend.types.certainty import Level
+from mfo_backend.types.parameter import Parameter, ParameterTable
+
+TABLE = ParameterTable([Parameter("colour", 3, 0.0, 1.0, (0.5,) * 3), Parameter("width", 1, 0.0, 2.0, 1.0)])
+
+
+def with_residual(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    return np.concatenate([residual[:, :, None], jacobian], axis=2)
+
+
+@pytest.mark.parametrize("shared", [False, True], ids=["independent-channels", "shared-by-channels"])
+def test_predicts_the_scatter_of_repeated_fits(shared):
+    rng = np.random.default_rng(0)
+    # the channels of a pixel move alike, so noise they share does not average out
+    jacobian = (rng.normal(size=(400, 1, 4)) + 0.3 * rng.normal(size=(400, 3, 4))) * [1.0, 0.5, 2.0, 0.1]
+    rows = jacobian.reshape(-1, 4)
+    solve = np.linalg.pinv(rows)
+    found, predicted = [], []
+    for _ in range(200):
+        noise = rng.normal(size=(400, 1 if shared else 3)) * 0.2 * np.ones((1, 3))
+        x = solve @ noise.ravel()
+        found.append(x)
+        spread = covariance(with_residual(jacobian, noise - (rows @ x).reshape(400, 3)), None, TABLE)
+        predicted.append(standard_deviations(spread, TABLE))
+    # 200 repetitions give the empirical value to 5 %; 1.2 is added for noise in the Jacobian
+    np.testing.assert_allclose(np.mean(predicted, axis=0) / INFLATION, np.std(found, axis=0), rtol=0.12)
+
+
+def test_noise_in_the_derivatives_makes_no_value_look_sharper():
+    # as in a recording whose own noise in the derivatives is as large as they are
+    rng = np.random.default_rng(3)
+    jacobian = rng.normal(size=(2000, 3, 4)) * [1.0, 0.5, 2.0, 0.1]
+    found, stated, naive = [], [], []
+    for _ in range(100):
+        a, b = (jacobian + rng.normal(size=jacobian.shape) * [1.0, 0.5, 2.0, 0.1] for _ in range(2))
+        noise = rng.normal(size=(2000, 3)) * 0.2
+        mean, half = 0.5 * (a + b), 0.5 * (a - b)
+        products = np.einsum("gck,gcl->kl", mean, mean) - np.einsum("gck,gcl->kl", half, half)
+        x = np.linalg.solve(products, np.einsum("gck,gc->k", mean, noise))
+        found.append(x)
+        rows = with_residual(mean, noise - mean @ x)
+        own = with_residual(half, -half @ x)
+        stated.append(standard_deviations(covariance(rows, own, TABLE), TABLE))
+        naive.append(standard_deviations(covariance(rows, None, TABLE), TABLE))
+    scatter = np.std(found, axis=0)
+    # 100 repetitions give the empirical value to 7 %
+    np.testing.assert_allclose(np.mean(stated, axis=0), scatter, rtol=0.2)
+    assert (np.mean(naive, axis=0) / INFLATION < 0.85 * scatter).all()
+
+
+def test_a_column_without_effect_is_as_unsure_as_its_box():
+    jacobian = np.random.default_rng(1).normal(size=(200, 3, 4))
+    jacobian[:, :, 3] = 0.0
+    sd = standard_deviations(covariance(with_residual(jacobian, np.full((200, 3), 0.01)), None, TABLE), TABLE)
+    levels = certainties(sd, TABLE)
+    assert sd[3] >= 2.0  # the width of its box
+    assert levels["width"].level is Level.NOT_VISIBLE
+    assert levels["colour"].level is Level.DETERMINED
+
+
+def test_an_exact_fit_still_has_the_error_of_the_model():
+    jacobian = np.random.default_rng(1).normal(size=(200, 3, 4)) * 1e-3
+    sd = standard_deviations(covariance(with_residual(jacobian, np.zeros((200, 3))), None, TABLE), TABLE)
+    assert (sd > 0.02).all()
+
+
+def test_the_levels_have_the_stated_limits():
+    levels = certainties(np.array([0.01, 0.019, 0.01, 0.299]), TABLE)
+    assert (levels["colour"].level, levels["width"].level) == (Level.DETERMINED, Level.WEAK)
+    levels = certainties(np.array([0.01, 0.021, 0.01, 0.301]), TABLE)
+    assert (levels["colour"].level, levels["width"].level) == (Level.WEAK, Level.NOT_VISIBLE)

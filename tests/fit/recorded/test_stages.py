@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The guards of a recorded fit's stages, each against a fit without it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.recorded_plan import RecordedPlan
+from mfo_backend.render.renderer import load_renderer
+from tests.fit.recorded.one_refine import refine
+from tests.render.scenes import AREA, SKY, write_scene
+
+NAMES = ["base_color", "roughness", "metallic", "specular"]
+TRUTH = {"base_color": (0.8, 0.5, 0.3), "roughness": 0.12, "metallic": 0.9, "specular": 0.5}
+PLAN = RecordedPlan()
+FAR = {"base_color": (0.3, 0.5, 0.8), "roughness": 0.45, "metallic": 0.2, "specular": 0.5}
+
+
+@pytest.fixture
+def refined(tmp_path, monkeypatch):
+    """Relative error of `refine` from a far start with these settings of its guards, and the number of recordings."""
+    renderer = load_renderer(
+        write_scene(tmp_path, AREA + SKY, size=40), "target", model="mitsuba_principled", parameters=NAMES
+    )
+    from mfo_backend.fit.recorded import stages as recorded_stages
+
+    table, mask = renderer.table, renderer.target_mask()
+    reference, true = (renderer.image(table.pack(TRUTH), seed=seed, spp=256) for seed in (5, 9))
+
+    def run(plan=PLAN, seed=1, **guards):
+        for name, value in guards.items():
+            monkeypatch.setattr(recorded_stages, name, value)
+        fit, refined = refine(renderer, reference, table.pack(FAR), plan, seed)
+        found = renderer.image(refined.x, seed=9, spp=256)
+        return float(np.sqrt(np.mean((found - true)[mask] ** 2) / np.mean(true[mask] ** 2))), fit.recordings
+
+    return run
+
+
+NEVER = float("inf")
+
+
+def test_a_recording_that_is_too_old_is_made_anew(refined):
+    plan = RecordedPlan(too_noisy=NEVER, most_own=1.0)
+
+    def error_and_recordings(**guards):
+        found = [refined(plan, seed, **guards) for seed in range(24)]
+        return np.median(found, axis=0)
+
+    stale, recordings = error_and_recordings(MOVED=NEVER, NOISIER=NEVER)
+    assert recordings == 1
+    assert stale > 0.05  # a highlight of roughness 0.12, seen by directions for 0.45
+    # either guard alone sees it, with most seeds
+    for guards in ({"MOVED": 0.15, "NOISIER": NEVER}, {"MOVED": NEVER, "NOISIER": 1.25}):
+        error, recordings = error_and_recordings(**guards)
+        assert recordings > 1, guards
+        assert error < 0.3 * stale, guards
+
+
+def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):
+    coarse = RecordedPlan(grid_last=2, too_noisy=NEVER, most_own=1.0)
+    noisy, recordings = refined(coarse, MOVED=NEVER, NOISIER=NEVER)
+    assert recordings == 1
+    # noisy to the eye, and noisier than the reference: either guard alone sees it
+    for guard in ({"too_noisy": 0.07}, {"most_own": 0.3}):
+        error, recordings = refined(replace(coarse, **guard), MOVED=NEVER, NOISIER=NEVER)
+        assert recordings > 1, guard
+        assert error < 0.5 * noisy, guard
+
+
+PAINT = ("base_color", "roughness", "specular_ior_level", "coat_weight", "coat_roughness")
+GLOSSY = dict(zip(PAINT, ((0.3, 0.2, 0.1), 0.25, 0.5, 0.0, 0.1), strict=True))
+COATED = dict(zip(PAINT, ((0.3, 0.2, 0.1), 0.5, 0.05, 0.8, 0.25), strict=True))
+
+
+@pytest.mark.parametrize("looked_at", [False, True])
+def test_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp_path, monkeypatch, looked_at):
+    from mfo_backend.fit.recorded import stages as recorded_stages
+
+    if not looked_at:
+        monkeypatch.setattr(recorded_stages.OtherEnds, "simplest", lambda self, found: found)
+    renderer = load_renderer(
+        write_scene(tmp_path, AREA + SKY, size=40),
+        "target",
+        model="blender_principled",
+        parameters=PAINT,
+        materials={"target_bsdf": {"name": "Paint", "distribution": "MULTI_GGX", "sockets": {}}},
+    )
+    table = renderer.table
+    renderer.start = table.pack({**GLOSSY, "base_color": (0.5, 0.5, 0.5), "roughness": 0.6})
+    reference = renderer.image(table.pack(GLOSSY), seed=5, spp=64)
+    for seed in range(3):
+        _, refined = refine(renderer, reference, table.pack(COATED), PLAN, seed)
+        found = table.unpack(refined.x)
+        if not looked_at:  # the picture is explained as well
+            assert found["coat_weight"] > 0.8
+            continue
+        assert found["coat_weight"] == 0.0
+        assert refined.off == ("coat_weight",)
+        # six fits of this reference ended within 0.013 and 0.053
+        assert found["roughness"] == pytest.approx(GLOSSY["roughness"], abs=0.03)
+        assert found["specular_ior_level"] == pytest.approx(GLOSSY["specular_ior_level"], abs=0.08)
+        assert 0.0 < sum(rival.share for rival in refined.rivals) < 0.05

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Oracle: central differences through the residual."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.squares.residuals import (
+    CensoredResidual,
+    RelativeResidual,
+    ResponseResidual,
+    WeightedResidual,
+    log_residual,
+    normal_equations,
+    residual_rows,
+)
+from mfo_backend.metrics.itp import Itp
+from mfo_backend.metrics.pu21 import Pu21
+
+RNG = np.random.default_rng(2)
+REFERENCE = RNG.uniform(0.05, 2.0, (50, 3))
+BASIS = RNG.uniform(-0.3, 0.3, (50, 3, 4))
+OFFSET = RNG.uniform(1.0, 2.0, (50, 3))
+
+
+def table(x: np.ndarray) -> np.ndarray:
+    image = OFFSET + BASIS @ x
+    return np.concatenate([image[:, :, None], BASIS], axis=2)
+
+
+@pytest.mark.parametrize(
+    "residual",
+    [
+        log_residual(REFERENCE),
+        ResponseResidual(Pu21(80.0), REFERENCE),
+        ResponseResidual(Itp(80.0), REFERENCE),
+        CensoredResidual(log_residual(REFERENCE), REFERENCE, 1.2),
+    ],
+    ids=["log", "pu21", "itp", "censored"],
+)
+def test_rows_are_derivatives(residual):
+    x, h = np.array([0.1, -0.2, 0.3, 0.2]), 1e-5
+    rows = residual_rows(table(x), residual)
+    for k in range(4):
+        step = h * np.eye(4)[k]
+        difference = (residual_rows(table(x + step), residual) - residual_rows(table(x - step), residual))[:, :, 0] / (
+            2 * h
+        )
+        # float64 here: float32 rounding alone is worth 0.03 just noticeable differences of ITP
+        np.testing.assert_allclose(rows[:, :, 1 + k], difference, atol=1e-6 * np.abs(rows).max())
+
+
+def test_equations_are_those_of_the_rows():
+    x = np.array([0.1, -0.2, 0.3, 0.2])
+    residual = log_residual(REFERENCE)
+    rows = residual_rows(table(x), residual).reshape(-1, 5)
+    equations = normal_equations(table, residual)(x)
+    assert equations.cost == pytest.approx(0.5 * np.mean(rows[:, 0] ** 2))
+    np.testing.assert_allclose(equations.gradient, rows[:, 1:].T @ rows[:, 0] / len(rows))
+    np.testing.assert_allclose(equations.hessian, rows[:, 1:].T @ rows[:, 1:] / len(rows))
+
+
+def test_nothing_is_seen_above_a_clipped_reference():
+    reference = np.full((1, 3), 1.0, np.float32)
+    residual = CensoredResidual(log_residual(reference), reference, 1.0)
+    values, slope = residual(np.array([[0.5, 1.0, 7.0]], np.float32))
+    assert values[0, 0] < 0.0
+    np.testing.assert_allclose(values[0, 1:], 0.0, atol=1e-7)
+    assert slope[0, 2] == 0.0
+
+
+def test_the_relative_residual_is_unbiased_under_noise_of_the_reference():
+    rng = np.random.default_rng(0)
+    truth = np.full((20_000, 3), 0.5, np.float32)
+    noisy = (truth * rng.exponential(1.0, truth.shape)).astype(np.float32)
+    values, _ = RelativeResidual(noisy)(truth)
+    assert abs(values.mean()) < 0.02  # 60 000 values of standard deviation 1
+    log_values, _ = log_residual(noisy)(truth)
+    assert log_values.mean() > 0.05  # which is why it is used
+
+
+def test_weighted_residual_has_its_slope_and_bounds_what_one_outlier_counts():
+    weight = np.full(REFERENCE.shape, 5.0)
+    residual = WeightedResidual(REFERENCE, weight)
+    image = REFERENCE + RNG.uniform(-2.0, 2.0, REFERENCE.shape)  # up to 10 standard deviations
+    values, slope = residual(image)
+    step = 1e-5
+    up, down = (residual(image + s * step)[0] for s in (1, -1))
+    np.testing.assert_allclose(slope, (up - down) / (2 * step), rtol=2e-3)
+    near = np.abs(image - REFERENCE) < 0.8
+    np.testing.assert_allclose(values[near], 5.0 * (image - REFERENCE)[near], rtol=1e-5)
+    # influence, value times slope: that of a firefly is below that of an ordinary pixel
+    firefly_value, firefly_slope = residual(REFERENCE + 1000.0)
+    assert (firefly_value * firefly_slope < 5.0 * 0.1).all()
+    assert (firefly_value < 20.0).all()
+
+
+def test_the_log_of_a_picture_that_is_black_but_for_a_highlight_does_not_look_into_the_black():
+    reference = np.full((100, 3), 1e-4, np.float32)
+    reference[:5] = 2.0
+    residual = log_residual(reference)
+    brighter = reference.copy()
+    brighter[5:] *= 5.0  # by four thousandths of the mean
+    # on the curve of the median itself it would be log(16 / 4) = 1.4, fifteen times a tenth more of the highlight
+    assert np.abs(residual(brighter)[0]).max() < 0.15
