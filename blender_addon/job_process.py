@@ -42,7 +42,7 @@ _EXIT_STATUS = {2: "bad_input", 3: "setup", 4: "cancelled"}
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: status code of `docs/architecture.md`, one sentence, and the end of the log if it crashed."""
+    """How a run ended: status code (`docs/reference/job_folder.md`), one sentence, the end of the log if it crashed."""
 
     status: str
     sentence: str

@@ -24,7 +24,7 @@ class JobResultError(Exception):
 class JobResult:
     """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result).
 
-    `certainty` holds the levels of `docs/architecture.md` by parameter name, where the preset finds them out.
+    `certainty` holds the levels of `docs/reference/job_folder.md` by parameter name, where the preset finds them out.
     """
 
     folder: Path

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Cut the pictures of `docs/artists.md` out of the screenshots that the tests in windows take.
+"""Cut the pictures of `docs/user/artists.md` out of the screenshots that the tests in windows take.
 
     MFO_SCREENSHOTS=SHOTS MFO_BLENDER_WINDOWS=BLENDER python -m pytest tests/blender/test_windows.py
     python tools/artists_pictures.py SHOTS

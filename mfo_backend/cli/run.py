@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfo run JOB`: the worker. Its protocol is in `docs/architecture.md`."""
+"""`mfo run JOB`: the worker. Its protocol is in `docs/reference/job_folder.md`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Work spread over processes or machines with Dask; `docs/cluster.md` says how to start one.
+"""Work spread over processes or machines with Dask; `docs/user/cluster.md` says how to start one.
 
 Dask's messages hold pickles: a scheduler trusts everyone who can reach it.
 """

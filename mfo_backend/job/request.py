@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""request.json: what a job asks for, checked before anything is rendered. Its keys are in `docs/architecture.md`."""
+"""request.json: what a job asks for, checked before anything is rendered. Its keys: `docs/reference/job_folder.md`."""
 
 from __future__ import annotations
 

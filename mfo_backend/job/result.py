@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""result.json: the outcome of a job, written once; partial.json until then. Keys are in `docs/architecture.md`."""
+"""result.json: the outcome of a job, written once; partial.json until then. Keys: `docs/reference/job_folder.md`."""
 
 from __future__ import annotations
 

@@ -24,8 +24,8 @@ from .request import Request, read_request
 from .result import write_partial
 from .stop import StopSignal
 
-# Measured on Linux (docs/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are mapped
-# but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
+# Measured on Linux (docs/reference/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are
+# mapped but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
 _STARTUP_BYTES, _MAPPED_BYTES = 150_000_000, 380_000_000
 _BYTES_PER_PIXEL = {"fast": 430, "balanced": 500, "best": 500, "paper": 500}
 _CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
@@ -36,8 +36,8 @@ def run_job(
 ) -> Status:
     """Run the job in folder `path` and report its events; the last one is always `finished` or `failed`.
 
-    Only a `trusted` job may name files that Mitsuba reads unchecked (docs/threats.md). A request that cannot be used
-    leaves the folder as it was. Tracebacks go to stderr only.
+    Only a `trusted` job may name files that Mitsuba reads unchecked (docs/user/threats.md). A request that cannot be
+    used leaves the folder as it was. Tracebacks go to stderr only.
     """
     try:
         status, sentence = _run(path, events, stop, fitter, trusted)

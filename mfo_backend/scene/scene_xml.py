@@ -267,7 +267,7 @@ def _fill_in_defaults(scene: Element, file: str) -> None:
 
 
 def _check_plugin_names(scene: Element, file: str) -> None:
-    """Mitsuba takes a path for a name too, and a library that it loads runs code: `docs/threats.md`."""
+    """Mitsuba takes a path for a name too, and a library that it loads runs code: `docs/user/threats.md`."""
     for element in scene.iter():
         name = element.get("type")
         if name is not None and not _PLUGIN_NAME.fullmatch(name):

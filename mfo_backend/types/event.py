@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a running fit tells its listener. The fields are those of the JSON lines in `docs/architecture.md`;
+"""What a running fit tells its listener. The fields are those of the JSON lines in `docs/reference/job_folder.md`;
 `BestValues` is no line but the file partial.json.
 """
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which losses rank changes of a material as the judges do: Spearman's correlation over rendered pairs.
 
-    python -m studies.losses.agreement [--materials 40] [--size 128] [--scores scores.json] [--doc docs/metrics.md]
+    python -m studies.losses.agreement [--materials 40] [--size 128] [--scores FILE] [--doc docs/reference/metrics.md]
 
 Needs the extra `judges`. Losses whose packages or weights are missing are left out; HDR-VDP-3 joins in where
-MFO_HDRVDP3 names a copy. The table replaces the one between the markers in docs/metrics.md.
+MFO_HDRVDP3 names a copy. The table replaces the one between the markers in docs/reference/metrics.md.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--scores", type=Path, help="also write the scores of every pair there, as JSON")
-    parser.add_argument("--doc", type=Path, default=ROOT / "docs" / "metrics.md")
+    parser.add_argument("--doc", type=Path, default=ROOT / "docs" / "reference" / "metrics.md")
     arguments = parser.parse_args()
     pairs = list(material_pairs(arguments.materials, arguments.size, arguments.seed))
     changes = [pair.change for pair in pairs]

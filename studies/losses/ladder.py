@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which losses, pairs and ladders of losses recover materials best, and what they cost.
 
-    python -m studies.losses.ladder [--scenes 30] [--size 48] [--rows ladder.jsonl] [--doc docs/ladder.md]
+    python -m studies.losses.ladder [--scenes 30] [--size 48] [--rows ladder.jsonl] [--doc docs/method/losses.md]
 
 Every scene is one line of the rows' file, so a run that was stopped goes on where it was; `--doc ""` only measures.
 Losses whose packages are missing are left out, and so is the judge ColorVideoVDP. The table and
@@ -31,7 +31,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=30)
     parser.add_argument("--size", type=int, default=48)
     parser.add_argument("--rows", type=Path, default=Path("ladder.jsonl"))
-    parser.add_argument("--doc", type=str, default=str(ROOT / "docs" / "ladder.md"))
+    parser.add_argument("--doc", type=str, default=str(ROOT / "docs" / "method" / "losses.md"))
     arguments = parser.parse_args()
     rows = (
         [json.loads(line) for line in arguments.rows.read_text("utf-8").splitlines()] if arguments.rows.exists() else []
@@ -52,7 +52,7 @@ def main() -> None:
     if arguments.doc:
         document = Path(arguments.doc)
         write_between_markers(document, table(rows))
-        document.with_name("pictures").joinpath("ladder.svg").write_text(plot(rows), "utf-8")
+        (document.parents[1] / "pictures" / "ladder.svg").write_text(plot(rows), "utf-8")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 
     python -m studies.parity.cycles_parity [--size 128] [--samples 512] [--spp 512] [--only "glass/area"] [--no-table]
 
-writes docs/cycles_parity.md. Needs a Python with `bpy`.
+writes docs/reference/cycles_parity.md. Needs a Python with `bpy`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .parity_scene import LIGHTS, MATERIALS
 
 ROOT = Path(__file__).resolve().parents[2]
 
-TABLE = ROOT / "docs" / "cycles_parity.md"
+TABLE = ROOT / "docs" / "reference" / "cycles_parity.md"
 BLOCK = 4  # pixels along each side of the means that are compared
 SPP_AT_ONCE = 32
 NOISY = {"glass": (2, 4)}  # smaller by, and more samples by: caustics

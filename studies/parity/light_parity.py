@@ -3,7 +3,7 @@
 
     python -m studies.parity.light_parity [--samples 4096] [--only "spread"]
 
-writes docs/light_parity.md. Needs a Python with `bpy`.
+writes docs/reference/light_parity.md. Needs a Python with `bpy`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from .cycles_parity import Difference, compare, render_job, table_row
 from .light_scene import FLOORS, SIZE, Lights, build
 
-TABLE = Path(__file__).resolve().parents[2] / "docs" / "light_parity.md"
+TABLE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "light_parity.md"
 
 
 def measure(floor: str, lights: Lights, folder: Path, samples: int) -> tuple[Difference, list[str]]:

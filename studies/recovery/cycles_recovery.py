@@ -4,8 +4,8 @@
     python -m studies.recovery.cycles_recovery [--size 96] [--samples 256] [--judge-samples 4096] [--judge PYTHON]
         [--only 1/environment ...] [--out DIR]
 
-writes docs/cycles_recovery.md. Needs a Python with `bpy`; ColorVideoVDP is computed by PYTHON, which has the packages
-of the extra `judges`.
+writes docs/reference/cycles_recovery.md. Needs a Python with `bpy`; ColorVideoVDP is computed by PYTHON, which has
+the packages of the extra `judges`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 
-TABLE = ROOT / "docs" / "cycles_recovery.md"
+TABLE = ROOT / "docs" / "reference" / "cycles_recovery.md"
 # the demo's own scene, then two of each light; the seed draws material, start, world and the light's place
 SCENES = (
     (1, "environment"),

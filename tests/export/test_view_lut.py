@@ -28,7 +28,7 @@ def error(scene: Any, colours: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("view", "largest", "mean"),
-    # those of docs/view_transforms.md, rounded up; kinks of a view inside of a cell make the largest
+    # those of docs/user/view_transforms.md, rounded up; kinks of a view inside of a cell make the largest
     [
         ("Standard", 0.002, 0.0004),
         ("AgX", 0.03, 0.0005),

@@ -2,7 +2,8 @@
 """Many fits in one process: ``python -m tests.faults.endurance backend|blender|repeat --fits 200``.
 
 ``backend``: one Python runs job after job, as nothing of ours does but a bench; ``blender``: one Blender starts a
-backend for each. Memory, open files, threads and seconds of every fit go into the record of `docs/reliability.md`.
+backend for each. Memory, open files, threads and seconds of every fit go into the record of
+`docs/reference/reliability.md`.
 ``repeat``: the same job again and again, in new processes, with 1, 2 and 4 threads.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole jobs far beyond the usual size: ``python -m tests.faults.heavy``; the record goes into `docs/reliability.md`.
+"""Whole jobs far beyond the usual size: ``python -m tests.faults.heavy``; record: `docs/reference/reliability.md`.
 
 A picture of 4096 x 4096 pixels and an object of two million triangles, exported from Blender.
 """

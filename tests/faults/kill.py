@@ -2,7 +2,7 @@
 """SIGKILL at random moments of real fits: ``python -m tests.faults.kill --blender 100 --backend 100``.
 
 After each the .blend must open with the values it had or with all recovered ones, no process of ours may be left, and
-the next run must leave no temporary file. The record goes into `docs/reliability.md`.
+the next run must leave no temporary file. The record goes into `docs/reference/reliability.md`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Real jobs that run out of something: ``python -m tests.faults.limits``; the record goes into `docs/reliability.md`.
+"""Real jobs that run out of something: ``python -m tests.faults.limits``; record: `docs/reference/reliability.md`.
 
 Memory by RLIMIT_AS, the disk by a small tmpfs (as root only), the folder removed or closed under way, no LLVM or one
 that is too old, a CUDA driver that is none.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/reliability.md says what its records say, and the records say what it promises."""
+"""docs/reference/reliability.md says what its records say, and the records say what it promises."""
 
 from __future__ import annotations
 

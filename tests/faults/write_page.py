@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of `docs/reliability.md` from the records of measured runs: ``python -m tests.faults.write_page``.
+"""Tables of `docs/reference/reliability.md` from the records of measured runs: ``python -m tests.faults.write_page``.
 
 A record that is missing leaves its table saying so. The text around the tables is written by hand.
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "reliability.md"
+PAGE = ROOT / "docs" / "reference" / "reliability.md"
 RECORDS = ROOT / "docs" / "reliability"
 
 

@@ -2,7 +2,7 @@
 """All targets in turn, each in a process of its own, and what came of it: ``python -m tests.fuzz.campaign``.
 
 Needs the package atheris in this Python. The corpus and the crashes stay in the folder, so that a second call goes on
-where the first ended; the sums are kept there too and in the record that `docs/reliability.md` is made of.
+where the first ended; the sums are kept there too and in the record that `docs/reference/reliability.md` is made of.
 """
 
 from __future__ import annotations

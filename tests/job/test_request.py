@@ -74,8 +74,8 @@ def test_a_view_table_goes_through_json_and_is_checked(job: Path, request_data: 
 
 
 def test_what_the_documentation_shows_is_a_request() -> None:
-    text = (Path(__file__).resolve().parents[2] / "docs" / "architecture.md").read_text("utf-8")
-    block = text.split("### request.json", 1)[1].split("```json", 1)[1].split("```", 1)[0]
+    text = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "job_folder.md").read_text("utf-8")
+    block = text.split("## request.json", 1)[1].split("```json", 1)[1].split("```", 1)[0]
     request = request_from_json(json.loads(block))
     assert request.materials["target_bsdf"].sockets["Roughness"].linked
     assert request_to_json(request)["notes"] == json.loads(block)["notes"]

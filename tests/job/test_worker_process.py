@@ -20,7 +20,7 @@ from mfo_backend.job.progress import EventWriter
 from mfo_backend.types.event import Started
 from mfo_backend.types.status import Status
 
-STOP_SECONDS = 1.0  # the promise of docs/architecture.md
+STOP_SECONDS = 1.0  # the promise of docs/reference/job_folder.md
 END_SECONDS = 8.0  # a process' end on a busy machine, its interpreter's own included
 ENDLESS = {"iterations": 10_000, "seconds": 0.02}
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

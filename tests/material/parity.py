@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random materials and directions, the same in Cycles and in our evaluation, and the table of their differences.
 
-`python tests/material/parity.py` rewrites docs/material_parity.md; further arguments `LABEL=MAJOR.MINOR=COMMAND` add
-other Blender versions, e.g. "4.2.23=4.2=/path/to/python" or "5.2=5.2=blender -b --factory-startup -P".
+`python tests/material/parity.py` rewrites docs/reference/material_parity.md; further arguments
+`LABEL=MAJOR.MINOR=COMMAND` add other Blender versions, e.g. "4.2.23=4.2=/path/to/python" or
+"5.2=5.2=blender -b --factory-startup -P".
 """
 
 from __future__ import annotations
@@ -165,7 +166,7 @@ def at_total_reflection(cases: Cases) -> NDArray[np.bool_]:
     return np.abs(index**2 - 1 + cosine**2) < 5e-3
 
 
-TABLE = ROOT / "docs" / "material_parity.md"
+TABLE = ROOT / "docs" / "reference" / "material_parity.md"
 TABLE_VERSION = "5.0.1"
 INTRODUCTION = """# Blender's Principled BSDF here and in Cycles
 

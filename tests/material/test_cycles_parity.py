@@ -29,7 +29,7 @@ def answers() -> dict[str, tuple[parity.Cases, np.ndarray]]:
 def test_value_is_that_of_cycles(group: parity.Group) -> None:
     cases, theirs = answers()[group.name]
     error = parity.relative_difference(parity.evaluate_cases(cases, group, (5, 0)), theirs)
-    # Single precision on both sides; docs/material_parity.md explains the few that are worse than the rest
+    # Single precision on both sides; docs/reference/material_parity.md explains the few that are worse than the rest
     assert np.quantile(error, 0.99) < group.most, np.sort(error)[-20:]
     if group.refracted:
         error = error[~parity.at_total_reflection(cases)]

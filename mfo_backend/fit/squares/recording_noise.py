@@ -3,7 +3,7 @@
 
 That noise depends on the material: a rougher one has less, so plain squares prefer it, and noise in derivatives makes
 values look better determined than they are. A product of two independent samples a and b of the light has no such part;
-with the mean m and half the difference d of their rows, a b = m^2 - d^2 (docs/recorded_paths.md has what it changes).
+with the mean m and half the difference d of their rows, a b = m^2 - d^2 (docs/method/recorded_paths.md).
 """
 
 from __future__ import annotations
