@@ -24,6 +24,7 @@ from ..job.progress_bar import terminal_columns
 from ..job.stop import StopSignal
 from ..types.errors import BadInputError, MfoError
 from ..types.status import Status
+from .bench_judge import add_judge_parser
 from .bench_surface import add_surface_parser
 from .blender_host import BlenderHost, find_blender_host
 from .cluster_options import add_cluster_options
@@ -44,13 +45,14 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("--out", type=Path, default=Path("mfo-bench"), metavar="DIR", help="folder (mfo-bench)")
     add_cluster_options(parser)
     parser.set_defaults(func=run)
-    actions = parser.add_subparsers(dest="action", metavar="[report DIR | surface]")
+    actions = parser.add_subparsers(dest="action", metavar="[report DIR | judge DIR | surface]")
     report = actions.add_parser("report", help="print and write the report of a bench folder")
     report.add_argument("folder", type=Path, metavar="DIR", help="folder of a bench")
     report.add_argument("--note", action="append", default=[], help="a remark for the report, such as a busy machine")
     page = "a Markdown page whose block `<!-- bench -->` gets the short table; again for more"
     report.add_argument("--page", type=Path, action="append", default=[], metavar="FILE", help=page)
     report.set_defaults(func=run_report)
+    add_judge_parser(actions)
     add_surface_parser(actions)
 
 

@@ -84,6 +84,13 @@ class Judge:
         """The judge's picture of these values under the reference's light."""
         return self._picture(self._renderer, self._renderer.table.pack(values))
 
+    def pair(self, values: Mapping[str, Value], spp: int | None) -> tuple[Pixels, Pixels]:
+        """What a row is scored on: the truth and these values, with `Row.judge_spp` samples a pixel."""
+        picture = self.picture(values)
+        if spp is None or spp <= self._spp or self.truth is None:
+            return self.pictures.truth[0], picture
+        return self._finer_truth, self._finer(self._renderer.table.pack(values), picture)
+
     def difference(self, values: Mapping[str, Value]) -> Difference:
         """Of the pictures of these values and of the true ones, under the same random numbers."""
         return self.difference_of(self.picture(values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -70,12 +70,18 @@ class RowFile:
 
     def append(self, row: Row) -> None:
         """Add a row and wait until the disk has it; an unfinished line of a killed process is cut off first."""
-        line = json.dumps(finite(asdict(row)), ensure_ascii=False, allow_nan=False).encode("utf-8") + b"\n"
+        line = _line(row)
         with open(self.path, "a+b") as file:
             self._cut_unfinished(file)
             file.write(line)
             file.flush()
             os.fsync(file.fileno())
+
+    def replace(self, rows: Iterable[Row]) -> None:
+        """Put rows in the place of those with their keys, all at once; the others and the order stay."""
+        new = {row.key: row for row in rows}
+        kept = [new.get(row.key, row) for row in self.read()]
+        write_atomically(self.path, b"".join(_line(row) for row in kept))
 
     def _cut_unfinished(self, file: Any) -> None:
         end = file.seek(0, os.SEEK_END)
@@ -92,6 +98,10 @@ class RowFile:
             raise BadInputError(
                 f"Line {number} of {self.path} is no row of a bench: remove the line or give another folder."
             ) from error
+
+
+def _line(row: Row) -> bytes:
+    return json.dumps(finite(asdict(row)), ensure_ascii=False, allow_nan=False).encode("utf-8") + b"\n"
 
 
 def keep_setup(folder: Path, setup: Mapping[str, Any]) -> None:

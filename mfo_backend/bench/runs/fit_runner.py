@@ -104,6 +104,11 @@ class FitRunner:
         self._open(task, None)
         return self._judge.pictures
 
+    def judged_pair(self, row: Row) -> tuple[Pixels, Pixels]:
+        """The pictures that the scores of a row are of: the truth's and the recovered values'."""
+        self._open(Task(row.scenario, row.scene, row.method), None)
+        return self._judge.pair(row.recovered, row.judge_spp)
+
     def _open(self, task: Task, pictures: TruePictures | None) -> None:
         at = (task.scenario, task.scene)
         if self._at != at:

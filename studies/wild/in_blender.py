@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Blender's part of the study: what the export says of each material of a file, and a recovery prepared from it.
+
+    python -m studies.wild.in_blender read FILE
+    python -m studies.wild.in_blender prepare FILE --object NAME --slot N --seed N --out DIR [--size 96] [--samples 64]
+    python -m studies.wild.in_blender render FILE --out EXR --seed N [--samples 64]
+
+Needs bpy. The answer is the last line of stdout, one JSON object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import bpy
+from mathutils import Vector
+
+from blender_addon.export.job import export_findings
+from blender_addon.headless import _open
+
+# Principled values that are moved for the start, with the range they are drawn from
+MOVED = {
+    "Base Color": (0.1, 0.9),
+    "Roughness": (0.2, 0.8),
+    "Metallic": (0.0, 0.6),
+}
+VIEW = Vector((0.6, -1.0, 0.5))  # from where a camera looks that the study has to add
+FIELD = 40.0  # degrees, of that camera
+LEAST_SHARE = 0.05  # of the frame's width and height that a target's bounds must span
+
+
+def read(path: Path) -> dict[str, Any]:
+    """What the export says of every material on a rendered mesh of a file, each once, on its largest object."""
+    _open(path)
+    context = bpy.context
+    rows = []
+    for material, (obj, slot) in sorted(_seen(context).items(), key=lambda item: item[0].name):
+        row = {"material": material.name, "object": obj.name, "slot": slot, "sort": _sort(material)}
+        obj.active_material_index = slot
+        added = _look_at(context.scene, obj)
+        findings = export_findings(context, obj)
+        rows.append({**row, "camera_added": added, "errors": findings.errors, "notes": findings.notes})
+    return {"version": list(bpy.data.version), "engine": context.scene.render.engine, "materials": rows}
+
+
+def prepare(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Render the reference and a picture of other noise; save the file with other values on the material."""
+    _open(chosen.file)
+    scene, obj = bpy.context.scene, bpy.data.objects[chosen.object]
+    obj.active_material_index = chosen.slot
+    material = obj.material_slots[chosen.slot].material
+    added = _look_at(scene, obj)
+    _make_small(scene, chosen.size)
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    for name, seed in (("reference", 0), ("floor", 1)):
+        _render(scene, chosen.out / f"{name}.exr", chosen.samples, seed)
+    moved = _move_values(material, random.Random(chosen.seed))
+    _render(scene, chosen.out / "before.exr", chosen.samples, 2)
+    bpy.ops.wm.save_as_mainfile(filepath=str(chosen.out / "start.blend"), copy=True, relative_remap=True)
+    return {"moved": moved, "camera_added": added}
+
+
+def render(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Render a saved file as `prepare` did."""
+    _open(chosen.file)
+    _render(bpy.context.scene, chosen.out, chosen.samples, chosen.seed)
+    return {}
+
+
+def _seen(context: bpy.types.Context) -> dict[bpy.types.Material, tuple[bpy.types.Object, int]]:
+    """Materials of rendered meshes, each with the slot of the largest object that has faces of it."""
+    best: dict[bpy.types.Material, tuple[float, bpy.types.Object, int]] = {}
+    for obj in context.view_layer.objects:
+        if obj.type != "MESH" or obj.hide_render or not obj.data.polygons:
+            continue
+        used = {polygon.material_index for polygon in obj.data.polygons}
+        for slot, entry in enumerate(obj.material_slots):
+            size = obj.dimensions.length
+            if entry.material is None or slot not in used:
+                continue
+            if entry.material not in best or best[entry.material][0] < size:
+                best[entry.material] = (size, obj, slot)
+    return {material: (obj, slot) for material, (_, obj, slot) in best.items()}
+
+
+def _sort(material: bpy.types.Material) -> str:
+    """The shader at the output: `principled`, `mix`, `emission`, another node's type, or `none`."""
+    tree = material.node_tree
+    output = tree.get_output_node("CYCLES") if tree else None
+    links = output.inputs["Surface"].links if output else ()
+    if not links:
+        return "none"
+    kind = links[0].from_node.bl_idname.removeprefix("ShaderNode").removeprefix("Bsdf").lower()
+    return {"mixshader": "mix", "addshader": "mix"}.get(kind, kind)
+
+
+def _look_at(scene: bpy.types.Scene, obj: bpy.types.Object) -> bool:
+    """Give the scene a camera that sees the object unless its own does; returns whether one was added."""
+    corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+    if scene.camera is not None and _spans(scene, corners):
+        return False
+    centre = sum(corners, Vector()) / len(corners)
+    radius = max((corner - centre).length for corner in corners) or 1.0
+    camera = bpy.data.objects.new("Study Camera", bpy.data.cameras.new("Study Camera"))
+    scene.collection.objects.link(camera)
+    camera.data.angle = FIELD * 3.14159265 / 180
+    camera.data.clip_start, camera.data.clip_end = radius * 0.01, radius * 100
+    direction = VIEW.normalized()
+    camera.location = centre + direction * radius * 2.6
+    camera.rotation_euler = direction.to_track_quat("Z", "Y").to_euler()
+    scene.camera = camera
+    if not any(o.type == "LIGHT" and not o.hide_render for o in scene.objects) and scene.world is None:
+        sun = bpy.data.objects.new("Study Sun", bpy.data.lights.new("Study Sun", "SUN"))
+        sun.data.energy = 3.0
+        sun.rotation_euler = (0.6, 0.3, 0.5)
+        scene.collection.objects.link(sun)
+    bpy.context.view_layer.update()
+    return True
+
+
+def _spans(scene: bpy.types.Scene, corners: list[Vector]) -> bool:
+    from bpy_extras.object_utils import world_to_camera_view
+
+    seen = [world_to_camera_view(scene, scene.camera, corner) for corner in corners]
+    if any(point.z <= 0 for point in seen):
+        return False
+    return all(
+        min(max(getattr(p, axis) for p in seen), 1.0) - max(min(getattr(p, axis) for p in seen), 0.0) >= LEAST_SHARE
+        for axis in "xy"
+    )
+
+
+def _make_small(scene: bpy.types.Scene, size: int) -> None:
+    settings = scene.render
+    sides = settings.resolution_x, settings.resolution_y
+    settings.resolution_x, settings.resolution_y = (max(8, round(side * size / max(sides))) for side in sides)
+    settings.resolution_percentage = 100
+
+
+def _move_values(material: bpy.types.Material, draw: random.Random) -> list[str]:
+    """Give unlinked values of every Principled node of the material others; returns which."""
+    moved = []
+    for node in material.node_tree.nodes if material.node_tree else ():
+        if node.bl_idname != "ShaderNodeBsdfPrincipled":
+            continue
+        for name, (low, high) in MOVED.items():
+            socket = node.inputs.get(name)
+            if socket is None or socket.is_linked:
+                continue
+            drawn = [draw.uniform(low, high) for _ in range(3)]
+            socket.default_value = (*drawn, 1.0) if name == "Base Color" else drawn[0]
+            moved.append(name)
+    return moved
+
+
+def _render(scene: bpy.types.Scene, out: Path, samples: int, seed: int) -> None:
+    scene.render.engine = "CYCLES"
+    cycles, settings = scene.cycles, scene.render.image_settings
+    cycles.samples, cycles.seed, cycles.use_adaptive_sampling, cycles.use_denoising = samples, seed, False, False
+    cycles.device = "CPU"
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
+    scene.render.use_border = False
+    scene.render.filepath, scene.render.use_file_extension = str(out.absolute()), False
+    bpy.ops.render.render(write_still=True)
+
+
+def main() -> None:
+    """Do one command and leave at once."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("command", choices=["read", "prepare", "render"])
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--object", default="")
+    parser.add_argument("--slot", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--size", type=int, default=96)
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--out", type=Path, default=Path())
+    chosen = parser.parse_args()
+    answer = {"read": lambda: read(chosen.file), "prepare": lambda: prepare(chosen), "render": lambda: render(chosen)}
+    print("\n" + json.dumps(answer[chosen.command]()), flush=True)
+    shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+    sys.stdout.flush()
+    os._exit(0)  # Blender's destructors may wait for ever after a render
+
+
+if __name__ == "__main__":
+    main()
