@@ -25,7 +25,11 @@ def paper_tables(rows: Sequence[Row]) -> list[tuple[str, Table]]:
     if here:
         for title, theirs, mine in (
             ("Table 1: mean runtime, solved scenes; in brackets all runs", _their_time, _our_time),
-            ("Table 2: JOD, mean (min/max)", _their_jod, _our_jod),
+            (
+                "Table 2: Q_JOD, mean (min/max); * JOD of ColorVideoVDP, another metric",
+                _their_jod,
+                _our_jod,
+            ),
             ("Table 3: share of scenes solved", _their_share, _our_share),
         ):
             found.append((title, _table(rows, methods, here, theirs, mine)))
@@ -93,8 +97,16 @@ def _their_jod(figure: PaperFigure) -> str:
 
 
 def _our_jod(rows: Sequence[Row]) -> str:
-    scores = [s for s in (row.q_jod if row.q_jod is not None else row.jod for row in rows) if s is not None]
-    return f"{sum(scores) / len(scores):.2f} ({min(scores):.2f}/{max(scores):.2f})" if scores else "–"
+    """Of the paper's judge where all rows have its score, else of ColorVideoVDP, marked: never of both together."""
+    judged = [row for row in rows if row.q_jod is not None or row.jod is not None]
+    if judged and all(row.q_jod is not None for row in judged):
+        return _spread([row.q_jod for row in judged if row.q_jod is not None])
+    scores = [row.jod for row in rows if row.jod is not None]
+    return f"{_spread(scores)} *" if scores else "–"
+
+
+def _spread(scores: Sequence[float]) -> str:
+    return f"{sum(scores) / len(scores):.2f} ({min(scores):.2f}/{max(scores):.2f})"
 
 
 def _their_share(figure: PaperFigure) -> str:

@@ -8,6 +8,7 @@ import pytest
 
 from mfo_backend.bench.judge import q_jod as module
 from mfo_backend.bench.judge.q_jod import scored, without_score
+from mfo_backend.bench.report.paper_tables import paper_tables
 from mfo_backend.bench.rows.row import Task
 from mfo_backend.bench.rows.row_file import RowFile
 from mfo_backend.cli.main import main
@@ -39,8 +40,6 @@ def test_only_rows_with_values_and_without_a_score_are_asked_for():
     given = [*rows(3), row(Task("base", 7, "fast")), *rows(1, "best", q_jod=9.0), *rows(2, "paper")]
     chosen = without_score(given, [], ["balanced", "best"])
     assert [r.key for r in chosen] == [("base", i, "balanced") for i in range(3)]
-        ("base", i, "balanced") for i in range(3)
-    ]
     assert without_score(given, ["noise"], []) == []
 
 
@@ -82,3 +81,15 @@ def test_without_the_judge_the_command_says_so_before_it_renders(tmp_path, monke
     monkeypatch.delenv("MFO_HDRVDP3", raising=False)
     assert main(["bench", "judge", str(tmp_path)]) == 3
     assert "MFO_HDRVDP3" in capsys.readouterr().err
+
+
+def test_the_papers_table_never_mixes_two_metrics():
+    def cell(rows):
+        ((_, _table), *_) = found = paper_tables(rows)
+        table = found[1][1]
+        return next(line[2] for line in table.rows if line[0].endswith("`balanced`"))
+
+    both = rows(2, jod=9.0, q_jod=9.9)
+    assert cell(both) == "9.90 (9.90/9.90)"
+    assert cell([*both, *rows(3, jod=8.0)[2:]]) == "8.67 (8.00/9.00) *"
+    assert cell(rows(2)) == "–"
