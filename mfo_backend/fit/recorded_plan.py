@@ -88,7 +88,7 @@ class RecordedPlan:
         """The plan of a preset.
 
         `fast` takes fewer camera rays at the solution where light is sampled, and is content with more noise: less
-        time, and more error (docs/method/recorded_paths.md has both).
+        time, and more error (docs/notebook/recorded_paths.md has both).
         """
         if preset == "fast":
             return RecordedPlan(grid_last=3, too_noisy=0.1, low_noise=0.08, grid_finest=8, most_own=1.0)

@@ -17,7 +17,7 @@ from .pictures import TracedTiles
 STREAM = 0x6F000000  # random numbers of no other stage
 WORTH = 0.02  # relative difference of blocks of pixels that noise does not explain; less is hard to see
 MOST_PIXELS = 1 << 16  # whole pictures are needed; of more pixels one takes too long
-# Of a half of a picture. With fewer, noise decides some results (docs/method/glass.md); with a quarter, a difference
+# Of a half of a picture. With fewer, noise decides some results (docs/notebook/glass.md); with a quarter, a difference
 # of 4 % is found in half of the pictures of 48 x 48 pixels only
 HALF_PATHS = 1 << 19
 HALF_SAMPLES = (4, 32)  # of a pixel, at least and at most

@@ -41,7 +41,7 @@ def lower_seen_error(
     A stage for each of the `residuals`, by its name, minimises their squares over tiles; they are alternatives. With
     `flip` the error itself is minimised from the best of them, and once more on a new picture there. All searches are
     in units of a small box and end early: one in units of the whole range follows the reference's noise further
-    (docs/method/glass.md).
+    (docs/notebook/glass.md).
     """
     picture = pictures.around(start, 1)
     if picture is None:

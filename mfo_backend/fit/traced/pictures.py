@@ -23,7 +23,7 @@ Samples = list[NDArray[np.float32]]
 
 GEOMETRIC = ("roughness", "ior")  # they move the paths
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
-# Wide ones blur what they look at, narrow ones are noisy (docs/method/glass.md has those of 0.03 and 0.06 of the index)
+# Wide ones blur what they look at, narrow ones are noisy (docs/notebook/glass.md: 0.03 and 0.06 of the index)
 SECANTS = {"roughness": 0.12, "ior": 0.045}
 
 

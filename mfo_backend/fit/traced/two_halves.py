@@ -22,7 +22,7 @@ def two_half_equations(a: Rows, b: Rows) -> NormalEquations:
     tiles with every step, and a single tile then hides what all others say. Under `ph_kiara_1_dawn` the race of six
     random glasses ended, by their geometric mean, at 0.14 of the reference's noise (squares) instead of 0.24 with a
     limit of 3. But what is cut off is missing from the mean: with that limit races under contrasty probes ended too
-    dark, and at 30 fireflies rule again (docs/method/glass.md).
+    dark, and at 30 fireflies rule again (docs/notebook/glass.md).
     """
     first, second = _capped(a), _capped(b)
     product = first.T @ second / len(first)
