@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Child processes in a group of their own, so that what they start ends with them. No bpy here."""
+"""Child processes in a group of their own, so that what they start ends with them; who lives. No bpy here."""
 
 from __future__ import annotations
 
@@ -27,3 +27,16 @@ def signal_group(pid: int, number: int) -> None:
             subprocess.run(["taskkill", "/T", "/F", "/PID", str(pid)], capture_output=True, check=False)
         else:
             os.killpg(pid, number)
+
+
+def process_lives(pid: int) -> bool:
+    """Whether there is a process of this id; always so on Windows, where asking would end it."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True

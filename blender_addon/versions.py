@@ -124,3 +124,11 @@ def corner_normals(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     normals = np.empty(len(mesh.loops) * 3, dtype=np.float32)
     mesh.corner_normals.foreach_get("vector", normals)
     return normals.reshape(-1, 3)
+
+
+def save_as_multilayer(settings: bpy.types.ImageFormatSettings) -> None:
+    """Let renders be written as uncompressed 32-bit multilayer EXR (a media type of its own from Blender 5.0 on)."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth, settings.exr_codec = "32", "NONE"

@@ -13,14 +13,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from ..process_group import process_lives
 from .findings import ExportError
 
 GENERATOR = "material_fit_mfo"
 _ABANDONED = re.compile(r"\..+\.(\d+)\.[a-z0-9_]+\.(partial|old)")  # hidden, process id, mkdtemp's letters
 # what a job folder may hold; a folder with anything else is somebody's own
 OWN_NAMES = {
-    "request.json", "scene.xml", "meshes", "textures", "view_lut.exr", "progress.jsonl", "cancel", "result.json",
-    "partial.json", "pictures", "index.html", "backend.log",
+    "request.json", "scene.xml", "meshes", "textures", "graph", "view_lut.exr", "progress.jsonl", "cancel",
+    "result.json", "partial.json", "pictures", "index.html", "backend.log",
 }  # fmt: skip
 
 
@@ -94,20 +95,8 @@ def _remove_abandoned(parent: Path) -> None:
     with suppress(OSError):
         for path in parent.iterdir():
             found = _ABANDONED.fullmatch(path.name)
-            if found is not None and not _lives(int(found[1])):
+            if found is not None and not process_lives(int(found[1])):
                 shutil.rmtree(path, ignore_errors=True)
-
-
-def _lives(pid: int) -> bool:
-    if os.name == "nt":
-        return True  # os.kill would end it there; an abandoned folder stays
-    try:
-        os.kill(pid, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True
-    return True
 
 
 def _sentence(problem: OSError, folder: Path) -> str:

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arbitrary output variables (AOVs) of one object's surface: a Cycles render without light, for values alone."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector  # pyright: ignore[reportMissingImports]
+from numpy.typing import NDArray
+
+from ..versions import save_as_multilayer
+from .plain_exr import read_plain_exr
+
+MARGIN = 2.0  # pixels around the target: as far as a pixel filter looks
+# bytes of one render's AOVs, 16 for each value and subpixel; larger ones are made at a smaller scale
+MOST_BYTES = 2 * 10**9
+BYTES_PER_VALUE = 16
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A part of the picture in subpixels: `scale` of them along each side of a pixel, columns `left` to `right`."""
+
+    scale: int
+    left: int
+    top: int
+    right: int
+    bottom: int
+    full: tuple[int, int]  # the whole picture, in subpixels
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Values by AOV name, float32 (height, width, 1 or 3), and the frame they are of."""
+
+    values: dict[str, NDArray[np.float32]]
+    frame: Frame
+
+
+def frame_of(scene: bpy.types.Scene, obj: bpy.types.Object, scale: int, outputs: int) -> Frame:
+    """The frame around `obj` with at most `scale` subpixels along a pixel, less where the AOVs would be too large."""
+    size = _picture_size(scene.render)
+    left, top, right, bottom = _bounds(scene, obj, size)
+    area = max((right - left) * (bottom - top), 1)
+    while scale > 1 and area * scale**2 * outputs * BYTES_PER_VALUE > MOST_BYTES:
+        scale //= 2
+    sides = (left * scale, top * scale, right * scale, bottom * scale)
+    return Frame(scale, *sides, (size[0] * scale, size[1] * scale))
+
+
+def world_to_frame(scene: bpy.types.Scene, frame: Frame) -> NDArray[np.float64]:
+    """The (3, 4) camera matrix: world (x, y, z, 1) to w times column, row (from the frame's corner) and 1."""
+    render, camera = scene.render, scene.camera
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = camera.evaluated_get(depsgraph)
+    projection = evaluated.calc_matrix_camera(
+        depsgraph, x=render.resolution_x, y=render.resolution_y,
+        scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y,
+    )  # fmt: skip
+    world = evaluated.matrix_world.normalized()  # Cycles ignores the scale of a camera
+    clip = np.array(projection @ world.inverted(), dtype=np.float64)
+    width, height = frame.full
+    x, y, w = clip[0], clip[1], clip[3]
+    return np.stack([(x + w) * width / 2 - frame.left * w, (w - y) * height / 2 - frame.top * w, w])
+
+
+def render_outputs(
+    scene: bpy.types.Scene,
+    layer: bpy.types.ViewLayer,
+    names: Iterable[tuple[str, bool]],
+    frame: Frame,
+    samples: int,
+) -> Outputs:
+    """Render the AOVs of these names and kinds (True for a colour); the nodes that write them are there already.
+
+    Raises
+    ------
+    RuntimeError
+        If Blender cannot render.
+    """
+    with tempfile.TemporaryDirectory(prefix="aov_") as folder, _settings(scene, layer, frame, samples) as put:
+        aovs = layer.aovs
+        while len(aovs):  # the file is a copy; the scene's own outputs are not asked for
+            aovs.remove(aovs[0])
+        wanted = list(names)
+        for name, is_color in wanted:
+            aov = aovs.add()
+            aov.name, aov.type = name, "COLOR" if is_color else "VALUE"
+        path = Path(folder) / "aov.exr"
+        put(scene.render, "filepath", str(path))
+        bpy.ops.render.render(write_still=True, scene=scene.name, layer=layer.name)
+        channels = read_plain_exr(path)
+    found = {name: _joined(channels, name) for name, _ in wanted}
+    rows, columns = slice(frame.top, frame.bottom), slice(frame.left, frame.right)
+    height, width = frame.bottom - frame.top, frame.right - frame.left
+    if next(iter(found.values())).shape[:2] != (height, width):  # the whole frame, black outside of the border
+        found = {name: values[rows, columns] for name, values in found.items()}
+    return Outputs(found, frame)
+
+
+@contextmanager
+def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, samples: int) -> Iterator[Any]:
+    """Settings of a render for values: no light, no blur, only the frame; all is put back."""
+    before: list[tuple[Any, str, Any]] = []
+
+    def put(owner: Any, name: str, value: Any) -> None:
+        if hasattr(owner, name) and getattr(owner, name) != value:
+            before.append((owner, name, getattr(owner, name)))
+            setattr(owner, name, value)
+
+    render, cycles = scene.render, scene.cycles
+    width, height = frame.full
+    try:
+        put(render, "engine", "CYCLES")
+        put(cycles, "device", "CPU")
+        put(render, "resolution_percentage", 100)
+        put(render, "resolution_x", width)
+        put(render, "resolution_y", height)
+        put(render, "use_border", True)
+        put(render, "use_crop_to_border", True)
+        # Blender rounds borders to whole pixels, and a float32 of a bound may lie just below
+        put(render, "border_min_x", (frame.left + 0.25) / width)
+        put(render, "border_max_x", (frame.right + 0.25) / width)
+        put(render, "border_min_y", (height - frame.bottom + 0.25) / height)
+        put(render, "border_max_y", (height - frame.top + 0.25) / height)
+        for name in ("use_compositing", "use_sequencer", "use_motion_blur", "use_multiview", "use_freestyle"):
+            put(render, name, False)
+        put(render, "use_file_extension", False)
+        put(render, "use_overwrite", True)
+        for name in ("use_adaptive_sampling", "use_denoising", "use_auto_tile", "use_light_tree"):
+            put(cycles, name, False)
+        for name, value in (("samples", samples), ("max_bounces", 0), ("seed", 0), ("time_limit", 0.0)):
+            put(cycles, name, value)
+        put(cycles, "pixel_filter_type", "BOX")
+        put(scene, "world", None)
+        put(scene.camera.data.dof, "use_dof", False)
+        for item in scene.objects:
+            if item.type == "LIGHT":
+                put(item, "hide_render", True)
+        save_as_multilayer(render.image_settings)
+        yield put
+    finally:
+        for owner, name, value in reversed(before):
+            setattr(owner, name, value)
+
+
+def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.float32]:
+    """The channels of one AOV; names are ``layer.aov.X`` or ``layer.aov.R`` and so on."""
+    parts = {key.rsplit(".", 1)[1]: values for key, values in channels.items() if key.split(".")[-2:-1] == [name]}
+    if not parts:
+        raise RuntimeError(f"Cycles has not written the output {name!r}")
+    order = ("R", "G", "B") if "R" in parts else ("X", "Y", "Z") if "Y" in parts else tuple(parts)[:1]
+    return np.stack([parts[key] for key in order], axis=-1)
+
+
+def _picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
+    percent = render.resolution_percentage
+    return render.resolution_x * percent // 100, render.resolution_y * percent // 100
+
+
+def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Left, top, right and bottom of the pixels that can see `obj`; the whole picture where it reaches behind the
+    camera or is outside of it."""
+    width, height = size
+    whole = (0, 0, width, height)
+    corners = []
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for instance in depsgraph.object_instances:
+        owner = instance.parent if instance.is_instance else instance.object
+        if owner is not None and owner.original == obj:
+            matrix = instance.matrix_world.copy()
+            corners += [matrix @ Vector(corner) for corner in instance.object.bound_box]
+    if not corners:
+        return whole
+    seen = [world_to_camera_view(scene, scene.camera, corner) for corner in corners]
+    if min(point.z for point in seen) <= 0.0:
+        return whole
+    left, right = (pick(point.x for point in seen) * width for pick in (min, max))
+    bottom, top = (pick(point.y for point in seen) * height for pick in (min, max))
+    found = (
+        max(math.floor(left - MARGIN), 0),
+        max(math.floor(height - top - MARGIN), 0),
+        min(math.ceil(right + MARGIN), width),
+        min(math.ceil(height - bottom + MARGIN), height),
+    )
+    return found if found[0] < found[2] and found[1] < found[3] else whole

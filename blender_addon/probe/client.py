@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The side that asks: a copy of the file, a second Blender on it, one answer for each request."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import re
+import shutil
+import subprocess
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+from ..backend_python import EXTENSION_ROOT
+from ..background_task import environment_for
+from ..job_process import log_tail
+from ..process_group import KILL, own_group, process_lives, signal_group
+from .own_blender import own_blender, save_copy
+
+PREFIX = "material_fit_probe_"
+_FOLDER = re.compile(PREFIX + r"(\d+)_.+")  # the process that asks, mkdtemp's letters
+END_SECONDS = 2.0  # the second Blender may take to end when nobody asks any more
+
+
+class ProbeError(Exception):
+    """The second Blender cannot answer; the message is one sentence for the user."""
+
+
+class Probe:
+    """A second Blender on a copy of the file as it is now; it starts at once and is waited for at the first request.
+
+    Use it in a `with` block: at its end the process and its files are gone.
+
+    Raises
+    ------
+    ProbeError
+        If the copy cannot be written or no Blender can be started.
+    """
+
+    def __init__(self) -> None:
+        _remove_abandoned()
+        self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}_"))
+        self._log = self.folder / "probe.log"
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()  # None: the process has ended
+        self._ready = False
+        try:
+            copy = self.folder / "scene.blend"
+            save_copy(copy)
+            # its own temporary files go with the folder, also when it is killed
+            environment = environment_for(EXTENSION_ROOT) | dict.fromkeys(("TMPDIR", "TEMP"), str(self.folder))
+            words = own_blender("probe.server", [str(copy), "--parent", str(os.getpid())])
+            with self._log.open("wb") as log:
+                self._process = subprocess.Popen(
+                    words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, encoding="utf-8",
+                    env=environment, cwd=self.folder, **own_group(),
+                )  # fmt: skip
+        except OSError as error:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise ProbeError(
+                f"A second Blender, which evaluates nodes, could not be started on a copy of the file "
+                f"({error.strerror or error}): free some space, or save the file under another name."
+            ) from error
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """The second Blender's process."""
+        return self._process.pid
+
+    def ask(self, command: str, **words: Any) -> dict[str, Any]:
+        """The answer to a request, as JSON values.
+
+        Raises
+        ------
+        ProbeError
+            With the sentence of the second Blender, or the end of its log where it died.
+        """
+        if not self._ready:
+            self._checked(self._next())
+            self._ready = True
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # a process that is gone is told by what it does not answer
+            self._process.stdin.write(json.dumps({"command": command, **words}) + "\n")
+            self._process.stdin.flush()
+        return self._checked(self._next())
+
+    def close(self) -> None:
+        """End the second Blender and remove its files."""
+        with contextlib.suppress(OSError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+        try:
+            self._process.wait(END_SECONDS if self._ready else 0.0)
+        except subprocess.TimeoutExpired:
+            signal_group(self._process.pid, KILL)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_SECONDS)
+        self._reader.join(END_SECONDS)
+        if self._process.stdout is not None and not self._reader.is_alive():
+            self._process.stdout.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def __enter__(self) -> Probe:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError, ValueError):
+            for line in self._process.stdout:
+                self._lines.put(line)
+        self._lines.put(None)
+
+    @staticmethod
+    def _checked(answer: dict[str, Any]) -> dict[str, Any]:
+        if answer["status"] != "ok":
+            raise ProbeError(answer["sentence"])
+        return answer
+
+    def _next(self) -> dict[str, Any]:
+        """The next answer; other lines are Blender's."""
+        while (line := self._lines.get()) is not None:
+            with contextlib.suppress(ValueError):
+                answer = json.loads(line)
+                if isinstance(answer, dict) and "status" in answer:
+                    return answer
+        self._lines.put(None)
+        last = next((text for text in reversed(log_tail(self._log).splitlines()) if text.strip()), "its log is empty")
+        raise ProbeError(f"The second Blender, which evaluates nodes, has ended: {last.strip()}")
+
+
+def _remove_abandoned() -> None:
+    """Remove what processes that were killed have left."""
+    with contextlib.suppress(OSError):
+        for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
+            found = _FOLDER.fullmatch(path.name)
+            if found is not None and not process_lives(int(found[1])):
+                shutil.rmtree(path, ignore_errors=True)

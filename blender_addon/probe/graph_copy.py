@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A material's nodes as a copy of their own, groups included, and what lies upstream of a socket."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import bpy
+
+GROUP = "ShaderNodeGroup"
+
+
+def own_copy(material: bpy.types.Material) -> bpy.types.Material:
+    """A copy of `material` whose node groups are copies too, so that a change in them is seen nowhere else."""
+    copy = material.copy()
+    _own_groups(copy.node_tree)
+    return copy
+
+
+def remove_copy(material: bpy.types.Material) -> None:
+    """Remove what `own_copy` made."""
+    trees = list(_groups_in(material.node_tree))
+    bpy.data.materials.remove(material)
+    for tree in trees:
+        if tree.users == 0:
+            bpy.data.node_groups.remove(tree)
+
+
+def node_at(tree: bpy.types.NodeTree, path: Sequence[str]) -> tuple[bpy.types.NodeTree, bpy.types.Node]:
+    """The node of a path, the names of the groups that hold it and its own, and the tree that it is in."""
+    *groups, name = path
+    for group in groups:
+        tree = tree.nodes[group].node_tree
+    return tree, tree.nodes[name]
+
+
+def nodes_of(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
+    """Every node of a tree and of the groups in it."""
+    for node in tree.nodes:
+        yield node
+        if node.bl_idname == GROUP and node.node_tree is not None:
+            yield from nodes_of(node.node_tree)
+
+
+def _own_groups(tree: bpy.types.NodeTree) -> None:
+    for node in tree.nodes:
+        if node.bl_idname == GROUP and node.node_tree is not None:
+            node.node_tree = node.node_tree.copy()
+            _own_groups(node.node_tree)
+
+
+def _groups_in(tree: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTree]:
+    for node in tree.nodes:
+        if node.bl_idname == GROUP and node.node_tree is not None:
+            yield node.node_tree
+            yield from _groups_in(node.node_tree)

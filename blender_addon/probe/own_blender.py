@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How to start this very Blender again, program or module, and a copy of the file for it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+
+from ..versions import is_module
+
+
+def own_blender(module: str, arguments: list[str]) -> list[str]:
+    """The command line that runs a module of this package, ``"probe.server"``, in a Blender of this version."""
+    if is_module():
+        return [sys.executable, "-m", f"blender_addon.{module}", *arguments]
+    script = Path(__file__).resolve().parent.parent.joinpath(*module.split(".")).with_suffix(".py")
+    options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", str(script), "--"]
+    return [bpy.app.binary_path, *options, *arguments]
+
+
+def save_copy(path: Path) -> None:
+    """Write the file as it is now to `path`; the session keeps its name and its unsaved changes.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
+    except RuntimeError as error:
+        raise OSError(str(error).strip().removeprefix("Error: ")) from error
+    if not path.is_file():
+        raise OSError(f"{path} was not written")

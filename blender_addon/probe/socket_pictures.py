@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command `sockets`: what a material's linked sockets hold at every subpixel of the target that the camera sees.
+
+Cycles evaluates the nodes itself: a copy of the material writes each socket's value into an output (AOV).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..export.color_space import to_rec709
+from ..export.shader_graph import source_of
+from ..versions import active_output
+from .aov_render import frame_of, render_outputs, world_to_frame
+from .graph_copy import node_at, nodes_of, own_copy, remove_copy
+from .server import ProbeRequestError
+
+MASK, POSITION = "mfo mask", "mfo position"
+DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
+SEEN = 0.05  # share of a subpixel's samples on the target from which on it has a value
+
+
+def answer(request: Mapping[str, Any]) -> dict[str, Any]:
+    """Write one .npy file, float32 (height, width, 1 or 3), for each socket, and the positions, NaN beside the target.
+
+    Requested are `scene`, `layer`, `object`, `slot`, the shader's `node` (a path of names), its `sockets`, the `scale`
+    in subpixels along a pixel, `samples` of each subpixel and the `folder` for the files. Answered are `files` by
+    socket, `means` over the target, the file `positions`, and `camera`, the (3, 4) matrix from the world to columns and
+    rows of the files. Colours are linear Rec.709, directions unit vectors of the world or zero.
+
+    Raises
+    ------
+    ProbeRequestError
+        If the camera does not see the target, or Blender cannot render.
+    """
+    scene = bpy.data.scenes[request["scene"]]
+    layer = scene.view_layers[request["layer"]]
+    if bpy.context.window is not None:
+        bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
+    obj = scene.objects[request["object"]]
+    slot = obj.material_slots[request["slot"]]
+    material, was_link = slot.material, slot.link
+    copy = own_copy(material)
+    try:
+        kinds = _write_outputs(copy, request["node"], request["sockets"])
+        wanted = [*((f"mfo {name}", kind != "VALUE") for name, kind in kinds.items()), (MASK, False), (POSITION, True)]
+        frame = frame_of(scene, obj, request["scale"], len(wanted))
+        _widen_bumps(copy.node_tree, frame.scale)
+        slot.link = "OBJECT"  # the mesh may belong to other objects too
+        slot.material = copy
+        try:
+            found = render_outputs(scene, layer, wanted, frame, request["samples"]).values
+        except RuntimeError as error:
+            raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{material.name}': {error}") from error
+    finally:
+        slot.material = material
+        slot.link = was_link
+        remove_copy(copy)
+    mask = found[MASK]
+    seen = mask[..., 0] > SEEN
+    if not seen.any():
+        raise ProbeRequestError(f"The camera does not see '{obj.name}': move it into the picture.")
+    folder = Path(request["folder"])
+    files, means = {}, {}
+    for number, (name, kind) in enumerate(kinds.items()):
+        values = _cleaned(found[f"mfo {name}"] / np.maximum(mask, SEEN), seen, name, kind)
+        files[name] = f"socket_{number:02d}.npy"
+        np.save(folder / files[name], values)
+        means[name] = values[seen].mean(axis=0, dtype=np.float64).tolist()
+    positions = np.where(seen[..., None], found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
+    np.save(folder / "positions.npy", positions.astype(np.float32))
+    camera = world_to_frame(scene, frame).tolist()
+    return {"files": files, "means": means, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
+
+
+def _write_outputs(copy: bpy.types.Material, path: list[str], sockets: list[str]) -> dict[str, str]:
+    """Put output nodes on the sockets of a copied material and make it opaque; returns the sockets' types."""
+    tree = copy.node_tree
+    for node in list(nodes_of(tree)):
+        if node.bl_idname == "ShaderNodeOutputAOV":  # the user's own, perhaps of the same name
+            node.id_data.nodes.remove(node)
+    inner, shader = node_at(tree, path)
+    kinds = {}
+    for name in sockets:
+        socket = shader.inputs[name]
+        source = source_of(socket)
+        if source is None:
+            raise ProbeRequestError(f"{name} of '{shader.name}' has no link any more.")
+        kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type
+        _output(inner, f"mfo {name}", source, kinds[name] != "VALUE")
+    one = tree.nodes.new("ShaderNodeValue")
+    one.outputs[0].default_value = 1.0
+    _output(tree, MASK, one.outputs[0], False)
+    _output(tree, POSITION, tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], True)
+    # opaque, and no shader that Cycles would fold away: outputs of a surface that is not there add up along the ray
+    grey = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    output = active_output(tree)
+    assert output is not None  # the shader is linked to it
+    tree.links.new(grey.outputs[0], output.inputs["Surface"])
+    for link in list(output.inputs["Volume"].links):
+        tree.links.remove(link)
+    return kinds
+
+
+def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, is_color: bool) -> None:
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    node.aov_name = name
+    tree.links.new(source, node.inputs["Color" if is_color else "Value"])
+
+
+def _widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
+    """Let Bump nodes take their differences over the width of a pixel, which is `scale` subpixels."""
+    for node in nodes_of(tree):
+        width = node.inputs.get("Filter Width") if node.bl_idname == "ShaderNodeBump" else None
+        if width is not None and not width.is_linked:
+            width.default_value *= scale
+
+
+def _cleaned(values: NDArray[np.float32], seen: NDArray[np.bool_], name: str, kind: str) -> NDArray[np.float32]:
+    """Finite values; colours of the working space as linear Rec.709, directions at unit length."""
+    finite = np.where(seen[..., None] & np.isfinite(values), values, 0.0).astype(np.float64)
+    if kind == "RGBA":
+        finite = to_rec709(finite)
+    if name in DIRECTIONS:
+        length = np.linalg.norm(finite, axis=-1, keepdims=True)
+        finite = np.divide(finite, length, out=np.zeros_like(finite), where=length > 0.1)
+    return np.ascontiguousarray(finite, dtype=np.float32)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The second Blender: it answers, says why not, and leaves nothing behind, whoever is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from blender_addon.probe.client import PREFIX, Probe, ProbeError  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[3]
+PATIENCE = 20.0  # seconds
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A temporary folder of the test's own, for this process and those it starts."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+def left_in(folder: Path) -> list[Path]:
+    return list(folder.glob(f"{PREFIX}*"))
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_an_unknown_command_and_the_end(temporary: Path) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with Probe() as probe:
+        assert left_in(temporary) == [probe.folder]
+        with pytest.raises(ProbeError, match="no command 'nothing'"):
+            probe.ask("nothing")
+        with pytest.raises(ProbeError, match="no command 'twice'"):  # it still answers
+            probe.ask("twice")
+    assert not left_in(temporary)
+
+
+def test_a_killed_second_blender_is_said(temporary: Path) -> None:
+    with Probe() as probe:
+        os.kill(probe.pid, signal.SIGTERM)
+        with pytest.raises(ProbeError, match="has ended"):
+            probe.ask("sockets")
+    assert not left_in(temporary)
+
+
+def test_a_copy_that_cannot_be_written(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_space(_path: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("blender_addon.probe.client.save_copy", no_space)
+    with pytest.raises(ProbeError, match="No space left on device"):
+        Probe()
+    assert not left_in(temporary)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_it_ends_and_cleans_up_when_the_one_that_asks_is_killed(temporary: Path) -> None:
+    script = (
+        "import time; from blender_addon.probe.client import Probe, ProbeError\n"
+        "probe = Probe()\n"
+        "try: probe.ask('nothing')\n"
+        "except ProbeError: print('pid', probe.pid, flush=True)\n"
+        "time.sleep(60)"
+    )
+    asker = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}
+    )
+    assert asker.stdout is not None
+    pid = next(int(line.split()[1]) for line in asker.stdout if line.startswith("pid"))
+    assert left_in(temporary)
+    asker.kill()
+    asker.wait()
+    asker.stdout.close()
+    wait_for(lambda: not left_in(temporary))
+    wait_for(lambda: not lives(pid))
+
+
+def lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_what_killed_processes_have_left_goes(temporary: Path) -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (temporary / f"{PREFIX}{gone.pid}_abcd").mkdir()
+    (temporary / f"{PREFIX}{os.getpid()}_abcd").mkdir()  # somebody else's probe in this process
+    with Probe():
+        pass
+    assert [path.name for path in left_in(temporary)] == [f"{PREFIX}{os.getpid()}_abcd"]
