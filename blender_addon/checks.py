@@ -17,7 +17,8 @@ from .export.image_pixels import UnreadableImageError, is_data, read_pixels, wit
 from .export.read_camera import has_camera, note_picture_settings, picture_size
 from .export.read_material import principled_node, read_target
 from .export.read_scene import MESH_TYPES
-from .export.reference import LINEAR_SUFFIXES, holds_display_colours, needs_table, refuse_size, refuse_suffix
+from .export.reference import DISPLAY_SUFFIXES, LINEAR_SUFFIXES, holds_display_colours, refuse_size, refuse_suffix
+from .export.reference_view import SCENE, mixed_by, needs_table, output_view
 from .export.render_state import rendered_objects
 from .export.shader_graph import source_of
 from .picture_header import read_header
@@ -131,9 +132,11 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
         problems += _refused(refuse_size, found.name, found.size, picture_size(scene.render))
     words = "scene-linear Rec.709"
     if not found.is_linear:
-        problems += _refused(needs_table, scene, found.name, settings.bake_view)
-        view = scene.view_settings.view_transform
-        words = f"display colours under the {'baked ' if settings.bake_view and view != 'Standard' else ''}view {view}"
+        problems += _refused(needs_table, scene, found.name, settings.reference_view)
+        words = "taken as a photograph or a render under Standard"
+        if settings.reference_view == SCENE:
+            words = f"display colours under the view {output_view(scene)[0].view_transform}"
+            words = f"taken as rendered in this scene, {words}" if mixed_by(scene) else words
     return problems or [Finding(FINE, f"Reference: {found.words}, {words}.")]
 
 
@@ -173,6 +176,17 @@ def _image_reference(settings: bpy.types.PropertyGroup) -> _Picture:
     width, height = image.size
     space = "raw numbers taken as colours" if is_data(image) else image.colorspace_settings.name
     return _Picture(image.name, (width, height), f"{width} x {height}, {space}", not holds_display_colours(image))
+
+
+def asks_view(scene: bpy.types.Scene) -> bool:
+    """Whether it makes a difference how the chosen reference was made; reads no file, for the panel's drawing."""
+    settings = scene.mfo
+    if settings.reference_source == "IMAGE":
+        image = settings.reference_image
+        is_display = image is not None and holds_display_colours(image)
+    else:
+        is_display = Path(settings.reference_path).suffix.lower() in DISPLAY_SUFFIXES
+    return is_display and bool(mixed_by(scene))
 
 
 def _refused(check: Callable[..., object], *arguments: object) -> list[Finding]:

@@ -3,7 +3,7 @@
 
 Run by the bpy module or by a Blender program::
 
-    python -m blender_addon.headless export FILE --object NAME --reference REF --job DIR [--fit JSON] [--bake-view]
+    python -m blender_addon.headless export FILE --object NAME --reference REF --job DIR [--fit JSON]
     blender -b --factory-startup --python blender_addon/headless.py -- apply FILE --job DIR --save-as OUT
 
 The answer is one JSON object with `status` and `sentence` on a line of its own, the last on stdout that starts with {;
@@ -73,7 +73,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
             Path(chosen.job).absolute(),
             reference=chosen.reference.absolute(),
             fit=fit,
-            bake_view=chosen.bake_view,
+            reference_view=chosen.reference_view,
         )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--reference", required=True, type=Path)
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--fit", default="{}", help="the `fit` object of request.json")
-    command.add_argument("--bake-view", action="store_true", help="take a display picture under any view transform")
+    command.add_argument("--reference-view", default="scene", help="scene or standard: how a display picture was made")
     command = add("apply", apply)
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--save-as", required=True, type=Path)

@@ -105,15 +105,8 @@ def _show_in_render(context: bpy.types.Context, _argument: str) -> None:
         collection.hide_render = False
 
 
-def _bake_view(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.mfo.bake_view = True
-
-
-def _standard_view(context: bpy.types.Context, _argument: str) -> None:
-    view = context.scene.view_settings
-    view.view_transform, view.look, view.use_curve_mapping = "Standard", "None", False
-    if hasattr(view, "use_white_balance"):
-        view.use_white_balance = False
+def _reference_view(context: bpy.types.Context, made: str) -> None:
+    context.scene.mfo.reference_view = made
 
 
 def _colorspace(context: bpy.types.Context, name: str) -> None:
@@ -166,10 +159,6 @@ def _make_local(context: bpy.types.Context, _argument: str) -> None:
         raise MendingError(f"Material '{name}' cannot be made local: make its object and its mesh local first.")
 
 
-def _render_exr(_context: bpy.types.Context, _argument: str) -> None:
-    bpy.ops.mfo.render_reference()
-
-
 def _all_parameters(context: bpy.types.Context, _argument: str) -> None:
     context.scene.mfo.parameter_set = "all"
 
@@ -185,12 +174,8 @@ KINDS = {
     "cycles": Kind("Use Cycles", "Set the render engine to Cycles", _cycles),
     "no_override": Kind("Remove Override", "Remove the material and world override of the view layer", _no_override),
     "show_in_render": Kind("Show in Render", "Turn Disable in Renders off for it and its collections", _show_in_render),
-    "bake_view": Kind("Bake View", "Compare under the scene's view, with which it was rendered", _bake_view),
-    "standard_view": Kind(
-        "Use Standard", "Set the view to Standard without look and curves; the reference must be such", _standard_view
-    ),
-    "render_exr": Kind(
-        "Render EXR", "Render the scene as it is with Cycles into an EXR and use that instead", _render_exr
+    "reference_view": Kind(
+        "Photo or Standard", "Take the reference as a photograph or a render under Standard", _reference_view
     ),
     "colorspace": Kind("{}", "Give the reference image this colour space", _colorspace),
     "new_material": Kind("Add Material", "Put a new material with a Principled BSDF into the slot", _new_material),

@@ -100,8 +100,15 @@ def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
         target and (target.name, target.active_material_index, getattr(target.active_material, "name", "")),
         scene.camera and scene.camera.name,
         (render.resolution_x, render.resolution_y, render.resolution_percentage, render.use_border, render.engine),
+        (render.image_settings.color_management, render.image_settings.file_format),
         (render.use_multiview, view.view_transform, view.look, view.use_curve_mapping),
         (settings.reference_source, settings.reference_path, getattr(settings.reference_image, "name", "")),
-        (settings.bake_view, settings.parameter_set, settings.model, frozenset(settings.sockets)),
+        (
+            scene.display_settings.display_device,
+            settings.reference_view,
+            settings.parameter_set,
+            settings.model,
+            frozenset(settings.sockets),
+        ),
         [(bound.name, bound.lower, bound.upper) for bound in settings.bounds],
     )

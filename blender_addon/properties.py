@@ -93,8 +93,8 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
     )
     reference_path: StringProperty(
         name="Reference",
-        description="Picture to reproduce: an EXR with scene-linear values, or a PNG rendered with the Standard view "
-        "(with Bake View: the scene's)",
+        description="Picture to reproduce: an EXR with scene-linear values, or a PNG, JPEG or TIFF rendered in this "
+        "scene or photographed",
         subtype="FILE_PATH",
         options=RELATIVE_PATH,
     )
@@ -139,10 +139,22 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
             ("ldr", "LDR", "Compare displayed values"),
         ),
     )
-    bake_view: BoolProperty(
-        name="Bake View",
-        description="Compare a display picture under the view transform, look, exposure, gamma and curves of the "
-        "scene; it must have been rendered with them",
+    reference_view: EnumProperty(
+        name="How Was It Made",
+        description="How the reference was made, which a PNG or JPEG does not tell",
+        items=(
+            (
+                "scene",
+                "In This Scene",
+                "Rendered in this scene: compared under its view transform, look, exposure, gamma and curves as they "
+                "are now",
+            ),
+            (
+                "standard",
+                "Photo or Standard",
+                "A photograph, or a render under the view transform Standard: compared under Standard",
+            ),
+        ),
     )
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of one stage", default=300, min=1, soft_max=1000, max=100_000

@@ -17,6 +17,7 @@ from .job_folder import GENERATOR, new_job_folder
 from .material_model import Material
 from .read_scene import read_scene
 from .reference import Reference, read_reference
+from .reference_view import SCENE, output_view
 from .scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
 from .scene_file import SceneFiles, scene_files
 
@@ -41,14 +42,14 @@ def export_job(
     *,
     reference: Path | bpy.types.Image | None,
     fit: dict[str, Any],
-    bake_view: bool = False,
+    reference_view: str = SCENE,
     tell: Callable[[float], None] = lambda _share: None,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
-    With `bake_view` a display picture is taken under any view of the scene, whose table goes into the job; else one
-    that cannot be undone by a formula is refused. `tell` gets the share that is done, of work that a million triangles
-    make some seconds long.
+    `reference_view` says how a display picture was made: "scene", rendered in this scene, or "standard", a photograph
+    or a render under Standard. `tell` gets the share that is done, of work that a million triangles make some seconds
+    long.
 
     Raises
     ------
@@ -60,12 +61,10 @@ def export_job(
     findings.raise_first()
     assert data is not None
     tell(0.4)
-    picture = read_reference(reference, context.scene, (data.camera.width, data.camera.height), bake_view=bake_view)
-    if picture is not None and picture.view is not None:
-        findings.note(
-            f"Pictures are compared under a table of the view {context.scene.view_settings.view_transform} as the "
-            "scene has it now: the reference must have been rendered with the same look, exposure, gamma and curves."
-        )
+    size = (data.camera.width, data.camera.height)
+    picture = read_reference(reference, context.scene, size, made=reference_view)
+    for said in picture.notes if picture is not None else ():
+        findings.note(said)
     files = scene_files(data, findings)
     tell(0.5)
     request = _request(context, obj, data, files, picture, fit, findings)
@@ -104,7 +103,7 @@ def _request(
     fit: dict[str, Any],
     findings: Findings,
 ) -> dict[str, Any]:
-    view = context.scene.view_settings
+    view, _device = output_view(context.scene)
     request: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},

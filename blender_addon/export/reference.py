@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ from .exr_file import write_exr
 from .findings import ExportError, Fix
 from .image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from .png_file import write_png
+from .reference_view import SCENE, needs_table, view_note
 from .view_lut import ViewLut, bake_view_lut
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
@@ -26,7 +28,7 @@ DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 class Reference:
     """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8).
 
-    `view` is the view of a display picture where no formula has it.
+    `view` is the view of a display picture where no formula has it; `notes` say what was taken for granted.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Reference:
     source: Path | None = None
     pixels: NDArray[np.float32] | NDArray[np.uint8] | None = None
     view: ViewLut | None = None
+    notes: tuple[str, ...] = ()
 
     def write(self, folder: Path) -> None:
         """Put the picture into `folder`.
@@ -58,22 +61,23 @@ def read_reference(
     scene: bpy.types.Scene,
     size: tuple[int, int],
     *,
-    bake_view: bool = False,
+    made: str = SCENE,
 ) -> Reference | None:
     """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
 
-    With `bake_view` a display picture of a view transform that cannot be undone comes with a table of that view.
+    `made` is one of `REFERENCE_VIEWS`. A display picture that was rendered in this scene comes with a table of the
+    scene's view where no formula undoes that.
 
     Raises
     ------
     ExportError
-        If it is missing, of another size, or a display picture of a view transform that cannot be undone.
+        If it is missing, of another size, or a display picture for another display than sRGB.
     """
     if reference is None:
         return None
     stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
     if isinstance(reference, bpy.types.Image):
-        return _from_image(reference, scene, size, stretched, bake_view)
+        return _from_image(reference, scene, size, stretched, made)
     path = Path(bpy.path.abspath(str(reference)))
     if not path.is_file():
         raise ExportError(f"The reference {path} does not exist: choose another file.")
@@ -82,12 +86,12 @@ def read_reference(
     if stretched:
         image = bpy.data.images.load(str(path), check_existing=False)
         try:
-            return _from_image(image, scene, size, stretched, bake_view)
+            return _from_image(image, scene, size, stretched, made)
         finally:
             bpy.data.images.remove(image)
     if suffix in LINEAR_SUFFIXES:
         return Reference(f"reference{suffix}", "linear", source=path)
-    return Reference(f"reference{suffix}", "srgb", source=path, view=_view_table(scene, path.name, bake_view))
+    return Reference(f"reference{suffix}", "srgb", source=path, **_view(scene, path.name, made))
 
 
 def refuse_suffix(path: Path) -> None:
@@ -112,7 +116,7 @@ def refuse_size(name: str, found: tuple[int, int], wanted: tuple[int, int]) -> N
 
 
 def _from_image(
-    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, bake_view: bool
+    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, made: str
 ) -> Reference:
     try:
         pixels = np.ascontiguousarray(read_pixels(image)[:, :, :3])
@@ -127,50 +131,16 @@ def _from_image(
         pixels = _stretch(pixels, size)
     if not holds_display_colours(image):
         return Reference("reference.exr", "linear", pixels=pixels)
-    view = _view_table(scene, image.name, bake_view)
     encoded = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055)
-    return Reference(
-        "reference.png", "srgb", pixels=np.rint(encoded.clip(0.0, 1.0) * 255.0).astype(np.uint8), view=view
-    )
+    levels = np.rint(encoded.clip(0.0, 1.0) * 255.0).astype(np.uint8)
+    return Reference("reference.png", "srgb", pixels=levels, **_view(scene, image.name, made))
 
 
-def _view_table(scene: bpy.types.Scene, name: str, bake_view: bool) -> ViewLut | None:
-    return bake_view_lut(scene) if needs_table(scene, name, bake_view) else None
-
-
-def needs_table(scene: bpy.types.Scene, name: str, bake_view: bool) -> bool:
-    """False for a view that did nothing but exposure, gamma and the sRGB curve: a formula undoes it.
-
-    Raises
-    ------
-    ExportError
-        If a table is needed and `bake_view` does not allow it, or none can be made.
-    """
-    view, device = scene.view_settings, scene.display_settings.display_device
-    reasons = []
-    if view.view_transform != "Standard":
-        reasons.append(f"the view transform {view.view_transform}")
-    if view.look not in ("None", ""):
-        reasons.append(f"the look {view.look}")
-    if view.use_curve_mapping:
-        reasons.append("view curves")
-    if getattr(view, "use_white_balance", False):
-        reasons.append("a white balance")
-    if device == "sRGB" and (bake_view or not reasons):
-        return bool(reasons)
-    cure = "render the reference as OpenEXR, or render it again with the view transform Standard and no look"
-    if device == "sRGB":
-        cure += ", or turn on Bake View (--bake-view) if it was rendered under this view"
-    else:
-        reasons.append(f"the display device {device}")
-    fixes = (Fix("render_exr"),)
-    if device == "sRGB":
-        fixes = (Fix("bake_view"), Fix("standard_view"), Fix("render_exr"))
-    raise ExportError(
-        f"The reference {name} holds display colours and the scene uses {' and '.join(reasons)}, which cannot be "
-        f"undone: {cure}.",
-        *fixes,
-    )
+def _view(scene: bpy.types.Scene, name: str, made: str) -> dict[str, Any]:
+    """The fields `view` and `notes` of a display picture."""
+    view = bake_view_lut(scene) if needs_table(scene, name, made) else None
+    said = view_note(scene, name, made)
+    return {"view": view, "notes": (said,) if said else ()}
 
 
 def _stretch(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:

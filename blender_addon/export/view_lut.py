@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .color_space import from_rec709
 from .exr_file import write_exr
+from .reference_view import output_view
 
 NAME = "view_lut.exr"
 SIZE = 48
@@ -51,7 +52,7 @@ class ViewLut:
 def bake_view_lut(scene: bpy.types.Scene) -> ViewLut:
     """Render a ramp of colours under the view of `scene`; nothing in the .blend changes."""
     # the view's exposure comes first, so the range moves against it and the table is as fine as without
-    low, high = (limit - scene.view_settings.exposure for limit in (LOG2_MIN, LOG2_MAX))
+    low, high = (limit - output_view(scene)[0].exposure for limit in (LOG2_MIN, LOG2_MAX))
     axis = np.concatenate([[0.0], np.exp2(np.linspace(low, high, SIZE - 1))])
     blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
     shown = shown_by(scene, np.stack([red, green, blue], axis=-1).reshape(SIZE, SIZE * SIZE, 3))
@@ -68,11 +69,12 @@ def shown_by(scene: bpy.types.Scene, linear: NDArray[np.floating]) -> NDArray[np
     written = None
     try:
         settings = copied.render.image_settings
+        if output_view(scene)[0] == scene.view_settings:  # else the output has a view of its own, which stays
+            settings.color_management = "FOLLOW_SCENE"
         if hasattr(settings, "media_type"):  # Blender 5.0
             settings.media_type = "IMAGE"
         settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "16"
         settings.compression = 0
-        settings.color_management = "FOLLOW_SCENE"
         image.pixels.foreach_set(pixels.ravel())
         with tempfile.TemporaryDirectory() as folder:
             path = str(Path(folder) / "view.png")

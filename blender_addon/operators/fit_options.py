@@ -15,6 +15,7 @@ from .. import fit_queue, running_job
 from ..backend_python import BackendPythonError
 from ..export.job import ExportError, export_job
 from ..export.read_material import principled_node as find_principled
+from ..export.reference_view import REFERENCE_VIEWS
 from ..fit_queue import PreparedFit
 from ..preferences import chosen_python, new_job_folder
 from ..properties import chosen_of, crossed_limits
@@ -47,8 +48,8 @@ class FitOptions:
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of a stage; 0: the scene's setting", min=0, options=_SCRIPT
     )
-    bake_view: BoolProperty(
-        name="Bake View", description="Take a display picture under any view; off: the scene's setting", options=_SCRIPT
+    reference_view: StringProperty(
+        name="How It Was Made", description='"scene" or "standard"; empty: the scene\'s setting', options=_SCRIPT
     )
     wait: BoolProperty(
         name="Wait", description="Return when the fit has ended; always so by default in background", options=_SCRIPT
@@ -75,6 +76,9 @@ class FitOptions:
         settings = context.scene.mfo
         material = _active_material(obj)
         reference = _reference(settings, self.reference)
+        made = self.reference_view or settings.reference_view
+        if made not in REFERENCE_VIEWS:
+            raise FitError(f"reference_view is {made!r}: give 'scene' or 'standard'.")
         python = python_of(context)
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
@@ -88,7 +92,7 @@ class FitOptions:
                 folder,
                 reference=reference,
                 fit=chosen,
-                bake_view=self.bake_view or settings.bake_view,
+                reference_view=made,
                 tell=lambda share: windows.progress_update(100.0 * share),
             )
         except ExportError as error:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from .. import preflight, running_job
+from ..checks import asks_view
 
 
 class Reference:
@@ -25,6 +26,10 @@ class Reference:
             column.prop(settings, "reference_path", text="")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
+        if asks_view(context.scene):
+            question = column.column(align=True)
+            question.label(text="How was it made?")
+            question.row(align=True).prop(settings, "reference_view", expand=True)
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -28,7 +28,6 @@ class Run:
         if body:
             body.prop(settings, "model")
             body.prop(settings, "range")
-            body.prop(settings, "bake_view")
             body.prop(settings, "max_iterations")
         if running_job.current is not None:
             _draw_progress(layout, context)

@@ -22,6 +22,7 @@ from .result_text import result_text
 from .run import leave
 from .run_folder import run_folder
 
+REFERENCE_VIEWS = ("scene", "standard")
 _ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
 
@@ -44,9 +45,15 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("--object", required=True, metavar="NAME", help="object whose active material is fitted")
     parser.add_argument("--reference", required=True, type=Path, help="the picture: EXR, HDR, PNG, JPEG or TIFF")
     parser.add_argument(
-        "--bake-view",
-        action="store_true",
-        help="compare a PNG, JPEG or TIFF under the view of FILE, which it was rendered with (AgX, Filmic, ...)",
+        "--reference-view",
+        choices=REFERENCE_VIEWS,
+        default=REFERENCE_VIEWS[0],
+        help="how a PNG, JPEG or TIFF was made: rendered in this scene, under its view (scene, the default), or a "
+        "photograph or a render under Standard (standard)",
+    )
+    # its name until the scene's view became the default
+    parser.add_argument(
+        "--bake-view", dest="reference_view", action="store_const", const="scene", help=argparse.SUPPRESS
     )
     add_fit_options(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="job folder (default: a new temporary one)")
@@ -66,7 +73,15 @@ def run(arguments: argparse.Namespace) -> int:
     host = find_blender_host(arguments.blender)
     stream = take_stdout() if arguments.json else None
     job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
-    fit = fit_blend(host, arguments.file, arguments.object, arguments.reference, job, options, arguments.bake_view)
+    fit = fit_blend(
+        host,
+        arguments.file,
+        arguments.object,
+        arguments.reference,
+        job,
+        options,
+        reference_view=arguments.reference_view,
+    )
     saved, notes = None, tuple(fit.result["notes"])
     if arguments.apply:
         saved = arguments.save_as or arguments.file
@@ -88,11 +103,12 @@ def fit_blend(
     reference: Path,
     job: Path,
     fit: Mapping[str, Any],
-    bake_view: bool = False,
+    *,
+    reference_view: str = "scene",
 ) -> BlendFit:
     """Export a job from a .blend file and run it with a progress bar on stderr.
 
-    With `bake_view` a display picture is compared under the view of the .blend file, whatever that is.
+    `reference_view` says how a display picture was made: one of `REFERENCE_VIEWS`.
 
     Raises
     ------
@@ -100,8 +116,15 @@ def fit_blend(
         With the sentence of the export or of the fit. A cancelled fit is a result, with what was found so far.
     """
     is_new = not job.exists()
-    words = ["--object", object_name, "--reference", reference, "--job", job, "--fit", json.dumps(fit)]
-    host.call("export", blend, *words, *(["--bake-view"] if bake_view else []))
+    host.call(
+        "export",
+        blend,
+        f"--object={object_name}",  # one word, since a name may begin with a dash
+        f"--reference={reference}",
+        f"--job={job}",
+        f"--fit={json.dumps(fit)}",
+        f"--reference-view={reference_view}",
+    )
     done = run_folder(job, fit_scene, is_new=is_new)
     if done.result is None:
         raise _ERRORS.get(done.status, MfoError)(done.sentence)
@@ -110,5 +133,5 @@ def fit_blend(
 
 def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path) -> tuple[str, ...]:
     """Save `blend` with the recovered values on its material; returns what was skipped, in sentences."""
-    applied = host.call("apply", blend, "--job", job, "--save-as", save_as)
+    applied = host.call("apply", blend, f"--job={job}", f"--save-as={save_as}")
     return tuple(applied.get("notes", ()))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -68,8 +67,8 @@ def another_size(scene: SimpleNamespace) -> None:
     scene.bpy.context.scene.render.resolution_x = 100
 
 
-def another_view(scene: SimpleNamespace) -> None:
-    scene.bpy.context.scene.view_settings.view_transform = "AgX"
+def another_display(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.display_settings.display_device = "Display P3"
 
 
 def no_material(scene: SimpleNamespace) -> None:
@@ -106,7 +105,7 @@ def nothing_chosen(scene: SimpleNamespace) -> None:
 SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
     (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (render_region, "whole_frame"),
     (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
-    (another_size, "resolution"), (another_view, "bake_view"), (another_view, "standard_view"),
+    (another_size, "resolution"), (another_display, "reference_view"),
     (no_material, "new_material"), (diffuse, "principled"), (noise, "unlink"), (nothing_active, "select"),
     (the_light_is_active, "select"), (nothing_chosen, "all_parameters"),
 ]  # fmt: skip
@@ -206,22 +205,28 @@ def test_a_material_that_stays_in_its_library_is_said_to(scene: SimpleNamespace,
         scene.bpy.ops.mfo.mend(kind="make_local")
 
 
-def test_render_exr_makes_a_reference_of_the_scene(scene: SimpleNamespace, tmp_path: Path) -> None:
-    from mfo_backend.scene.image_file import read_image
+def test_the_question_how_the_reference_was_made(scene: SimpleNamespace) -> None:
+    from blender_addon.checks import asks_view
 
+    current = scene.bpy.context.scene
     assert stopping(scene) == {}
-    another_view(scene)
-    scene.bpy.context.scene.cycles.samples = 1
-    (found,) = (f for f in check(scene) if "render_exr" in {fix.kind for fix in f.fixes})
-    assert scene.bpy.ops.mfo.mend(kind="render_exr") == {"FINISHED"}
-    path = Path(scene.bpy.context.scene.mfo.reference_path)
-    try:
-        assert path.suffix == ".exr"
-        assert read_image(path).pixels.shape == (64, 96, 3)
-        assert stopping(scene) == {}  # scene-linear values have no view
-        assert found.sentence not in {f.sentence for f in check(scene)}
-    finally:
-        shutil.rmtree(path.parent)
+    assert not asks_view(current)
+    current.view_settings.view_transform = "AgX"
+    assert asks_view(current)
+    assert stopping(scene) == {}
+    (said,) = (f.sentence for f in check(scene) if f.sentence.startswith("Reference"))
+    assert said.endswith("taken as rendered in this scene, display colours under the view AgX.")
+    current.mfo.reference_view = "standard"
+    (said,) = (f.sentence for f in check(scene) if f.sentence.startswith("Reference"))
+    assert said.endswith("taken as a photograph or a render under Standard.")
+    current.mfo.reference_path = "//a.exr"
+    assert not asks_view(current)
+
+
+def test_no_button_replaces_the_reference_by_a_render() -> None:
+    from blender_addon.mending import KINDS
+
+    assert not any("render" in name and "reference" in kind.tooltip for name, kind in KINDS.items())
 
 
 def test_no_pixel_is_read(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -328,17 +328,19 @@ def test_reference_from_an_image_of_the_file(scene: SimpleNamespace) -> None:
     assert fit(scene, reference="") == {"FINISHED"}
 
 
-def test_picture_under_another_view_needs_bake_view(scene: SimpleNamespace) -> None:
+def test_how_the_picture_was_made_is_the_scenes_setting_or_the_scripts(scene: SimpleNamespace) -> None:
     bpy = scene.bpy
     bpy.context.scene.view_settings.view_transform = "AgX"
-    with pytest.raises(RuntimeError, match=r"the view transform AgX, which cannot be undone: .* turn on Bake View"):
-        fit(scene)
-    assert fit(scene, bake_view=True) == {"FINISHED"}
-    bpy.context.scene.mfo.bake_view = True
-    assert fit(scene, job_folder=scene.job + "1") == {"FINISHED"}
-    for job in (scene.job, scene.job + "1"):
-        assert json.loads(Path(job, "request.json").read_text("utf-8"))["view"]["lut"]["path"] == "view_lut.exr"
-        assert Path(job, "view_lut.exr").is_file()
+    assert fit(scene) == {"FINISHED"}
+    assert fit(scene, job_folder=scene.job + "1", reference_view="standard") == {"FINISHED"}
+    bpy.context.scene.mfo.reference_view = "standard"
+    assert fit(scene, job_folder=scene.job + "2") == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="reference_view is 'photo': give 'scene' or 'standard'"):
+        fit(scene, job_folder=scene.job + "3", reference_view="photo")
+    for job, table in ((scene.job, True), (scene.job + "1", False), (scene.job + "2", False)):
+        request = json.loads(Path(job, "request.json").read_text("utf-8"))
+        assert ("lut" in request["view"]) == table
+        assert Path(job, "view_lut.exr").is_file() == table
 
 
 def test_nothing_heavy_is_in_blenders_process(scene: SimpleNamespace) -> None:

@@ -60,35 +60,68 @@ def test_png_file_and_view(target: Any, export: Any, tmp_path: Path) -> None:
         ("use_curve_mapping", True, "view curves"),
     ],
 )
-def test_display_file_under_another_view_is_refused(
+def test_display_file_under_another_view(
     name: str, value: Any, reason: str, target: Any, export: Any, tmp_path: Path
 ) -> None:
+    """Rendered in this scene unless the user says it is a photograph; either is said."""
     write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
     setattr(bpy.context.scene.view_settings, name, value)
-    with pytest.raises(ExportError, match=f"ref.png holds display colours and the scene uses {reason}.*OpenEXR"):
-        export(target, reference=tmp_path / "ref.png")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["ref.png"]
+    report = export(target, reference=tmp_path / "ref.png")
+    assert report.request["view"]["lut"]["path"] == "view_lut.exr"
+    assert any("ref.png is taken as rendered in this scene: " in n and f"({reason})" in n for n in report.notes)
+    report = export(target, reference=tmp_path / "ref.png", reference_view="standard")
+    assert report.request["view"] == {"exposure_ev": 0.0, "gamma": 1.0}
+    assert not (report.folder / "view_lut.exr").exists()
+    assert any(f"ref.png is taken as a photograph or a render under Standard: {reason}" in n for n in report.notes)
 
 
-def test_baked_view_goes_into_the_job(target: Any, export: Any, tmp_path: Path) -> None:
+def test_the_scenes_view_goes_into_the_job(target: Any, export: Any, tmp_path: Path) -> None:
     write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
     view = bpy.context.scene.view_settings
     view.view_transform, view.exposure = "AgX", 1.5
-    with pytest.raises(ExportError, match=r"or turn on Bake View \(--bake-view\) if it was rendered under this view"):
-        export(target, reference=tmp_path / "ref.png")
-    report = export(target, reference=tmp_path / "ref.png", bake_view=True)
+    report = export(target, reference=tmp_path / "ref.png")
     assert report.request["reference"] == {"path": "reference.png", "encoding": "srgb"}
     lut = {"path": "view_lut.exr", "size": 48, "log2_min": -14.25, "log2_max": 3.0}
     assert report.request["view"] == {"exposure_ev": 1.5, "gamma": 1.0, "lut": lut}
-    assert any("a table of the view AgX as the scene has it now" in note for note in report.notes)
     table = read(report.folder / "view_lut.exr")
     assert table.shape == (48, 48 * 48, 3)
     np.testing.assert_allclose(table[0, 0], 0, atol=1e-4)  # AgX is black there to a few of 65535 levels
     np.testing.assert_allclose(table[-1, -1], 1, atol=1e-4)
     assert np.argmax(table[0, 47]) == 0  # red is fastest
     assert np.argmax(table[47, 0]) == 2
-    again = export(target, reference=tmp_path / "ref.png", bake_view=True)  # over the first
+    again = export(target, reference=tmp_path / "ref.png")  # over the first
     assert (again.folder / "view_lut.exr").is_file()
+
+
+def test_an_output_with_a_view_of_its_own(target: Any, export: Any, tmp_path: Path) -> None:
+    """The picture that Blender writes itself tells which view counts."""
+    scene = bpy.context.scene
+    output = scene.render.image_settings
+    output.file_format, output.color_management = "PNG", "OVERRIDE"
+    output.view_settings.view_transform, output.view_settings.exposure = "Filmic", -1.0
+    image = bpy.data.images.new("Grey", 6, 4, float_buffer=True)
+    image.pixels.foreach_set(np.tile(np.array([0.18, 0.18, 0.18, 1.0], np.float32), 6 * 4))
+    image.save_render(str(tmp_path / "ref.png"), scene=scene)
+    shown = bpy.data.images.load(str(tmp_path / "ref.png"))
+    shown.colorspace_settings.name = "Non-Color"
+    report = export(target, reference=tmp_path / "ref.png")
+    assert report.request["view"]["exposure_ev"] == -1.0
+    lut = report.request["view"]["lut"]
+    axis = lut["log2_min"] + np.arange(47) * (lut["log2_max"] - lut["log2_min"]) / 46
+    grey = np.einsum("iiic->ic", read(report.folder / "view_lut.exr").reshape(48, 48, 48, 3))[1:, 0]
+    assert np.interp(np.log2(0.18), axis, grey) == pytest.approx(shown.pixels[0], abs=2 / 255)
+    output.file_format = "OPEN_EXR"  # of which a view is no part
+    assert export(target, reference=tmp_path / "ref.png").request["view"] == {"exposure_ev": 0.0, "gamma": 1.0}
+
+
+def test_another_display_is_refused_unless_it_is_a_photograph(target: Any, export: Any, tmp_path: Path) -> None:
+    write_png(tmp_path / "ref.png", np.zeros((4, 6, 3), np.uint8))
+    bpy.context.scene.display_settings.display_device = "Display P3"
+    with pytest.raises(
+        ExportError, match=r"ref\.png holds display colours and the scene is shown on the display device"
+    ):
+        export(target, reference=tmp_path / "ref.png")
+    assert "lut" not in export(target, reference=tmp_path / "ref.png", reference_view="standard").request["view"]
 
 
 @pytest.mark.parametrize("view", ["Standard", "AgX"])
@@ -97,9 +130,10 @@ def test_no_table_where_a_formula_does(view: str, target: Any, export: Any, tmp_
     write_exr(tmp_path / "ref.exr", picture())
     bpy.context.scene.view_settings.view_transform = view
     reference = tmp_path / ("ref.png" if view == "Standard" else "ref.exr")
-    report = export(target, reference=reference, bake_view=True)
+    report = export(target, reference=reference)
     assert "lut" not in report.request["view"]
     assert not (report.folder / "view_lut.exr").exists()
+    assert not [note for note in report.notes if "is taken as" in note]
 
 
 def test_16_bit_image_holds_display_colours(target: Any, export: Any, tmp_path: Path) -> None:
@@ -111,8 +145,7 @@ def test_16_bit_image_holds_display_colours(target: Any, export: Any, tmp_path: 
     deep = bpy.data.images.load(str(tmp_path / "deep.png"))
     assert export(target, reference=deep).request["reference"] == {"path": "reference.png", "encoding": "srgb"}
     scene.view_settings.view_transform = "AgX"
-    with pytest.raises(ExportError, match=r"deep.png holds display colours and the scene uses the view transform AgX"):
-        export(target, reference=deep)
+    assert any("deep.png is taken as rendered in this scene" in n for n in export(target, reference=deep).notes)
 
 
 def test_float_image_becomes_linear_exr(target: Any, export: Any) -> None:

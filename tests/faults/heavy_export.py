@@ -27,9 +27,7 @@ def main(folder: str, segments: str, size: str) -> None:
     target.data = sphere(int(segments))
     target.data.materials.append(material)
     write_exr(source / "reference.exr", np.full((int(size), int(size), 3), 0.3, np.float32))
-    report = export_job(
-        bpy.context, target, Path(folder), reference=source / "reference.exr", fit={"preset": "fast"}, bake_view=False
-    )
+    report = export_job(bpy.context, target, Path(folder), reference=source / "reference.exr", fit={"preset": "fast"})
     print("mfo: exported", *report.notes, file=sys.stderr)
 
 
