@@ -1,21 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fit by the preset the settings name, and the way out where that preset cannot do it."""
+"""A whole fit, for every route alike: check, choose the route, fit, verify, choose the end, judge the result."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any, Protocol
 
 from ..metrics.tone_mapping import View
 from ..render.mitsuba_renderer import MitsubaRenderer
-from ..render.renderer import Renderer
+from ..render.renderer import Interrupted, Renderer
 from ..types.errors import UnrecordableError
-from ..types.event import Listener
-from ..types.image import Image
-from .paper.fit import FitOutcome, fit_material
-from .recorded.fit import fit_recorded
+from ..types.event import Listener, Preview, Started
+from ..types.image import Image, Pixels
+from ..types.result import FitResult
+from ..types.status import Status
+from .judge.checked_reference import GAP_STREAM
+from .judge.fit_task import FitTask, check_task
+from .judge.model_gap import model_gap
+from .judge.picture_errors import picture_errors
+from .judge.verification import VerifiedEnd, Verifier
+from .paper.fit import PaperRoute
+from .plans import RecordedPlan
+from .recorded.fit import RecordedRoute
+from .result.outcome import Candidate, FitOutcome, RouteEnds, final_result
 from .settings import FitSettings
-from .traced.fit import fit_transmission
+from .traced.fit import TracedRoute
+
+
+class Route(Protocol):
+    """One way to fit, made ready: its constructor has refused what it cannot hold."""
+
+    stages: tuple[str, ...]
+
+    @property
+    def verification(self) -> Verifier:
+        """Renders the pictures by which the ends are judged."""
+        ...
+
+    def fit(self) -> RouteEnds:
+        """Run the stages; raises `UnrecordableError` where another route has to do it."""
+        ...
+
+
+_Says = Callable[[tuple[str, ...]], str]  # what a route does that stands in for another, by its stages' names
+_Way = tuple[Callable[[], Route], _Says]
 
 
 def recover_material(
@@ -26,38 +56,133 @@ def recover_material(
     display: View | None = None,
     listener: Listener,
     should_stop: Callable[[], bool],
+    plan: RecordedPlan | None = None,
+    hand_over: bool = True,
 ) -> FitOutcome:
-    """See `fit_material` (preset `paper`) and `fit_recorded` (`fast`, `balanced`, `best`).
+    """Recover the renderer's parameters from a picture of the same scene.
 
-    A material that recorded paths cannot hold, such as glass, is fitted by `fit_transmission`; where that cannot do it
-    either, by `fit_material` whatever the preset. The last of the result's notes says which and why.
+    The presets `fast`, `balanced` and `best` fit on recorded light paths. A material that these cannot hold, such as
+    glass, is fitted on whole light paths; where those cannot do it either, by the preset `paper`. The last of the
+    result's notes says which and why.
+
+    Parameters
+    ----------
+    display
+        View of a display-encoded reference; see `metrics.loss.make_loss`.
+    listener
+        Hears the events of `types.event`.
+    should_stop
+        Polled before every iteration and between the stages and pictures after them.
+    plan
+        How much a recorded fit does, where that is not for the preset to say.
+    hand_over
+        Whether the preset `paper` may stand in for another one.
+
+    Raises
+    ------
+    BadInputError
+        If reference and scene do not fit together or the camera does not see the target.
+    SetupError
+        If one of the settings' losses needs a package that is missing.
+    UnrecordableError
+        If no route of the preset holds the material, and it may not be handed over.
     """
-    reason = ""
-    if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer):
+    task = check_task(renderer, reference, settings, display, listener, should_stop)
+    reasons: list[str] = []
+    for make, why in _ways(task, plan, hand_over=hand_over):
         try:
-            return fit_recorded(
-                renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
-            )
+            return _fit_along(make(), task, reasons, why)
         except UnrecordableError as error:
-            reason = str(error)
+            reasons.append(str(error))
+    raise UnrecordableError(" ".join(reasons))
+
+
+def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Iterator[_Way]:
+    """The routes by their order."""
+    renderer, settings = task.renderer, task.settings
+    ours = renderer if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer) else None
+    no_losses = ""
+    if ours is not None:
+        yield lambda: RecordedRoute(task, ours, plan), lambda stages: ""
         if settings.losses is None:
-            try:
-                outcome = fit_transmission(
-                    renderer, reference, settings, display=display, listener=listener, should_stop=should_stop
-                )
-            except UnrecordableError as error:
-                reason = f"{reason} {error}"
-            else:
-                stages = ", ".join(repr(stage.name) for stage in outcome.result.stages)
-                return _noted(outcome, f"{reason} So whole light paths were traced, by the stages {stages}.")
+            yield (
+                lambda: TracedRoute(task, ours),
+                lambda stages: f"So whole light paths were traced, by the stages {', '.join(map(repr, stages))}.",
+            )
         else:
-            reason += " The stages on whole light paths know no losses of the user's choice."
-        reason += f" So the preset 'paper' was used instead of {settings.preset!r}."
-    settings = replace(settings, preset="paper")
-    outcome = fit_material(renderer, reference, settings, display=display, listener=listener, should_stop=should_stop)
-    return _noted(outcome, reason) if reason else outcome
+            no_losses = "The stages on whole light paths know no losses of the user's choice. "
+    if ours is None or hand_over:
+        of_paper = replace(task, settings=replace(settings, preset="paper"))
+        yield (
+            lambda: PaperRoute(of_paper),
+            lambda stages: f"{no_losses}So the preset 'paper' was used instead of {settings.preset!r}.",
+        )
 
 
-def _noted(outcome: FitOutcome, note: str) -> FitOutcome:
-    """The outcome with one more note."""
-    return replace(outcome, result=replace(outcome.result, notes=(*outcome.result.notes, note)))
+def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says) -> FitOutcome:
+    """Fit, verify the ends by new random numbers, choose the best, and make the result.
+
+    `reasons` say why the routes before this one could not do it.
+    """
+    renderer = task.renderer
+    start = route.verification.begin(renderer.start)  # rendered while the kernels of the fit are compiled
+    seconds = time.monotonic() - task.began
+    task.listener(Started(stages=route.stages, parameters=renderer.table.names, seconds=seconds))
+    found = route.fit()
+    status, pictures = _verified(route.verification, start, found)
+    choice = found.choose([picture.image for picture in pictures])
+    best = choice.end + 1 if choice.beats_start else 0
+    if pictures is not found.unverified:
+        pictures = [*pictures[:best], route.verification.finished(pictures[best]), *pictures[best + 1 :]]
+        task.listener(Preview(pictures[best].image))
+    first, end = pictures[0], pictures[best]
+    result = final_result(
+        renderer,
+        found,
+        choice,
+        status=Status.CANCELLED if task.should_stop() else status,
+        errors=picture_errors(task.reference, first.image, end.image, task.mask, task.counted, task.display),
+        began=task.began,
+        notes=[" ".join([*reasons, says(route.stages)])] if reasons else [],
+    )
+    halves = _halves(task, end)
+    return FitOutcome(_judged(task, result, halves), first.image, end.image, task.counted, halves)
+
+
+def _verified(verification: Verifier, start: Callable[[], Any], found: RouteEnds) -> tuple[Status, Sequence[Candidate]]:
+    """The pictures of start and ends; those of the fit itself where it was asked to stop before there were others."""
+    if found.status is Status.CANCELLED and found.unverified:
+        return found.status, found.unverified
+    try:
+        return found.status, verification.pictures(start, [end.x for end in found.ends])
+    except Interrupted:
+        return Status.CANCELLED, found.unverified
+
+
+def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:
+    """Two pictures of an end whose random numbers have nothing in common; None where there is no time for them.
+
+    The halves of the verification picture will do: it only chose the result among a few ends.
+    """
+    if isinstance(end, VerifiedEnd):
+        return end.halves
+    seed, spp = task.settings.seed ^ GAP_STREAM, max(task.settings.verify_spp // 2, 1)
+    if task.should_stop():
+        return None
+    try:
+        first, second = (task.renderer.image(end.vector, seed=seed ^ k, spp=spp) for k in (0, 1))
+    except Interrupted:
+        return None
+    return first, second
+
+
+def _judged(task: FitTask, result: FitResult, halves: tuple[Pixels, Pixels] | None) -> FitResult:
+    """The result with what its pictures say of it.
+
+    All verdicts on a result belong here: reference, result and two pictures of it with independent noise are at hand.
+    """
+    if halves is None or result.status is Status.CANCELLED:
+        return result
+    gap = model_gap(task.reference, halves, task.mask, task.view)
+    said = (gap.sentence,) if gap is not None and gap.sentence else ()
+    return replace(result, model_gap=gap, notes=(*result.notes, *said))

@@ -10,27 +10,21 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fit.settings import FitSettings
 from ..metrics.tone_mapping import View
 from ..types.event import Listener
 from ..types.image import Image, Pixels
-from ..types.model_gap import ModelGap
 from ..types.parameter_bounds import narrowed
 from ..types.result import FitResult
 from .job_folder import JobFolder
 from .request import Request, request_to_json
 
 if TYPE_CHECKING:
-    from ..fit.paper.fit import FitOutcome
     from ..render.renderer import Renderer
 
 _WITHOUT_LIGHT_PATHS = (
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
     "limits for one kind of bounce."
 )
-
-
-GAP_STREAM = 0x6A500000  # apart from the seeds users choose and from those of the verification
 
 
 @dataclass(frozen=True)
@@ -60,7 +54,7 @@ class Fitter(Protocol):
         listener: Listener,
         should_stop: Callable[[], bool],
     ) -> JobOutcome:
-        """Run the fit; errors are those of `fit_material`."""
+        """Run the fit; errors are those of `recover_material`."""
         ...
 
 
@@ -117,34 +111,9 @@ def fit_scene(
         renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
     )
     result = outcome.result
-    if not should_stop():
-        gap = _model_gap(renderer, outcome, reference, request.fit, view)
-        said = (gap.sentence,) if gap is not None and gap.sentence else ()
-        result = replace(result, model_gap=gap, notes=(*result.notes, *said))
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
     return JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant)
-
-
-def _model_gap(
-    renderer: Renderer, outcome: FitOutcome, reference: Image, settings: FitSettings, view: View
-) -> ModelGap | None:
-    """The gap of the recovered values, of two renders whose random numbers no stage has seen; None when stopped.
-
-    The halves of the verification picture will do: it only chose the result among a few ends.
-    """
-    from ..fit.judge.model_gap import model_gap
-    from ..render.interruptible import Interrupted
-
-    if outcome.result_halves is not None:
-        return model_gap(reference, outcome.result_halves, renderer.target_mask(), view)
-    vector = renderer.table.pack(outcome.result.recovered)
-    spp = max(settings.verify_spp // 2, 1)
-    try:
-        first, second = (renderer.image(vector, seed=settings.seed ^ GAP_STREAM ^ k, spp=spp) for k in (0, 1))
-    except Interrupted:
-        return None
-    return model_gap(reference, (first, second), renderer.target_mask(), view)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

@@ -245,9 +245,10 @@ def phases_of(job: Path) -> dict[str, Any]:
         load_variant()
     dr.set_flag(dr.JitFlag.KernelHistory, True)
     from mfo_backend.fit import recover_material
+    from mfo_backend.fit.judge.picture_judge import PictureJudge
     from mfo_backend.fit.judge.verification import Verification
-    from mfo_backend.fit.recorded import fit as fit_recorded
-    from mfo_backend.job import fit_scene, run_job
+    from mfo_backend.fit.recorded.fit import RecordedRoute
+    from mfo_backend.job import run_job
     from mfo_backend.job.progress import EventWriter
     from mfo_backend.job.stop import StopSignal
     from mfo_backend.render import renderer
@@ -257,12 +258,11 @@ def phases_of(job: Path) -> dict[str, Any]:
     stages.wrap(run_job, "read_reference", "load")
     stages.wrap(renderer, "load_renderer", "load")
     stages.wrap(MitsubaRenderer, "target_mask", "load")
-    stages.wrap(recover_material, "fit_recorded", "solve")
+    stages.wrap(RecordedRoute, "fit", "solve")
     stages.wrap(RecordedScene, "_probe", "record")
     stages.wrap(RecordedScene, "record", "record")
-    for owner, name in ((fit_recorded, "picture_errors"), (fit_recorded.PictureJudge, "value")):
+    for owner, name in ((recover_material, "picture_errors"), (PictureJudge, "value"), (recover_material, "_judged")):
         stages.wrap(owner, name, "verify")
-    stages.wrap(fit_scene, "_model_gap", "verify")
     stages.wrap(run_job, "write_outputs", "write")
     for name in ("pictures", "finished"):
         stages.wrap(Verification, name, "verify")

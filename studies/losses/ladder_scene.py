@@ -20,8 +20,9 @@ from mfo_backend.bench.scenes.assets import Assets
 from mfo_backend.bench.scenes.scenario import Scenario
 from mfo_backend.bench.scenes.scene import SHAPE, write_scene
 from mfo_backend.fit.judge.checked_reference import stage_losses
-from mfo_backend.fit.paper.loop import Candidate, run_stages
+from mfo_backend.fit.paper.loop import run_stages
 from mfo_backend.fit.recover_material import recover_material
+from mfo_backend.fit.result.outcome import Candidate
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.compare import compare_images
 from mfo_backend.metrics.loss import Loss, make_loss

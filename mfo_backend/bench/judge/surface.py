@@ -5,14 +5,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...fit.judge.checked_reference import stage_losses
-from ...fit.paper.fit import fit_material
-from ...fit.recorded.fit import fit_recorded
+from ...fit.recover_material import recover_material
 from ...fit.settings import FitSettings
 from ...render.mitsuba_renderer import MitsubaRenderer, load_mitsuba_renderer
 from ...types.errors import BadInputError
@@ -87,12 +85,19 @@ def measure_surface(
         if isinstance(event, StageEnd):
             ends[event.stage] = len(watched.visited)
 
-    common: dict[str, Any] = {"listener": listen, "should_stop": lambda: False}
-    if settings.preset == "paper":
-        outcome = fit_material(watched, judge.reference, settings, **common)
+    loop = settings.preset == "paper"
+    outcome = recover_material(
+        watched if loop else renderer,
+        judge.reference,
+        settings,
+        plan=METHODS[method].plan,
+        hand_over=False,
+        listener=listen,
+        should_stop=lambda: False,
+    )
+    if loop:
         path, losses = np.array(watched.visited), settings.stage_names(judge.reference.encoding)
     else:  # steps inside a stage are too many to see: the ends of the stages
-        outcome = fit_recorded(renderer, judge.reference, settings, plan=METHODS[method].plan, **common)
         stops = [renderer.table.pack(stage.values) for stage in outcome.result.stages]
         path, losses = np.array([renderer.start, *stops]), ("mse-hdr", "flip-hdr")
         ends = {stage.name: place + 2 for place, stage in enumerate(outcome.result.stages)}

@@ -7,12 +7,11 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from ...fit.paper.fit import FitOutcome
+from ...fit.result.outcome import FitOutcome
 from ...fit.settings import FitSettings
 from ...job.atomic_file import write_atomically
-from ...types.errors import SetupError, UnrecordableError
+from ...types.errors import SetupError
 from ...types.event import Event, StageEnd
 from ...types.image import Pixels
 from ...types.status import Status
@@ -128,9 +127,7 @@ class FitRunner:
         return write_cycles_scene(scenario, number, self.size, self._host, folder)
 
     def _fit(self, task: Task, settings: FitSettings, should_stop: Callable[[], bool]) -> _Measured:
-        from ...fit.paper.fit import fit_material
-        from ...fit.recorded.fit import fit_recorded
-        from ...fit.traced.fit import fit_transmission
+        from ...fit.recover_material import recover_material
         from ...render.mitsuba_renderer import load_mitsuba_renderer
 
         began, method = time.monotonic(), METHODS[task.method]
@@ -149,17 +146,16 @@ class FitRunner:
             if isinstance(event, StageEnd):
                 ends[event.stage] = busy.own_seconds()
 
-        common: dict[str, Any] = {"listener": note_end, "should_stop": should_stop}
         with watch.watching():
-            # not `recover_material`: a preset that hands a scene over to the preset `paper` has not fitted it
-            if settings.preset == "paper":
-                seen = NewSeeds(renderer, settings.seed) if method.new_seeds else renderer
-                outcome = fit_material(seen, self._judge.reference, settings, **common)
-            else:
-                try:
-                    outcome = fit_recorded(renderer, self._judge.reference, settings, plan=method.plan, **common)
-                except UnrecordableError:
-                    outcome = fit_transmission(renderer, self._judge.reference, settings, **common)
+            outcome = recover_material(
+                NewSeeds(renderer, settings.seed) if method.new_seeds else renderer,
+                self._judge.reference,
+                settings,
+                plan=method.plan,
+                hand_over=False,  # a preset that hands a scene over to the preset `paper` has not fitted it
+                listener=note_end,
+                should_stop=should_stop,
+            )
         return _Measured(outcome, loaded, watch.parts, busy.own_seconds(), busy.others(), ends)
 
     def _row(self, task: Task, measured: _Measured, warm_up: float) -> Row:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...fit.recorded_plan import RecordedPlan
+from ...fit.plans import RecordedPlan
 from ...fit.settings import FitSettings
 from ...metrics.loss import make_loss
 from ...metrics.loss_names import OPTIONAL_LOSS_NAMES

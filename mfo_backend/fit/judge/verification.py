@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from ...render.mitsuba_renderer import MitsubaRenderer
 from ...render.renderer import Vector
 from ...render.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
-from ..paper.loop import Candidate
+from ..result.outcome import Candidate
 from .checked_reference import VERIFY_STREAM
 from .region import blocks_around
 
@@ -86,6 +87,22 @@ class GrowingPicture:
         """The picture as it is now."""
         first, second = self.halves
         return VerifiedEnd(self.vector, 0.5 * (first + second), (first, second), self.samples, self.whole)
+
+
+class Verifier(Protocol):
+    """Pictures of a start and of ends under random numbers that no stage has seen, the same for all of them."""
+
+    def begin(self, vector: Vector) -> Callable[[], Any]:
+        """Start a picture of the start, or put it off; returns what waits for it."""
+        ...
+
+    def pictures(self, start: Callable[[], Any], ends: Sequence[Vector]) -> Sequence[Candidate]:
+        """The start and the ends with pictures to compare them by; raises `Interrupted` where it was stopped."""
+        ...
+
+    def finished(self, end: Any) -> Candidate:
+        """One of these with a picture that may be shown."""
+        ...
 
 
 class Verification:

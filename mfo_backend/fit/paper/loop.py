@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...metrics.loss import Loss
 from ...render.renderer import Renderer
@@ -18,6 +17,7 @@ from ...types.image import Pixels
 from ...types.result import CurvePoint, StageReport
 from ...types.status import Status
 from ..result.best_so_far import BestSoFar
+from ..result.outcome import Candidate
 from ..settings import FitSettings
 from .adam_stage import StageOutcome, Step, run_stage
 from .schedule import SCHEDULES
@@ -26,16 +26,8 @@ _PREVIEW_SECONDS = 1.0  # no more than one preview in this time
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """Values a stage ended with and their picture under the fit's own seed."""
-
-    vector: NDArray[np.float64]
-    image: Pixels
-
-
-@dataclass(frozen=True)
 class StagesOutcome:
-    """Start and best of every stage in order, and how the last stage that ran ended."""
+    """Start and best of every stage in order, under the fit's own seed, and how the last stage that ran ended."""
 
     status: Status
     candidates: tuple[Candidate, ...]

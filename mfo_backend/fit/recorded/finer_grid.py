@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..recorded_plan import RecordedPlan
+from ..plans import RecordedPlan
 
 
 def finer_grid(grid: int, noise: float, share: float, plan: RecordedPlan, finest: Callable[[float], int]) -> int:

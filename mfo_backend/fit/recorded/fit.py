@@ -3,196 +3,162 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from ...metrics.baked_view import HALF_LEVEL, BakedView
-from ...metrics.pixel_check import check_finite
-from ...metrics.tone_mapping import DisplayView, View
+from ...metrics.baked_view import BakedView
+from ...metrics.tone_mapping import DisplayView
 from ...render.mitsuba_renderer import MitsubaRenderer
-from ...types.event import Listener, Preview, Started
-from ...types.image import Encoding, Image, Pixels
-from ...types.status import Status
+from ...types.image import Pixels
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.weak_combinations import weak_combinations
-from ..judge.checked_reference import check_reference, counted_pixels
-from ..judge.picture_errors import picture_errors
+from ..judge.fit_task import FitTask
 from ..judge.picture_judge import NOISY, PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
-from ..paper.fit import FitOutcome
-from ..recorded_plan import RecordedPlan
+from ..plans import RecordedPlan
 from ..result.course import Course
-from ..result.outcome import SQUARES_KEPT, final_result
-from ..settings import FitSettings
-from ..squares.displayed_residual import DisplayedResidual
-from ..squares.problem import End, Problem
-from ..squares.residuals import CensoredResidual, RelativeResidual, WeightedResidual, log_residual
+from ..result.outcome import Choice, End, RouteEnds
+from ..squares.problem import Problem
+from ..squares.residuals import (
+    CensoredResidual,
+    DisplayedResidual,
+    MakeResidual,
+    MakeWeighted,
+    RelativeResidual,
+    WeightedResidual,
+    log_residual,
+)
 from ..squares.stage_residuals import finishing_residuals
 from .keep_user_values import keep_values
 from .perceptual_stages import perceptual_ends
-from .stages import MakeResidual, MakeWeighted, RecordedFit
+from .stages import RecordedFit
 
 STAGES = ("scan", "start", "refine")
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
 
 
-def fit_recorded(
-    renderer: MitsubaRenderer,
-    reference: Image,
-    settings: FitSettings,
-    *,
-    display: View | None = None,
-    listener: Listener,
-    should_stop: Callable[[], bool],
-    plan: RecordedPlan | None = None,
-) -> FitOutcome:
-    """Recover the renderer's parameters from a picture of the same scene, with no use of their start but as one guess.
+class RecordedRoute:
+    """A fit with no use of the material's start but as one guess; `plan` is that of the preset, unless it is given.
 
-    Parameters and errors are those of `fit_material`; `plan` is that of the preset, unless it is given. The result is
-    the best of the scene's own values and the end of every finishing stage, judged on path-traced pictures under random
-    numbers no stage has seen: by the least-squares residual of tiles for `fast` and where the picture's noise is
-    reached, by the last of the losses where the settings name them, else by FLIP (`fit.picture_judge`).
+    The result is the best of the scene's own values and the end of every finishing stage, judged on path-traced
+    pictures: by the least-squares residual of tiles for `fast` and where the picture's noise is reached, by the last of
+    the losses where the settings name them, else by FLIP (`fit.judge.picture_judge`).
 
     Raises
     ------
-    BadInputError
-        As `fit_material`.
     UnrecordableError
         For materials that recorded paths cannot hold: textures, transmission.
+    BadInputError
+        If one of the settings' losses is not defined for the reference.
     """
-    from ...render.recorded_scene import RecordedScene
 
-    began = time.monotonic()
-    mask = renderer.target_mask()
-    check_reference(reference, mask)
-    check_finite(reference.pixels, "The reference")
-    ldr = reference.encoding is Encoding.SRGB or settings.range == "ldr"
-    view = (
-        (display or DisplayView())
-        if reference.encoding is Encoding.SRGB
-        else DisplayView.for_scene(reference.pixels, mask)
-    )
-    named = None if settings.losses is None else settings.stage_names(reference.encoding)
-    measure = named[-1] if named else "flip-ldr" if ldr else "flip-hdr"
-    light = linear_pixels(reference, view)
-    scene = RecordedScene(renderer, int(mask.sum()))  # refuses glass, so it comes first
-    # the start's picture is rendered while the kernels of the fit are compiled
-    counted = counted_pixels(mask, settings)
-    verification = Verification(
-        renderer,
-        reference,
-        counted,
-        view,
-        seed=settings.seed,
-        first=FIRST_SAMPLES_EXACT if scene.lights_exact else FIRST_SAMPLES,
-        most=settings.verify_spp,
-        should_stop=should_stop,
-    )
-    start = verification.begin(renderer.start)
-    finishing = finishing_residuals(settings, reference.encoding, light, mask, view)
-    names = (*STAGES, *finishing, *(["flip"] if settings.preset == "best" else []))
-    listener(Started(stages=names, parameters=renderer.table.names, seconds=time.monotonic() - began))
-    course = Course(renderer, names, listener, should_stop, began)
-    plan = plan or RecordedPlan.of(settings.preset)
-    fit = RecordedFit(scene, light, mask, plan, settings.seed, course, clipped_pixels(reference, view))
+    def __init__(self, task: FitTask, renderer: MitsubaRenderer, plan: RecordedPlan | None) -> None:
+        from ...render.recorded_scene import RecordedScene
 
-    basins = fit.start_from_nothing(_censored(log_residual, reference, view))
-    ends = [End("start", renderer.start)]
-    kept = None
-    notes = list(scene.needs.notes)
-    counts: Callable[[Pixels], float] | None = None  # what the result is chosen by
-    if should_stop():
-        ends.append(End("start", basins[0].x))
-    else:
+        settings = task.settings
+        self._task, self._renderer = task, renderer
+        self._plan = plan or RecordedPlan.of(settings.preset)
+        named = None if settings.losses is None else settings.stage_names(task.reference.encoding)
+        self._measure = named[-1] if named else task.measure
+        self._finishing = finishing_residuals(settings, task.reference.encoding, task.light, task.mask, task.view)
+        self._scene = RecordedScene(renderer, int(task.mask.sum()))
+        self.stages = (*STAGES, *self._finishing, *(["flip"] if settings.preset == "best" else []))
+        self.verification = Verification(
+            renderer,
+            task.reference,
+            task.counted,
+            task.view,
+            seed=settings.seed,
+            first=FIRST_SAMPLES_EXACT if self._scene.lights_exact else FIRST_SAMPLES,
+            most=settings.verify_spp,
+            should_stop=task.should_stop,
+        )
+
+    def fit(self) -> RouteEnds:
+        """Run the stages.
+
+        Raises
+        ------
+        UnrecordableError
+            If no start gives finite numbers on the recorded paths.
+        """
+        task, scene, renderer, plan = self._task, self._scene, self._renderer, self._plan
+        course = Course(renderer, self.stages, task.listener, task.should_stop, task.began)
+        fit = RecordedFit(scene, task.light, task.mask, plan, task.settings.seed, course, task.clipped)
+        basins = fit.start_from_nothing(_censored(log_residual, task))
+        if task.should_stop():
+            end = End("start", basins[0].x)
+            choose = self._choose_by(self._judge(blurred=False).value)
+            return RouteEnds((end,), 1, choose, tuple(course.reports), tuple(scene.needs.notes))
+
         make = RelativeResidual if scene.needs.sampled else log_residual
         first, *others = (basin.x for basin in basins)
-        refined = fit.refine(first, _censored(make, reference, view), _weighted(reference, view), others)
-        weighted = scene.needs.sampled and not isinstance(view, BakedView)
-        seen = None if weighted else PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
-        kept = keep_values(fit, refined, weighted=weighted, seen=seen)
+        refined = fit.refine(first, _censored(make, task), _weighted(task), others)
+        weighted = scene.needs.sampled and not isinstance(task.view, BakedView)
+        kept = keep_values(fit, refined, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
         fit.box = box_holding(fit.table, renderer.start, kept.held)
-        ends.append(End("refine", kept.x))
-        notes += kept.notes
-        linear = reference.encoding is Encoding.LINEAR
-        optional = finishing and settings.losses is None and linear
-        # under lights with extent residuals are in deviations of the noise
-        left = np.inf if scene.needs.sampled else float(np.sqrt(2.0 * refined.all.equations(kept.x).cost))
-        nothing_left = optional and left < plan.seen_rms
-        at_noise = optional and not nothing_left and fit.misfit(kept.x) < AT_NOISE
-        noise = fit.noise.level if fit.noise else 0.0
-        if nothing_left:
-            notes.append(
-                f"What is left of the picture ({100 * left:.1g} %) nobody sees: perceptual stages were left out."
-            )
-        elif at_noise:
-            notes.append(
-                f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
-                "perceptual stages would fit that noise and were left out."
-            )
-        elif finishing:
-            blurred = linear and settings.losses is None and (scene.needs.sampled or noise > NOISY)
-            judge = PictureJudge(measure, reference, light, mask, settings, view, blurred=blurred)
-            counts = judge.value
-            tried = others if settings.preset == "best" else []
-            ends += perceptual_ends(fit, refined.all, kept.x, tried, finishing, judge, settings, notes)
+        notes = [*scene.needs.notes, *kept.notes]
+        later: list[End] = []
+        judge: PictureJudge | None = None
+        left = np.inf  # under lights with extent residuals are in deviations of the noise
+        if not scene.needs.sampled:
+            left = float(np.sqrt(2.0 * refined.all.equations(kept.x).cost))
+        enough = self._nothing_left(fit, kept.x, left)
+        if enough:
+            notes.append(enough)
+        elif self._finishing:
+            noise = fit.noise.level if fit.noise else 0.0
+            may_blur = task.linear and task.settings.losses is None
+            judge = self._judge(blurred=may_blur and (scene.needs.sampled or noise > NOISY))
+            tried = others if task.settings.preset == "best" else []
+            later = perceptual_ends(fit, refined.all, kept.x, tried, self._finishing, judge, task.settings, notes)
         if fit.fireflies:
             notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
         if scene.needs.sampled and fit.recordings > 1:
             notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
-        if counts is None:
-            counts = _misfit(fit, refined.all, _censored(log_residual, reference, view))
+        counts = judge.value if judge else _misfit(fit, refined.all, _censored(log_residual, task))
+        weak = tuple(weak_combinations(kept.spread, fit.table, kept.certainty, kept.held))
+        ends = [End("refine", kept.x), *later]
+        return RouteEnds(
+            ends=tuple(replace(end, certainty=kept.certainty, weak_combinations=weak) for end in ends),
+            by_squares=1,
+            choose=self._choose_by(counts),
+            stages=tuple(course.reports),
+            notes=tuple(notes),
+        )
 
-    pictures = verification.pictures(start, [end.x for end in ends[1:]])
-    listener(Preview(pictures[-1].image))
-    counts = counts or PictureJudge(measure, reference, light, mask, settings, view, blurred=False).value
-    best = best_of([counts(p.image) if np.isfinite(p.image).all() else np.inf for p in pictures])
-    pictures[best] = end = verification.finished(pictures[best])
-    status = Status.CANCELLED if should_stop() else Status.CONVERGED
-    if best == 1 and len(ends) > 2:
-        notes.append(SQUARES_KEPT.format(stage="refine"))
-    result = final_result(
-        renderer,
-        pictures,
-        best,
-        status=status,
-        stages=course.reports,
-        errors=picture_errors(reference, pictures[0].image, end.image, mask, counted, display),
-        began=began,
-        certainty=kept.certainty if kept else {},
-        notes=notes,
-        weak_combinations=weak_combinations(kept.spread, fit.table, kept.certainty, kept.held) if kept else (),
-    )
-    return FitOutcome(result, pictures[0].image, end.image, counted, end.halves)
+    def _nothing_left(self, fit: RecordedFit, x: np.ndarray, left: float) -> str:
+        """Why perceptual stages have nothing to do, one sentence; empty where they have, or are the user's choice."""
+        optional = self._finishing and self._task.settings.losses is None and self._task.linear
+        if not optional:
+            return ""
+        if left < self._plan.seen_rms:
+            return f"What is left of the picture ({100 * left:.1g} %) nobody sees: perceptual stages were left out."
+        if fit.misfit(x) >= AT_NOISE:
+            return ""
+        noise = fit.noise.level if fit.noise else 0.0
+        return (
+            f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
+            "perceptual stages would fit that noise and were left out."
+        )
 
+    def _judge(self, *, blurred: bool) -> PictureJudge:
+        task = self._task
+        light, mask = task.light, task.mask
+        return PictureJudge(self._measure, task.reference, light, mask, task.settings, task.view, blurred=blurred)
 
-def best_of(errors: Sequence[float]) -> int:
-    """The number of the smallest error; one that is not finite never wins, and without any the start stays."""
-    values = [error if np.isfinite(error) else np.inf for error in errors]
-    return int(np.argmin(values))
-
-
-def linear_pixels(reference: Image, view: View) -> Pixels:
-    """Scene-linear values of a reference; those above a display's white are lost."""
-    if reference.encoding is Encoding.LINEAR:
-        return np.maximum(reference.pixels, 0.0)
-    assert isinstance(view, DisplayView | BakedView)
-    return view.linear(reference.pixels)
+    @staticmethod
+    def _choose_by(error: Callable[[Pixels], float]) -> Callable[..., Choice]:
+        return lambda images: Choice.of([error(i) if np.isfinite(i).all() else np.inf for i in images])
 
 
-def clipped_pixels(reference: Image, view: View) -> Pixels | None:
-    """1 where only a lower bound of the radiance is known, else 0; None for a linear reference."""
-    if reference.encoding is Encoding.LINEAR:
-        return None
-    top = view.top if isinstance(view, BakedView) else 1 - HALF_LEVEL
-    return (reference.pixels >= top).astype(np.float32)
-
-
-def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:
+def _censored(make: MakeResidual, task: FitTask) -> MakeResidual:
     """Residuals that expect no more of clipped pixels than a display shows."""
-    if reference.encoding is Encoding.LINEAR:
+    view = task.view
+    if task.linear:
         return make
     if isinstance(view, BakedView):
         return lambda target: DisplayedResidual(view, target)
@@ -201,11 +167,11 @@ def _censored(make: MakeResidual, reference: Image, view: View) -> MakeResidual:
     return lambda target: CensoredResidual(make(target), target, limit)
 
 
-def _weighted(reference: Image, view: View) -> MakeWeighted | None:
+def _weighted(task: FitTask) -> MakeWeighted | None:
     """Residuals in standard deviations of the noise; None for a view that is no formula."""
-    if isinstance(view, BakedView):
+    if isinstance(task.view, BakedView):
         return None
-    return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), reference, view)(target)
+    return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), task)(target)
 
 
 def _misfit(fit: RecordedFit, problem: Problem, compressed: MakeResidual) -> Callable[[Pixels], float]:

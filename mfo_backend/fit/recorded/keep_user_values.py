@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +17,8 @@ from ...types.parameter import ParameterTable
 from ..alike.rival_notes import rival_notes
 from ..alike.unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
 from ..certainty.covariance import MODEL_ERROR, certainties, covariance, standard_deviations, with_rivals
+from ..judge.picture_judge import VISIBLE
+from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
 from ..squares.recording_noise import rows_of_samples
 from ..squares.residuals import RelativeResidual
@@ -25,7 +27,6 @@ from .stages import RecordedFit, Vector
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
 HOPELESS = 1.1  # the same, by some of the groups
-VISIBLE = 0.002  # mean FLIP; values that the picture does not show change it by less than half of this
 # Mean change of a picture's pixels, relative to them and to a hundredth of their median, that FLIP need not be asked
 # about: even where both were equal, where FLIP is steepest, it rises by 0.0013 at most
 UNSEEN_CHANGE = 5e-5
@@ -82,11 +83,6 @@ def keep_values(
                 break
     notes += rival_notes(refined.rivals, found, table)
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
-
-
-def kept_note(names: Iterable[str]) -> str:
-    """The sentence on values that went back to the user's."""
-    return f"The picture does not determine {', '.join(names)}: kept as in the scene."
 
 
 def _sets_to_return(

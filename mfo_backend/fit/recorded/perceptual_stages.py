@@ -10,9 +10,11 @@ import numpy as np
 from ...types.image import Pixels
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
+from ..result.outcome import End
 from ..settings import FitSettings
-from ..squares.problem import End, Problem
-from .stages import MakeResidual, RecordedFit, Vector
+from ..squares.problem import Problem
+from ..squares.residuals import MakeResidual
+from .stages import RecordedFit, Vector
 
 BASIN = 0.1  # of the box: solutions nearer than this in every value are one
 FLIP_STARTS = 2

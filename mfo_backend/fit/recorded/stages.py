@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -21,21 +21,18 @@ from ..alike.exchanges import best_basin, metal_rivals
 from ..alike.simplest import OtherEnds, SimplestEnd
 from ..alike.unneeded_lobes import Box, solve_without_unneeded
 from ..alike.width_rivals import width_rivals
-from ..recorded_plan import RecordedPlan
+from ..plans import RecordedPlan
 from ..result.course import Course, Stage
 from ..search.global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
 from ..search.race_starts import CLEARLY_LOWER, race
 from ..squares.problem import Problem, Refined
-from ..squares.residuals import OneSidedResidual, Residual, WeightedResidual
+from ..squares.residuals import MakeResidual, MakeWeighted, OneSidedResidual, WeightedResidual
 from .finer_grid import finer_grid
 from .fireflies import without_fireflies
 from .reference_noise import TileNoise, tile_noise
 from .where_to_look import all_groups, detail_grid, edges_of_light, fewer_groups, solution_grid, thinned_grid
 
 Vector = NDArray[np.float64]
-MakeResidual = Callable[[NDArray[np.float32]], Residual]
-# a residual from a reference and one over the deviation of its noise
-MakeWeighted = Callable[[NDArray[np.float32], NDArray[np.float32]], Residual]
 
 # Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
 LEAST_NOISE = 0.002

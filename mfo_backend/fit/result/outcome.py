@@ -1,61 +1,157 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result of a fit from the pictures of its ends, for every preset alike."""
+"""What a route hands over, and the result of a fit that is made of it, for every route alike."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...render.renderer import Renderer
 from ...types.certainty import Certainty, WeakCombination
+from ...types.image import Pixels
 from ...types.result import FitResult, StageReport
 from ...types.status import Status
-from ..paper.loop import Candidate
 
 START_KEPT = "Nothing was better than the start, so the start was kept."
 SQUARES_KEPT = "No perceptual stage was better in a picture of its own, so the end of {stage!r} was kept."
 
 
+@dataclass(frozen=True)
+class Candidate:
+    """Values, as a vector of the renderer's table, and their picture, scene-linear."""
+
+    vector: NDArray[np.float64]
+    image: Pixels = field(repr=False)
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a stage ended, and what the fit knows of the values there.
+
+    `notes` are sentences that hold if these values become the result.
+    """
+
+    stage: str
+    x: NDArray[np.float64]
+    certainty: Mapping[str, Certainty] = field(default_factory=dict)
+    weak_combinations: tuple[WeakCombination, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The best of a route's ends, counted from 0, and whether it is better than the scene's own material."""
+
+    end: int
+    beats_start: bool
+
+    @staticmethod
+    def of(errors: Sequence[float]) -> Choice:
+        """The smallest error, the first of which is the start's; one that is not finite never wins."""
+        start, *others = (error if np.isfinite(error) else np.inf for error in errors)
+        end = int(np.argmin(others))
+        return Choice(end, others[end] < start)
+
+
+@dataclass(frozen=True)
+class RouteEnds:
+    """All that a route has found.
+
+    Attributes
+    ----------
+    ends
+        In the order of the stages, without the start.
+    by_squares
+        How many of the ends, the first ones, are those of least squares; the others are perceptual stages'.
+    choose
+        Judges the pictures of the start and of all ends, scene-linear (height, width, 3), in this order.
+    stages, notes
+        The stages' reports, and sentences on what was left out or kept.
+    status
+        How the last stage ended.
+    unverified
+        Start and ends with the fit's own pictures, which have to do where there was no time for others.
+    """
+
+    ends: tuple[End, ...]
+    by_squares: int
+    choose: Callable[[Sequence[Pixels]], Choice]
+    stages: tuple[StageReport, ...]
+    notes: tuple[str, ...] = ()
+    status: Status = Status.CONVERGED
+    unverified: tuple[Candidate, ...] = ()
+
+    def chosen_notes(self, choice: Choice) -> tuple[str, ...]:
+        """The sentences on a choice among the ends."""
+        if not choice.beats_start:
+            return ()
+        end = self.ends[choice.end]
+        kept = choice.end == 0 and len(self.ends) > self.by_squares
+        return (*((SQUARES_KEPT.format(stage=end.stage),) if kept else ()), *end.notes)
+
+
+@dataclass(frozen=True)
+class FitOutcome:
+    """The result of a fit with the pictures of its start and its end, scene-linear and under one seed.
+
+    The fit looked at the pixels that are `counted`, True (height, width); others may have fewer samples.
+    `result_halves` are two pictures of the end whose random numbers have nothing in common, where there are such.
+    """
+
+    result: FitResult
+    start_image: Pixels = field(repr=False)
+    result_image: Pixels = field(repr=False)
+    counted: NDArray[np.bool_] = field(repr=False)
+    result_halves: tuple[Pixels, Pixels] | None = field(default=None, repr=False)
+
+
+def kept_note(names: Iterable[str]) -> str:
+    """The sentence on values that went back to the user's."""
+    return f"The picture does not determine {', '.join(names)}: kept as in the scene."
+
+
 def final_result(
     renderer: Renderer,
-    pictures: Sequence[Candidate],
-    best: int,
+    found: RouteEnds,
+    choice: Choice,
     *,
     status: Status,
-    stages: Sequence[StageReport],
     errors: Mapping[str, tuple[float, float]],
     began: float,
-    certainty: Mapping[str, Certainty] | None = None,
     notes: Sequence[str] = (),
-    weak_combinations: Sequence[WeakCombination] = (),
 ) -> FitResult:
     """What a fit has found.
 
     Parameters
     ----------
-    pictures
-        The ends with their pictures; the first is the scene's own material.
-    best
-        Number of the end that is the result. If that is the first, the message says so, unless the fit was cancelled.
+    choice
+        The end that is the result; where it does not beat the start, the start is, and the message says so, unless the
+        fit was cancelled. How sure the values are is what the fit knows of the end that came nearest.
     began
         The fit's begin on the monotonic clock.
+    notes
+        Sentences after those of the route.
     """
     message = status.sentence
-    if best == 0 and status is not Status.CANCELLED:
+    if not choice.beats_start and status is not Status.CANCELLED:
         message += f" {START_KEPT}"
-    table = renderer.table
+    table, end = renderer.table, found.ends[choice.end]
     return FitResult(
         status=status,
         message=message,
         model=renderer.model,
         initial=table.unpack(renderer.start),
-        recovered=table.unpack(pictures[best].vector),
+        recovered=table.unpack(end.x if choice.beats_start else renderer.start),
         bounds={p.name: (p.lower, p.upper) for p in table},
-        stages=tuple(stages),
+        stages=found.stages,
         errors=dict(errors),
         seconds=time.monotonic() - began,
         passes=renderer.passes,
-        certainty=dict(certainty or {}),
-        notes=tuple(notes),
-        weak_combinations=tuple(weak_combinations),
+        certainty=dict(end.certainty),
+        notes=(*found.notes, *found.chosen_notes(choice), *notes),
+        weak_combinations=end.weak_combinations,
     )

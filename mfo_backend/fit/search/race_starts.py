@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import Solution
-from ..recorded_plan import RecordedPlan
+from ..plans import RecordedPlan
 
 Vector = NDArray[np.float64]
 # of a start, at most so many evaluations, and the cost of the best solution so far, which it has to be better than

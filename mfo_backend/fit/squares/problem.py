@@ -69,14 +69,6 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class End:
-    """Where a stage ended."""
-
-    stage: str
-    x: Vector
-
-
-@dataclass(frozen=True)
 class Rival:
     """Another material that explains the picture about as well, and its share of the probability.
 

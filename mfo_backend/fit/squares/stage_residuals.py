@@ -12,9 +12,8 @@ from ...metrics.pu21 import Pu21
 from ...metrics.response import OnDisplay, Response, Scaled, displayed_by, logarithmic_for, nits_per_unit
 from ...metrics.tone_mapping import View
 from ...types.image import Encoding, Pixels
-from ..recorded.stages import MakeResidual
 from ..settings import FitSettings
-from .residuals import RelativeResidual, ResponseResidual
+from .residuals import MakeResidual, RelativeResidual, ResponseResidual
 
 
 def finishing_residuals(

@@ -1,37 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The presets for materials whose light passes through them: least squares on traced paths, then FLIP."""
+"""Materials whose light passes through them: least squares on traced paths, then FLIP."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.pixel_check import check_finite
-from ...metrics.tone_mapping import DisplayView, View
 from ...render.mitsuba_renderer import MitsubaRenderer
 from ...types.certainty import Certainty, Level
-from ...types.event import Listener, Preview, Started
-from ...types.image import Encoding, Image, Pixels
+from ...types.image import Pixels
 from ...types.parameter import ParameterTable
-from ...types.status import Status
 from ..certainty.covariance import WEAK_BELOW, certainties
-from ..judge.checked_reference import VERIFY_STREAM, check_reference, counted_pixels
-from ..judge.picture_errors import picture_errors
-from ..judge.picture_judge import PictureJudge
+from ..judge.checked_reference import VERIFY_STREAM
+from ..judge.fit_task import FitTask
+from ..judge.picture_judge import VISIBLE, PictureJudge
 from ..judge.verification import Verification
-from ..paper.fit import FitOutcome
-from ..recorded.fit import clipped_pixels, linear_pixels
-from ..recorded.keep_user_values import VISIBLE, kept_note
+from ..plans import TransmissionPlan
 from ..result.course import Course
-from ..result.outcome import SQUARES_KEPT, final_result
-from ..settings import FitSettings
+from ..result.outcome import Choice, End, RouteEnds, kept_note
 from ..squares.stage_residuals import finishing_residuals
-from ..transmission_plan import TransmissionPlan
 from .linear_pictures import LinearPictures
 from .perceptual_stages import FLIP, lower_seen_error
 from .polished import CORE, Polished
@@ -45,116 +36,126 @@ _PREVIEW_PATHS, _PREVIEW_SPP = 1 << 15, 2  # a quarter of a launch, whatever the
 Vector = NDArray[np.float64]
 
 
-def fit_transmission(
-    renderer: MitsubaRenderer,
-    reference: Image,
-    settings: FitSettings,
-    *,
-    display: View | None = None,
-    listener: Listener,
-    should_stop: Callable[[], bool],
-    plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
-) -> FitOutcome:
-    """Recover the renderer's parameters from a picture of the same scene by whole light paths.
+class TracedRoute:
+    """A fit on whole light paths.
 
-    Parameters and errors are those of `fit_material`. Ends of the stages are compared on paths no stage has seen, and
-    the best of them with the scene's own values on path-traced pictures under yet another seed, by mean FLIP.
+    Ends of the stages are compared on paths no stage has seen, and the best of them with the scene's own values on
+    path-traced pictures, by mean FLIP.
 
     Raises
     ------
-    BadInputError
-        As `fit_material`.
     UnrecordableError
         If the model has no traced version.
+    BadInputError
+        If one of the settings' losses is not defined for the reference.
     """
-    from ...render.traced_paths import TracedPaths
 
-    began = time.monotonic()
-    mask = renderer.target_mask()
-    check_reference(reference, mask)
-    check_finite(reference.pixels, "The reference")
-    ldr = reference.encoding is Encoding.SRGB or settings.range == "ldr"
-    scene_view = DisplayView.for_scene(reference.pixels, mask) if reference.encoding is Encoding.LINEAR else None
-    view = scene_view or display or DisplayView()
-    paths = TracedPaths(renderer)
-    light, clipped = linear_pixels(reference, view), clipped_pixels(reference, view)
-    seen_residuals = finishing_residuals(settings, reference.encoding, light, mask, view)
-    stages = (*STAGES, *seen_residuals, *([FLIP] if settings.preset == "best" else []))
-    listener(Started(stages=stages, parameters=renderer.table.names, seconds=time.monotonic() - began))
-    course = Course(renderer, stages, listener, should_stop, began)
-    course.picture = lambda x: _preview(paths, x, mask.shape, settings.seed ^ VERIFY_STREAM)
-    fit = TransmissionFit(paths, renderer.start, light, mask, plan, settings.seed, course, clipped)
+    def __init__(
+        self,
+        task: FitTask,
+        renderer: MitsubaRenderer,
+        plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
+    ) -> None:
+        from ...render.traced_paths import TracedPaths
 
-    certainty: dict[str, Certainty] = {}
-    ends: list[Polished] = []
-    notes: list[str] = []
-    freest = 0
-    nodes = fit.scan()
-    found = [fit.race(nodes) if not should_stop() else nodes[0][1]]
-    if not should_stop():
-        ends = fit.polish(found[0])
-        candidates = [end.x for end in reversed(ends)] + found
-        chosen = fit.choose(candidates)
-        raced = chosen == len(ends)
-        found = [candidates[chosen]]
-        ends = ends if raced else ends[: len(ends) - chosen]
-        freest = int(np.argmin([end.kept.sum() for end in ends]))
-        if raced or (chosen == 0 and freest < len(ends) - 1):
-            # by the noisy squares values may go back to the user's, and a race look better, where no eye agrees
-            found.append(ends[freest].x)
-        if raced:
-            ends = ends[: freest + 1]
-    name = "flip-ldr" if ldr else "flip-hdr"
-    judge, nearer = None, []
-    if seen_residuals and ends and not should_stop():
-        linear = LinearPictures(fit.pictures, settings.seed)
-        if linear.are_worth_it(found[0], reference, view):
-            blurred = reference.encoding is Encoding.LINEAR
-            judge = PictureJudge(name, reference, light, mask, settings, view, blurred=blurred)
-            end = lower_seen_error(linear, judge, seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in stages)
-            nearer = [] if np.array_equal(end, found[0]) else [end]
-    stopped = should_stop()
-    counted = counted_pixels(mask, settings)
-    verification = Verification(
-        renderer, reference, counted, view, seed=settings.seed, most=settings.verify_spp, should_stop=should_stop
-    )
-    pictures = verification.pictures(verification.begin(renderer.start), [*found, *nearer])
-    plain = PictureJudge(name, reference, pictures[0].image, mask, settings, view, blurred=False)
-    seen = [plain.value(picture.image) for picture in pictures]
-    kept = len(found) == 2 and seen[1] <= seen[2] + VISIBLE
-    best = 1 if kept else len(found)
-    if judge and nearer and best == 1 and judge.value(pictures[-1].image) < judge.value(pictures[1].image):
-        best = len(pictures) - 1
-    best = best if seen[best] < seen[0] else 0
-    pictures[best] = end = verification.finished(pictures[best])
-    listener(Preview(end.image))
-    if nearer and best == 1:
-        notes.append(SQUARES_KEPT.format(stage="polish"))
-    if ends:
-        shown = ends if kept or len(found) == 1 else ends[: freest + 1]
-        certainty = _certainty(shown, renderer.table)
-        back = [name for name in certainty if shown[-1].kept[renderer.table.slice_of(name)].all()]
-        unseen = [name for name in back if certainty[name].level is Level.NOT_VISIBLE]
-        notes += [kept_note(unseen)] if unseen and best else []
-    counts = fit.pictures.counts
-    if counts is not None:
-        notes.append(
-            f"The picture is as noisy as one of {counts.count} samples a pixel: compressed pixels of as many "
-            "samples were compared, so that no firefly decides."
+        settings, encoding = task.settings, task.reference.encoding
+        self._task, self._renderer, self._plan = task, renderer, plan
+        self._paths = TracedPaths(renderer)
+        self._seen_residuals = finishing_residuals(settings, encoding, task.light, task.mask, task.view)
+        self.stages = (*STAGES, *self._seen_residuals, *([FLIP] if settings.preset == "best" else []))
+        self.verification = Verification(
+            renderer,
+            task.reference,
+            task.counted,
+            task.view,
+            seed=settings.seed,
+            most=settings.verify_spp,
+            should_stop=task.should_stop,
         )
-    status = Status.CANCELLED if stopped or should_stop() else Status.CONVERGED
-    result = final_result(
-        renderer,
-        pictures,
-        best,
-        status=status,
-        stages=course.reports,
-        errors=picture_errors(reference, pictures[0].image, end.image, mask, counted, display),
-        began=began,
-        certainty=certainty,
-        notes=notes,
-    )
-    return FitOutcome(result, pictures[0].image, end.image, counted, end.halves)
+
+    def fit(self) -> RouteEnds:
+        """Run the stages."""
+        task, renderer, paths = self._task, self._renderer, self._paths
+        seed, should_stop = task.settings.seed, task.should_stop
+        course = Course(renderer, self.stages, task.listener, should_stop, task.began)
+        course.picture = lambda x: _preview(paths, x, task.mask.shape, seed ^ VERIFY_STREAM)
+        fit = TransmissionFit(paths, renderer.start, task.light, task.mask, self._plan, seed, course, task.clipped)
+
+        ends: list[Polished] = []
+        freest = 0
+        nodes = fit.scan()
+        found = [fit.race(nodes) if not should_stop() else nodes[0][1]]
+        if not should_stop():
+            ends = fit.polish(found[0])
+            candidates = [end.x for end in reversed(ends)] + found
+            chosen = fit.choose(candidates)
+            raced = chosen == len(ends)
+            found = [candidates[chosen]]
+            ends = ends if raced else ends[: len(ends) - chosen]
+            freest = int(np.argmin([end.kept.sum() for end in ends]))
+            if raced or (chosen == 0 and freest < len(ends) - 1):
+                # by the noisy squares values may go back to the user's, and a race look better, where no eye agrees
+                found.append(ends[freest].x)
+            if raced:
+                ends = ends[: freest + 1]
+        judge: PictureJudge | None = None
+        nearer: list[Vector] = []
+        if self._seen_residuals and ends and not should_stop():
+            linear = LinearPictures(fit.pictures, seed)
+            if linear.are_worth_it(found[0], task.reference, task.view):
+                judge = self._judge(task.light, blurred=task.linear)
+                end = lower_seen_error(
+                    linear, judge, self._seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in self.stages
+                )
+                nearer = [] if np.array_equal(end, found[0]) else [end]
+        counts = fit.pictures.counts
+        notes = ()
+        if counts is not None:
+            notes = (
+                f"The picture is as noisy as one of {counts.count} samples a pixel: compressed pixels of as many "
+                "samples were compared, so that no firefly decides.",
+            )
+        of_kept = self._known(ends)
+        # the second end is the freest, where there are two
+        known = [of_kept, self._known(ends[: freest + 1])] if len(found) == 2 else [of_kept]
+        return RouteEnds(
+            ends=(
+                *(End("polish", x, certainty, notes=back) for x, (certainty, back) in zip(found, known, strict=True)),
+                *(End(self.stages[-1], x, of_kept[0], notes=of_kept[1]) for x in nearer),
+            ),
+            by_squares=len(found),
+            choose=self._choose(len(found), judge if nearer else None),
+            stages=tuple(course.reports),
+            notes=notes,
+        )
+
+    def _choose(self, squares: int, judge: PictureJudge | None) -> Callable[[Sequence[Pixels]], Choice]:
+        """The first end unless the eye sees that another is better; a perceptual one is judged below the noise."""
+
+        def choose(images: Sequence[Pixels]) -> Choice:
+            plain = self._judge(images[0], blurred=False)
+            start, *seen = (plain.value(image) for image in images)
+            best = 0 if squares == 1 or seen[0] <= seen[1] + VISIBLE else 1
+            if judge is not None and best == 0 and judge.value(images[-1]) < judge.value(images[1]):
+                best = len(seen) - 1
+            return Choice(best, seen[best] < start)
+
+        return choose
+
+    def _judge(self, background: Pixels, *, blurred: bool) -> PictureJudge:
+        task = self._task
+        settings, view = task.settings, task.view
+        return PictureJudge(task.measure, task.reference, background, task.mask, settings, view, blurred=blurred)
+
+    def _known(self, ends: list[Polished]) -> tuple[dict[str, Certainty], tuple[str, ...]]:
+        """How sure the last end's values are, and a sentence on those that went back to the user's unseen."""
+        if not ends:
+            return {}, ()
+        table = self._renderer.table
+        certainty = _certainty(ends, table)
+        back = [name for name in certainty if ends[-1].kept[table.slice_of(name)].all()]
+        unseen = [name for name in back if certainty[name].level is Level.NOT_VISIBLE]
+        return certainty, ((kept_note(unseen),) if unseen else ())
 
 
 def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...solve.bounded_least_squares import SolveLimits, solve_bounded
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
-from ..recorded.stages import MakeResidual
 from ..result.course import Course
 from ..squares.recording_noise import unbiased_equations
+from ..squares.residuals import MakeResidual
 from .linear_pictures import LinearPicture, LinearPictures
 
 FLIP = "flip"

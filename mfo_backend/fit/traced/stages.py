@@ -14,8 +14,8 @@ from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import cautious_step
 from ...types.image import Pixels
 from ..alike.unneeded_lobes import values_off
+from ..plans import TransmissionPlan
 from ..result.course import Course, Stage
-from ..transmission_plan import TransmissionPlan
 from .pictures import GEOMETRIC, SECANT_BELOW, TracedTiles
 from .polished import AMOUNTS, CORE, Polished, without_lobe
 from .sample_count import MOST_COUNT

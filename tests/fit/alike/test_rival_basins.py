@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded.stages import RecordedFit
-from mfo_backend.fit.recorded_plan import RecordedPlan
 from mfo_backend.fit.squares.problem import Refined
 from mfo_backend.solve.bounded_least_squares import NormalEquations
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.paper.fit import FitOutcome, fit_material
+from mfo_backend.fit.recover_material import recover_material
+from mfo_backend.fit.result.outcome import FitOutcome
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.colour import srgb_from_linear
 from mfo_backend.types.errors import BadInputError, SetupError
@@ -18,7 +19,7 @@ from mfo_backend.types.status import Status
 
 
 def fit(renderer, reference, *, listener=lambda event: None, should_stop=lambda: False, **settings) -> FitOutcome:
-    return fit_material(renderer, reference, FitSettings(**settings), listener=listener, should_stop=should_stop)
+    return recover_material(renderer, reference, FitSettings(**settings), listener=listener, should_stop=should_stop)
 
 
 @pytest.mark.parametrize("range_", ["hdr", "ldr"])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mfo_backend.fit.recorded_plan import RecordedPlan
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.squares.problem import Refined
 from mfo_backend.types.image import Pixels
 

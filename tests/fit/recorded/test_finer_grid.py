@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import pytest
 
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded.finer_grid import finer_grid
-from mfo_backend.fit.recorded_plan import RecordedPlan
 
 PLAN = RecordedPlan(
     too_noisy=0.07, low_noise=0.06, grid_finest=16, most_own=0.3, low_own=0.2, clean_lanes=1_000_000

@@ -294,9 +294,9 @@ def test_what_cannot_be_recorded_is_fitted_by_the_paper_and_says_so(tmp_path):
 
 @pytest.mark.parametrize("losses", [None, ("mse", "itp")])
 def test_a_large_target_is_fitted_on_some_of_its_pixels(tmp_path, monkeypatch, losses):
-    from mfo_backend.fit.recorded import fit as fit_recorded
+    from mfo_backend.fit.plans import RecordedPlan
+    from mfo_backend.fit.recorded import fit as recorded_fit
     from mfo_backend.fit.recorded import where_to_look as choose_groups
-    from mfo_backend.fit.recorded_plan import RecordedPlan
     from mfo_backend.render import recorded_scene
 
     renderer = load(tmp_path, POINT, size=64)
@@ -308,7 +308,7 @@ def test_a_large_target_is_fitted_on_some_of_its_pixels(tmp_path, monkeypatch, l
     )
     # as for a picture of 256 x 256 pixels: fine recordings are too much, and so are the first one's pixels
     monkeypatch.setattr(choose_groups, "MOST_FINE_RAYS", 0)
-    monkeypatch.setattr(fit_recorded.RecordedPlan, "of", staticmethod(lambda preset: RecordedPlan(refine_lanes=1500)))
+    monkeypatch.setattr(recorded_fit.RecordedPlan, "of", staticmethod(lambda preset: RecordedPlan(refine_lanes=1500)))
     outcome, _ = fit(renderer, reference, preset="balanced", losses=losses)
     found = renderer.table.pack(outcome.result.recovered)
     np.testing.assert_allclose(found[:4], renderer.table.pack(TRUTHS[1])[:4], atol=0.01)

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded import keep_user_values as kept_values
-from mfo_backend.fit.recorded_plan import RecordedPlan
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.squares.problem import Rival

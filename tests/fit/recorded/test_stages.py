@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.recorded_plan import RecordedPlan
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.render.renderer import load_renderer
 from tests.fit.recorded.one_refine import refine
 from tests.render.scenes import AREA, SKY, write_scene

@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.paper.loop import Candidate, run_stages
+from mfo_backend.fit.paper.loop import run_stages
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.result import best_so_far
 from mfo_backend.fit.result.best_so_far import BestSoFar
+from mfo_backend.fit.result.outcome import Candidate
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.loss import make_loss
 from mfo_backend.render.renderer import load_renderer

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.recorded_plan import RecordedPlan
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.search.race_starts import CLEARLY_LOWER, race
 from mfo_backend.solve.bounded_least_squares import TRIED, NormalEquations, SolveLimits, solve_bounded
 

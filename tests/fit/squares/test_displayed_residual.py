@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mfo_backend.fit.squares.displayed_residual import DisplayedResidual
-from mfo_backend.fit.squares.residuals import OneSidedResidual, RelativeResidual
+from mfo_backend.fit.squares.residuals import DisplayedResidual, OneSidedResidual, RelativeResidual
 from mfo_backend.metrics.tone_mapping import DisplayView
 
 from ...metrics.view_tables import baked, filmic

@@ -9,7 +9,7 @@ import pytest
 from mfo_backend.fit.judge import verification as verified_end
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.fit.traced import fit as fit_transmission
+from mfo_backend.fit.traced import fit as traced_fit
 from mfo_backend.fit.traced import sample_count as equal_counts
 from mfo_backend.fit.traced.polished import Polished
 from mfo_backend.fit.traced.sample_pools import TilePools
@@ -192,7 +192,7 @@ def test_a_preview_costs_the_same_for_every_picture(tmp_path, monkeypatch, shape
     from mfo_backend.render.traced_paths import TracedPaths
 
     paths = TracedPaths(renderer)
-    monkeypatch.setattr(fit_transmission, "_PREVIEW_PATHS", 1 << 11)
+    monkeypatch.setattr(traced_fit, "_PREVIEW_PATHS", 1 << 11)
     traced = []
 
     def images(xs, pixels, *, samples, **_):
@@ -201,7 +201,7 @@ def test_a_preview_costs_the_same_for_every_picture(tmp_path, monkeypatch, shape
         return np.ones((1, len(pixels), 3, 1), np.float32)
 
     monkeypatch.setattr(paths, "images", images)
-    picture = fit_transmission._preview(paths, renderer.start, shape, 0)
+    picture = traced_fit._preview(paths, renderer.start, shape, 0)
     assert picture.shape == (*shape, 3)
     assert np.all(picture == 1.0)
     assert traced[0] < 1.3 * (1 << 11)  # rows and columns are rounded up

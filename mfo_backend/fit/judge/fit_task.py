@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The task of one fit: scene, reference and settings, checked, and what every route needs of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.baked_view import HALF_LEVEL, BakedView
+from ...metrics.pixel_check import check_finite
+from ...metrics.tone_mapping import DisplayView, View
+from ...render.renderer import Renderer
+from ...types.event import Listener
+from ...types.image import Encoding, Image, Pixels
+from ..settings import FitSettings
+from .checked_reference import check_reference, counted_pixels
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """What is to be fitted, and who listens.
+
+    Attributes
+    ----------
+    display
+        The view of a display-encoded reference as the user gave it; None stands for plain sRGB.
+    view
+        What a display shows: `display` for a display-encoded reference, else an exposure chosen for the picture.
+    mask, counted
+        Pixels, True (height, width), that see the target, and those that the settings' region holds.
+    light
+        The reference as scene-linear radiance, float32 (height, width, 3), not negative.
+    clipped
+        1 where only a lower bound of the radiance is known, else 0; None for a linear reference.
+    should_stop
+        Polled before every iteration and between stages and pictures.
+    began
+        The fit's begin on the monotonic clock, seconds.
+    """
+
+    renderer: Renderer
+    reference: Image
+    settings: FitSettings
+    display: View | None
+    view: View
+    mask: NDArray[np.bool_] = field(repr=False)
+    counted: NDArray[np.bool_] = field(repr=False)
+    light: Pixels = field(repr=False)
+    clipped: NDArray[np.float32] | None = field(repr=False)
+    listener: Listener
+    should_stop: Callable[[], bool]
+    began: float
+
+    @property
+    def linear(self) -> bool:
+        """Whether the reference holds radiance and not a display's values."""
+        return self.reference.encoding is Encoding.LINEAR
+
+    @property
+    def measure(self) -> str:
+        """The loss by which a result is chosen where the settings name none: FLIP in the reference's range."""
+        return "flip-hdr" if self.linear and self.settings.range != "ldr" else "flip-ldr"
+
+
+def check_task(
+    renderer: Renderer,
+    reference: Image,
+    settings: FitSettings,
+    display: View | None,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> FitTask:
+    """The task, if reference and scene fit together.
+
+    Raises
+    ------
+    BadInputError
+        If the reference has another size, shows nothing or has pixels that are not finite, or if the camera does not
+        see the target.
+    """
+    began = time.monotonic()
+    mask = renderer.target_mask()
+    check_reference(reference, mask)
+    check_finite(reference.pixels, "The reference")
+    if reference.encoding is Encoding.SRGB:
+        view = display or DisplayView()
+    else:
+        view = DisplayView.for_scene(reference.pixels, mask)
+    return FitTask(
+        renderer=renderer,
+        reference=reference,
+        settings=settings,
+        display=display,
+        view=view,
+        mask=mask,
+        counted=counted_pixels(mask, settings),
+        light=linear_pixels(reference, view),
+        clipped=clipped_pixels(reference, view),
+        listener=listener,
+        should_stop=should_stop,
+        began=began,
+    )
+
+
+def linear_pixels(reference: Image, view: View) -> Pixels:
+    """Scene-linear values of a reference; those above a display's white are lost."""
+    if reference.encoding is Encoding.LINEAR:
+        return np.maximum(reference.pixels, 0.0)
+    assert isinstance(view, DisplayView | BakedView)
+    return view.linear(reference.pixels)
+
+
+def clipped_pixels(reference: Image, view: View) -> NDArray[np.float32] | None:
+    """1 where only a lower bound of the radiance is known, else 0; None for a linear reference."""
+    if reference.encoding is Encoding.LINEAR:
+        return None
+    top = view.top if isinstance(view, BakedView) else 1 - HALF_LEVEL
+    return (reference.pixels >= top).astype(np.float32)
