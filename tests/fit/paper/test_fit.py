@@ -78,10 +78,13 @@ def test_a_loss_whose_package_is_missing_is_refused_before_the_fit(sphere, truth
 
 def test_the_last_pictures_have_a_seed_and_samples_of_their_own(noisy_sphere, sphere, truth) -> None:
     outcome = fit(noisy_sphere, sphere.reference(truth), max_iterations=5, seed=3, spp=4, verify_spp=32)
-    *fitted, _, _, last = noisy_sphere.calls
+    *fitted, _, _, last, first_half, second_half = noisy_sphere.calls
     assert set(fitted) == {(3, 4)}
     assert last[0] != 3
     assert last[1] == 32
+    # two pictures of the result with numbers of their own say how far it is from the reference beyond the noise
+    assert len({0, last[0], first_half[0], second_half[0]}) == 4
+    assert first_half[1] == second_half[1] == 16
     vector = noisy_sphere.table.pack(outcome.result.recovered)
     np.testing.assert_array_equal(outcome.result_image, noisy_sphere.image(vector, seed=last[0], spp=last[1]))
 
