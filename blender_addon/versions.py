@@ -48,6 +48,19 @@ def cycles_settings(owner: Any) -> Any:
     return getattr(owner, "cycles", None)
 
 
+def shadow_terminator(item: bpy.types.Object) -> tuple[float, float]:
+    """Return Geometry Offset and Shading Offset: of the object from Blender 5.0 on, before of its Cycles settings.
+
+    Blender 5 still has those of Cycles, which change nothing any more (measured in 5.0 and 5.2).
+    """
+    if hasattr(item, "shadow_terminator_shading_offset"):
+        return item.shadow_terminator_geometry_offset, item.shadow_terminator_shading_offset
+    cycles = cycles_settings(item)
+    if cycles is None:
+        return 0.1, 0.0
+    return cycles.shadow_terminator_geometry_offset, cycles.shadow_terminator_offset
+
+
 def active_output(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
     """Return the output node that Cycles uses."""
     if tree is None:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..versions import cycles_settings, has_compositor, overrides_of
+from ..versions import cycles_settings, has_compositor, overrides_of, shadow_terminator
 from .findings import Findings, Fix
 from .material_model import Material
 from .mesh_arrays import CornerMesh, joined, world_mesh
@@ -20,7 +20,7 @@ from .read_material import read_context, read_target
 from .read_mesh import read_mesh
 from .read_world import read_world
 from .render_state import render_state, rendered_objects
-from .scene_data import TARGET_BSDF, TARGET_SHAPE, RenderSettings, SceneData, Shape
+from .scene_data import TARGET_BSDF, TARGET_SHAPE, RenderSettings, SceneData, Shape, Terminator
 from .visibility import check_visible
 
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -146,7 +146,12 @@ class _Walk:
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
         if self.target_pieces:
             meshes, closed = zip(*self.target_pieces, strict=True)
-            self.data.shapes.insert(0, Shape(TARGET_SHAPE, joined(meshes), TARGET_BSDF, all(closed)))
+            self.data.shapes.insert(
+                0,
+                Shape(
+                    TARGET_SHAPE, joined(meshes), TARGET_BSDF, all(closed), Terminator(*shadow_terminator(self.target))
+                ),
+            )
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
@@ -182,7 +187,8 @@ class _Walk:
                 self.target_pieces.append((piece, mesh.is_closed))
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
-            self.data.shapes.append(Shape(name, piece, self._bsdf(item, int(slot)), mesh.is_closed))
+            bsdf = self._bsdf(item, int(slot))
+            self.data.shapes.append(Shape(name, piece, bsdf, mesh.is_closed, Terminator(*shadow_terminator(item))))
 
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
         slots = item.material_slots

@@ -19,6 +19,14 @@ TARGET_BSDF = "target_bsdf"
 
 
 @dataclass(frozen=True)
+class Terminator:
+    """What Cycles does to shadows of smooth-shaded facets: Blender's Geometry Offset and Shading Offset, in [0, 1]."""
+
+    geometry_offset: float = 0.1
+    shading_offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class Shape:
     """One mesh with one material; `identifier` is its id in the scene file."""
 
@@ -26,6 +34,7 @@ class Shape:
     mesh: TriangleMesh
     bsdf: str
     is_closed: bool
+    terminator: Terminator = Terminator()
 
 
 @dataclass(frozen=True)

@@ -115,9 +115,19 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
         path = f"meshes/{identifier}.ply"
         files.meshes[path] = mesh
         element = add(plugin("shape", "ply", identifier), string("filename", path), reference(shape.bsdf))
+        add(element, *_terminator(shape))
         emitter = emission_element(material, scene.settings.exposure, files.texture)
         elements.append(element if emitter is None else add(element, emitter))
     return elements
+
+
+def _terminator(shape: Shape) -> list[Element]:
+    """What the backend reads about shadows of smooth facets (`mfo_backend/render/smooth_facets.py`)."""
+    numbers = {
+        "shadow_geometry_offset": shape.terminator.geometry_offset,
+        "shadow_shading_offset": shape.terminator.shading_offset,
+    }
+    return [add(plugin("texture", "uniform", name=name), scalar("value", v)) for name, v in numbers.items() if v > 0.0]
 
 
 def _hide_emitters(scene: SceneData, findings: Findings) -> bool:

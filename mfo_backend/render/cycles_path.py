@@ -2,8 +2,8 @@
 """The Mitsuba integrator `cycles_path`: a path tracer that treats indirect light as Cycles does.
 
 What differs from Mitsuba's `prb` is Filter Glossy, the clamping of indirect light, limits for one kind of bounce
-(Cycles 5.0: kernel/integrator/surface_shader.h, path_state.h, film/light_passes.h), and that rays meet lamps
-(`lamps.lamp`). Derivatives are those of path
+(Cycles 5.0: kernel/integrator/surface_shader.h, path_state.h, film/light_passes.h), that rays meet lamps
+(`lamps.lamp`), and where shadow rays start (`smooth_facets`). Derivatives are those of path
 replay (Vicini, Speierer, Jakob 2021, "Path Replay Backpropagation"), for materials only: lights and shapes are held.
 Choose the variant before importing this.
 """
@@ -22,6 +22,7 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 
 from ..types.light_paths import NO_LIMIT, LightPaths
 from .lamps.met_lamps import SceneLamps, alone
+from .smooth_facets import ShadowTerminator, sample_light, seen_side
 
 PLUGIN_NAME = "cycles_path"
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
@@ -58,7 +59,7 @@ class CyclesPath(RBIntegrator):
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out.
         """
         primal = mode == dr.ADMode.Primal
-        lamps = SceneLamps(scene)
+        lamps, terminator = SceneLamps(scene), ShadowTerminator.of(scene)
         context = mi.BSDFContext()
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
@@ -88,6 +89,7 @@ class CyclesPath(RBIntegrator):
                 behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
                 si[skip] = behind
             valid |= (bounce == 0) & si.is_valid()
+            si = seen_side(si)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), 0)
             bsdf = si.bsdf(ray)
 
@@ -105,8 +107,10 @@ class CyclesPath(RBIntegrator):
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
-            ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, goes_on)
+            ds, light = sample_light(scene, terminator, si, sampler.next_2d(), goes_on)
             lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            if dr.hint(terminator.bends, mode="scalar"):
+                light *= terminator.bend(si, si.to_local(ds.d), lit)
             with dr.resume_grad(when=not primal):
                 value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
                 weight = dr.detach(share(alone(ds), ds.pdf, chance))
@@ -114,6 +118,8 @@ class CyclesPath(RBIntegrator):
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
 
             bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
+            if dr.hint(terminator.bends, mode="scalar"):
+                ratio *= terminator.bend(si, bs.wo, goes_on)
             onward = si.spawn_ray(si.to_world(bs.wo))
             goes_on &= dr.any(throughput * ratio != 0)
 

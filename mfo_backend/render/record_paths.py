@@ -27,6 +27,7 @@ from .primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from .proposal import DefensiveProposal
 from .recorded_background import recorded_background
 from .recorded_paths import RecordedPaths
+from .smooth_facets import ShadowTerminator, seen_side
 from .traced_radiance import traced_radiance
 
 
@@ -105,7 +106,7 @@ def record_paths(
         If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
-        lamps = SceneLamps(scene)
+        lamps, terminator = SceneLamps(scene), ShadowTerminator.of(scene)
         if lamps and settings.light_paths is None:
             # so that paths over other surfaces know they are no camera's
             settings = replace(settings, light_paths=LightPaths())
@@ -141,10 +142,10 @@ def record_paths(
         dr.eval(si if sampled else (), position, filter_weight, held)
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels)
-        exact = [part for part in _delta_lights(scene, hits) if dr.width(part.position) > 0]
+        exact = [part for part in _delta_lights(scene, hits, terminator) if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
-            lanes += _sampled_lights(scene, hits, settings, lamps)
+            lanes += _sampled_lights(scene, hits, settings, lamps, terminator)
 
         covered, coverage = _coverage(pixels, position, filter_weight)
         constant = recorded_background(
@@ -196,11 +197,14 @@ def _without_parametrisation(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteracti
     bare = dr.zeros(mi.SurfaceInteraction3f, dr.width(si))
     bare.t, bare.time, bare.wavelengths = si.t, si.time, si.wavelengths
     bare.p, bare.n, bare.sh_frame, bare.wi = si.p, si.n, si.sh_frame, si.wi
+    bare.shape, bare.prim_index = si.shape, si.prim_index
     return bare
 
 
 def _facing(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
-    return _face_camera(si) if settings.two_sided or shape.bsdf().class_name() == "TwoSidedBRDF" else si
+    if settings.two_sided:
+        return _face_camera(seen_side(si))
+    return _face_camera(si) if shape.bsdf().class_name() == "TwoSidedBRDF" else si
 
 
 def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
@@ -211,7 +215,7 @@ def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     return si
 
 
-def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
+def _delta_lights(scene: mi.Scene, hits: _Hits, terminator: ShadowTerminator) -> list[_Lanes]:
     """One exact sample for each light of no extent."""
     si = hits.si
     started = []
@@ -221,12 +225,14 @@ def _delta_lights(scene: mi.Scene, hits: _Hits) -> list[_Lanes]:
         ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
         wo = si.to_local(ds.d)
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
-        lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), True, lit)
-        started.append(_lit(hits, wo, value * hits.share, lit))
+        lit &= ~scene.ray_test(terminator.ray(si, ds, lit), True, lit)
+        started.append(_lit(hits, wo, value * (hits.share * terminator.bend(si, wo, lit)), lit))
     return [kept() for kept in started]
 
 
-def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps) -> list[_Lanes]:
+def _sampled_lights(
+    scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps, terminator: ShadowTerminator
+) -> list[_Lanes]:
     """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
     everywhere = list(scene.emitters())
     extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
@@ -260,10 +266,10 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
         ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
-        lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
+        lit &= ~scene.ray_test(terminator.ray(si, ds, lit), lit)
         light_density = ds.pdf * choice
         mis = light_density / (light_density + proposal.density(si.wi, wo))
-        started.append(_lit(hits, wo, value * (share * mis / choice), lit))
+        started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
 
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u))
@@ -289,6 +295,7 @@ def _sampled_lights(scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamp
             total = dr.gather(mi.Color3f, weight, index) + _over_others(scene, some, met, towards, settings)
             dr.scatter(weight, total, index, mode=dr.ReduceMode.Permute)
     # the share may be negative, where the pixel filter is
+    share *= terminator.bend(si, wo, valid)
     started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
     return [kept() for kept in started]
 

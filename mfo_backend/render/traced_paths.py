@@ -33,6 +33,7 @@ from ..types.parameter import ParameterTable
 from .lamps.met_lamps import SceneLamps, alone
 from .mitsuba_renderer import MitsubaRenderer
 from .primary_rays import camera_ray, through_filter
+from .smooth_facets import ShadowTerminator, sample_light, seen_side
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
@@ -106,7 +107,7 @@ class TracedPaths:
         if self._hide and renderer.shape.is_emitter():
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self._light_paths = renderer.light_paths
-        self._lamps = SceneLamps(scene)
+        self._lamps, self._terminator = SceneLamps(scene), ShadowTerminator.of(scene)
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
 
@@ -199,7 +200,7 @@ class TracedPaths:
 
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
-            si = scene.ray_intersect(ray, active)
+            si = seen_side(scene.ray_intersect(ray, active))
             blur = self._blur(s)
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
@@ -221,7 +222,7 @@ class TracedPaths:
                 total = [t + b * shine for t, b in zip(total, beta, strict=True)]
             active = active & si.is_valid() & (s["left"] > 1)
             # light sampled from here
-            ds, value = scene.sample_emitter_direction(si, rng.pair(2 + 3 * depth), True, active)
+            ds, value = sample_light(scene, self._terminator, si, rng.pair(2 + 3 * depth), active)
             wo = si.to_local(ds.d)
             lit = active & (ds.pdf > 0.0)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
@@ -240,6 +241,9 @@ class TracedPaths:
                 pdf_next = dr.select(off, bs.pdf, pdf_next)
                 local = dr.select(off, bs.wo, local)
                 kind = dr.select(off, bs.sampled_type, kind)
+            value *= self._terminator.bend(si, wo, lit)
+            bend = self._terminator.bend(si, local, active)
+            f_next = [f * bend for f in f_next]
             weight = value * dr.select(alone(ds), 1.0, self._share(ds.pdf, pdf_light))
             weight = dr.select(lit, weight, 0.0)
             weight *= self._clamp(beta[0] * f_light[0] * weight, depth >= 1)

@@ -25,6 +25,7 @@ collect_ignore = (
         "test_light_levels.py",
         "test_materials.py",
         "test_reference.py",
+        "test_smooth_facets.py",
         "test_untouched.py",
         "test_view_lut.py",
         "test_world.py",
