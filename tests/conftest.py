@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import os
 
-# as the `mfo` command does, before NumPy reads it: its threads wait for each other where a machine is busy
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import pytest
 from hypothesis import HealthCheck, settings
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import os
 import re
 import subprocess
 import sys
@@ -58,3 +60,39 @@ def test_importing_the_backend_is_quick_and_light() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_numpy_computes_with_one_thread_under_plain_pytest_in_a_study_and_in_the_command(tmp_path: Path) -> None:
+    """With more threads the order of its sums, and with it the end of a fit of glass, depends on the machine."""
+    seen = tmp_path / "seen"
+    hook = (
+        "import importlib.abc, os, pathlib, sys\n"
+        "class Hook(importlib.abc.MetaPathFinder):\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name == 'numpy':\n"
+        f"            pathlib.Path({str(seen)!r}).write_text(os.environ.get('OPENBLAS_NUM_THREADS', 'not set'))\n"
+        "sys.meta_path.insert(0, Hook())\n"
+    )
+    (tmp_path / "sitecustomize.py").write_text(hook)
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(ROOT)])
+    starts = [
+        ["pytest", "tests/solve/test_leverage.py", "-q", "-p", "no:cacheprovider"],
+        ["studies.cost.solver_yardstick", "--help"],
+        ["mfo_backend", "compare", "--help"],
+    ]
+    for words in starts:
+        command = [sys.executable, "-m", *words]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, check=False)
+        assert done.returncode == 0, done.stderr
+        assert seen.read_text() == "1", words
+        seen.unlink()
+
+
+def test_the_quick_tests_exist() -> None:
+    spec = importlib.util.spec_from_file_location("dev", ROOT / "dev.py")
+    assert spec is not None
+    assert spec.loader is not None
+    dev = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(dev)
+    assert [path for path in dev.QUICK if not (ROOT / path).exists()] == []

@@ -6,13 +6,13 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
 from .. import __version__
+from .. import one_blas_thread as one_blas_thread
 from ..render.cache_folder import use_kernel_cache
 from ..types.errors import MfoError
 from ..types.status import Status
@@ -34,8 +34,6 @@ _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not install
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    # NumPy's own threads would fight with Dr.Jit's; read when NumPy is first imported
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     use_kernel_cache()
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:

@@ -231,7 +231,6 @@ def phases_of(job: Path) -> dict[str, Any]:
     stages = Stages()
     import io
 
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from mfo_backend.render.llvm import configure_llvm, needs_llvm
 
     with stages.within("variant"):

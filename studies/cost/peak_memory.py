@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import resource
 import subprocess
 import sys
@@ -19,12 +18,9 @@ import tempfile
 import time
 from pathlib import Path
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")  # as the `mfo` command does, before NumPy reads it
+import numpy as np
 
-import numpy as np  # noqa: E402
-
-from studies.recovery.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene  # noqa: E402
+from studies.recovery.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 

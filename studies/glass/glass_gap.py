@@ -12,7 +12,6 @@ of the result and of what the reference shows, so no noise of the reference is i
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,12 +19,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")  # as the `mfo` command does, before NumPy reads it
+import numpy as np
 
-import numpy as np  # noqa: E402
-
-from studies.recovery.scene_fit import fit_to, open_bench_scene, true_vector, write_bench_scene  # noqa: E402
+from studies.recovery.scene_fit import fit_to, open_bench_scene, true_vector, write_bench_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 

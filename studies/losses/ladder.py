@@ -17,10 +17,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[variable] = "1"  # read once, when the libraries load; pictures this small gain nothing from more
+os.environ["OMP_NUM_THREADS"] = "1"  # of PyTorch, read when it loads; pictures this small gain nothing from more
 
-from studies.losses.ladder_report import plot, table, write_between_markers  # noqa: E402
+from studies.losses.ladder_report import plot, table, write_between_markers
 
 ROOT = Path(__file__).resolve().parents[2]
 
