@@ -3,7 +3,8 @@
 """Set up and use a checkout of Material Fit with nothing but Python 3.11.
 
     python3 dev.py demo       recover a material from a Cycles render, end to end
-    python3 dev.py test       check and test everything; test --bpy 4.2 (or 4.5): the add-on with another bpy module
+    python3 dev.py test       check and test everything; test --quick: what has no fit and no Blender, in a minute;
+                              test --bpy 4.2 (or 4.5): the add-on with another bpy module
     python3 dev.py mfo ...    the `mfo` command of this checkout
     python3 dev.py package    build the extension zip and a static extension repository into dist/
     python3 dev.py lock       resolve the dependencies again and rewrite requirements/*.lock
@@ -42,6 +43,16 @@ BPY_PACKAGES = [
     "libice6",
     "libgl1",
     "libegl1",
+]
+
+
+# `test --quick`: the folders and files whose tests neither fit a material nor start or import Blender
+QUICK = [
+    *(f"tests/{folder}" for folder in ("types", "scene", "solve", "metrics", "report", "tools")),
+    *(f"tests/material/test_{name}.py" for name in ("tables", "grid_table", "properties", "dual")),
+    *("tests/bench/rows", "tests/bench/report", "tests/bench/judge"),
+    *("tests/job/test_request.py", "tests/job/test_worker_process.py"),
+    *("tests/test_import_arrows.py", "tests/test_repository.py"),
 ]
 
 
@@ -216,7 +227,7 @@ def test_other_bpy(release: str, arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Lint, type-check and test; with arguments only pytest, which gets them."""
+    """Lint, type-check and test; with other arguments than the two of its own only pytest, which gets them."""
     if arguments[:1] == ["--bpy"]:
         return test_other_bpy(arguments[1] if len(arguments) > 1 else "", arguments[2:])
     python = str(venv_program("python"))
@@ -224,6 +235,8 @@ def test(arguments: list[str]) -> int:
     # tests of a file share fixtures.
     two_at_a_time = ["-n", "2", "--dist", "loadfile"]
     checks = [["ruff", "check"], ["ruff", "format", "--check"], ["basedpyright"]]
+    if arguments[:1] == ["--quick"]:
+        arguments = [*QUICK, *two_at_a_time, *arguments[1:]]
     commands = [] if arguments else [[python, "-m", *check] for check in checks]
     codes = [subprocess.run(command, cwd=ROOT).returncode for command in commands]
     codes.append(subprocess.run([python, "-m", "pytest", *(arguments or two_at_a_time)], cwd=ROOT).returncode)

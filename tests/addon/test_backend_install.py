@@ -83,7 +83,10 @@ def test_a_wheel_with_another_hash_is_refused_and_nothing_stays(folder: Path, wh
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such groups")
-def test_cancel_ends_the_whole_group_and_removes_the_environment(folder: Path, wheels: tuple[str, Path]) -> None:
+def test_cancel_ends_the_whole_group_and_removes_the_environment(
+    folder: Path, wheels: tuple[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backend_install, "CANCEL_GRACE", 3600.0)  # it ends by itself, nobody kills it
     source, lock = wheels
     install = BackendInstall(folder, BASE, source, lock)
     end = time.monotonic() + 30
@@ -92,9 +95,7 @@ def test_cancel_ends_the_whole_group_and_removes_the_environment(folder: Path, w
         time.sleep(0.01)
     install.cancel()
     assert install.step == "Cancelling"
-    began = time.monotonic()
     outcome = finished(install).outcome
-    assert time.monotonic() - began < 4  # less than the grace after which it would be killed
     assert outcome is not None
     assert (outcome.status, outcome.sentence) == ("cancelled", "Cancelled; nothing was installed.")
     assert not list(folder.glob("env-*"))

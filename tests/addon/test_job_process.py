@@ -176,20 +176,19 @@ def test_a_flood_keeps_the_newest_progress_and_little_memory(start: Start) -> No
             assert len(process._events) <= job_process.QUEUE_LIMIT
         process._check_end()
         time.sleep(0.01)
-    started = time.perf_counter()
     events = process.poll()
-    assert time.perf_counter() - started < 0.05  # one tick of the panel; measured well below a millisecond
+    assert len(events) <= job_process.QUEUE_LIMIT + 1  # what one tick of the panel has to look at
     assert events[-1] == {"event": "progress", "iteration": 19999, "padding": "x" * 200}
     assert process.outcome.status == "stale"
 
 
 def test_poll_does_not_wait_for_a_silent_worker(start: Start) -> None:
-    process = start("say(event='started'); time.sleep(60)")
+    process = start("say(event='started'); wait_for_cancel(); say(event='finished', status='cancelled', sentence='ok')")
     wait_for(process, "started")
-    began = time.perf_counter()
-    assert process.poll() == []
-    assert time.perf_counter() - began < 0.05
+    assert process.poll() == []  # a poll that waited would stay here: the worker is silent until it is asked to stop
     assert process.outcome is None
+    process.cancel()
+    assert [event["event"] for event in drain(process)] == ["finished"]
 
 
 def test_cancel_keeps_what_the_backend_says(start: Start) -> None:
@@ -262,13 +261,14 @@ def test_a_worker_that_hangs_after_its_last_event_is_ended(start: Start, monkeyp
 def test_a_grandchild_that_holds_the_pipe_does_not_hold_us(start: Start) -> None:
     process = start("""
         import subprocess
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(4)"])
+        wait = "import os, time\\nwhile not os.path.exists('let go'): time.sleep(0.01)"
+        child = subprocess.Popen([sys.executable, "-c", wait])
         say(event="finished", status="stale", sentence="ok")
     """)
-    began = time.monotonic()
     drain(process)
-    assert time.monotonic() - began < 3.5
     assert process.outcome == job_process.Outcome("stale", "ok")
+    assert process._reader.is_alive()  # the grandchild holds the pipe still
+    (process.folder.parent / "let go").touch()
     process._reader.join(10)
     process._process.stdout.close()  # type: ignore[union-attr]
 

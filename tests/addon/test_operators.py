@@ -195,6 +195,7 @@ def step_until(scene: SimpleNamespace, done) -> None:
 
 
 def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("blender_addon.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
     monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
     assert fit(scene, wait=False) == {"FINISHED"}
     assert not scene.bpy.ops.mfo.fit.poll()
@@ -202,9 +203,7 @@ def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytes
     assert "Stage 1/2" in runtime(scene).progress_text
     assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
     assert not scene.bpy.ops.mfo.cancel.poll()
-    began = time.monotonic()
     step_until(scene, lambda: runtime(scene).state != "CANCELLING")
-    assert time.monotonic() - began < 3  # the fake answers after its current pause of 1.5 s
     assert runtime(scene).has_result
     assert "best values so far" in runtime(scene).sentence
     assert scene.bpy.ops.mfo.apply() == {"FINISHED"}

@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -110,12 +109,12 @@ def test_two_blenders_choose_two_folders(scene: SimpleNamespace, monkeypatch: py
 def test_two_blenders_at_once(scene: SimpleNamespace, tmp_path: Path) -> None:
     """Same material, same default folder, about the same time: two jobs, two results."""
     png(tmp_path / "reference.png", (180, 60, 40), WIDTH, HEIGHT)
-    start = time.time() + 8  # both have started by then, even on a busy machine most of the time
     code = (
-        "import bpy, os, sys, tempfile, time, blender_addon; blender_addon.register();"
+        "import bpy, os, pathlib, sys, tempfile, time, blender_addon; blender_addon.register();"
         f"tempfile.tempdir = {str(tmp_path)!r}; bpy.context.scene.view_settings.view_transform = 'Standard';"
         f"bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = {WIDTH}, {HEIGHT};"
-        f"time.sleep(max(0, {start} - time.time()));"
+        f"folder = pathlib.Path({str(tmp_path)!r}); (folder / f'ready{{os.getpid()}}').touch()\n"
+        "while len(list(folder.glob('ready*'))) < 2: time.sleep(0.01)\n"
         f"assert bpy.ops.mfo.fit(reference={str(tmp_path / 'reference.png')!r}) == {{'FINISHED'}};"
         "assert bpy.ops.mfo.apply() == {'FINISHED'};"
         "print(bpy.context.window_manager.mfo_runtime.job_folder, flush=True); os._exit(0)"

@@ -18,11 +18,11 @@ from mfo_backend.solve.stopping import StoppingRules
 from mfo_backend.types.parameter import Parameter, ParameterTable
 from mfo_backend.types.status import Status
 
-SOON = 0.9  # seconds; the thread gives up after 0.35, the rest is for a busy machine
+NEVER = 3600.0  # seconds that no test waits for: a call that is not given up runs into the time limit of its test
 
 
 class Grey:
-    """A picture of one grey pixel; the call number `slow` takes a minute."""
+    """A picture of one grey pixel; the call number `slow` takes an hour."""
 
     model = "grey"
     table = ParameterTable([Parameter("grey", 1, 0.0, 1.0, 0.5)])
@@ -54,7 +54,7 @@ class Grey:
     def wait(self, where: str) -> None:
         if self.calls == self.slow and where == self.where:
             self.asked.set()  # someone cancels now
-            time.sleep(60)
+            time.sleep(NEVER)
 
 
 def test_the_thread_ends_with_its_last_user() -> None:
@@ -79,10 +79,8 @@ def test_work_that_is_nearly_done_may_finish() -> None:
 
 
 def test_work_that_does_not_return_is_abandoned() -> None:
-    began = time.monotonic()
     with pytest.raises(Interrupted):
-        NativeThread(lambda: True).call(lambda: time.sleep(60))
-    assert time.monotonic() - began < SOON
+        NativeThread(lambda: True).call(lambda: time.sleep(NEVER))
 
 
 def test_a_renderer_is_the_same_on_its_thread() -> None:
@@ -102,7 +100,6 @@ def test_a_stage_keeps_its_best_values_when_interrupted(where: str) -> None:
     grey = Grey(slow=5, where=where)
     renderer = InterruptibleRenderer(grey, NativeThread(grey.asked.is_set))
     steps = []
-    began = time.monotonic()
     outcome = run_stage(
         renderer,
         lambda image: (float(np.square(image).mean()), 2 * image / image.size),
@@ -115,7 +112,6 @@ def test_a_stage_keeps_its_best_values_when_interrupted(where: str) -> None:
         on_step=steps.append,
         should_stop=grey.asked.is_set,
     )
-    assert time.monotonic() - began < SOON
     assert outcome.status is Status.CANCELLED
     assert len(steps) == (4 if where == "image" else 5)
     assert outcome.loss_best == min(step.loss for step in steps)

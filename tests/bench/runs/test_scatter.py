@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from dataclasses import replace
 
 import pytest
@@ -93,11 +92,9 @@ def test_jobs_run_on_workers_too(tmp_path, client):
 
 
 def test_no_scheduler_is_said_in_one_sentence(monkeypatch):
-    monkeypatch.setattr("mfo_backend.job.cluster._CONNECT_SECONDS", 1)
-    began = time.monotonic()
+    monkeypatch.setattr("mfo_backend.job.cluster._CONNECT_SECONDS", 0.2)
     with pytest.raises(BadInputError, match="No Dask scheduler answers"), open_client("tcp://127.0.0.1:1", 0):
         pass
-    assert time.monotonic() - began < 10
 
 
 class Dropped:
