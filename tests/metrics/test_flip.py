@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import flip_evaluator as oracle
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ import pytest
 from mfo_backend.metrics.colour import linear_from_srgb
 from mfo_backend.metrics.exposure_range import ExposureRange, lit_exposures, official_exposures
 from mfo_backend.metrics.flip import flip_map, planes_of
+from mfo_backend.metrics.flip_difference import FlipDifference
+from mfo_backend.metrics.flip_features import Perceived
 from mfo_backend.metrics.flip_reference import FlipReference
 from mfo_backend.metrics.hdr_flip import HdrFlip, hdr_flip_map
 from mfo_backend.metrics.tone_curve import ToneCurve
@@ -200,3 +204,12 @@ def test_pixels_without_a_meaning_are_refused(metric, reference, test, sentence)
 def test_bad_options_are_refused(make, sentence):
     with pytest.raises(BadInputError, match=sentence):
         make()
+
+
+def test_a_feature_that_rounding_lifts_above_its_largest_has_a_finite_error():
+    """An edge of sqrt(2) and one unit in the last place, on equal colours: 0 to less than 0 would be infinite."""
+    flat, colours = np.zeros((1, 1), np.float32), np.zeros((3, 1, 1), np.float32)
+    edge = np.full((1, 1), np.nextafter(np.float32(np.sqrt(2.0)), np.float32(2.0)), np.float32)
+    test = SimpleNamespace(perceived=Perceived(colours, edge, flat))
+    difference = FlipDifference(Perceived(colours, flat, flat), test)
+    assert difference.error[0, 0] == 1.0

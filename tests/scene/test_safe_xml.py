@@ -60,3 +60,11 @@ def test_a_name_that_the_system_cannot_look_up(tmp_path: Path) -> None:
     path = tmp_path / "scene.xml"
     path.write_text(f'<scene><string name="filename" value="{"a" * 5000}"/></scene>')
     assert len(read_scene(path)[0].get("value", "")) == 5000
+
+
+def test_elements_beside_each_other_are_not_deep(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text("<scene>" + "<bsdf><string/></bsdf>" * 3 * DEEPEST + "</scene>")
+    assert len(parse_xml(path)) == 3 * DEEPEST
+    path.write_text("<a>" * DEEPEST + "</a>" * DEEPEST)
+    assert parse_xml(path).tag == "a"

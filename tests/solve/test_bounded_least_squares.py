@@ -175,3 +175,15 @@ def test_the_quadratic_promises_the_least_cost_in_the_box(seed):
     step, rise = step_in_box(here, x, lower, upper)
     np.testing.assert_allclose(x + step, [0.3, *free.x], atol=1e-7)
     assert here.cost + rise == pytest.approx(free.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("rise", [1.0, 1e-2, 1e-6])
+def test_a_step_that_raises_the_cost_is_not_taken(rise):
+    """The quadratic promises a hundredth; every trial is higher than the start by `rise`."""
+
+    def uphill(x: np.ndarray) -> NormalEquations:
+        return NormalEquations(1.0 + rise * float(x[0] != 0.0), np.array([-0.02]), np.array([[0.02]]))
+
+    solution = solve_bounded(uphill, np.zeros(1), -np.ones(1), 2.0 * np.ones(1), SolveLimits(evaluations=6))
+    assert len(solution.costs) == 6
+    assert (solution.x[0], solution.equations.cost) == (0.0, 1.0)
