@@ -49,7 +49,7 @@ def test_locks_have_hashes_and_no_addresses(path: Path) -> None:
 
 
 def test_readme_is_short() -> None:
-    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) < 120
+    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) < 100
 
 
 def test_importing_the_backend_is_quick_and_light() -> None:

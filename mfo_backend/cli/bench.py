@@ -49,7 +49,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     report = actions.add_parser("report", help="print and write the report of a bench folder")
     report.add_argument("folder", type=Path, metavar="DIR", help="folder of a bench")
     report.add_argument("--note", action="append", default=[], help="a remark for the report, such as a busy machine")
-    page = "a Markdown page whose block `<!-- bench -->` gets the short table; again for more"
+    page = "a Markdown page whose blocks, such as `<!-- bench -->`, get their tables; again for more"
     report.add_argument("--page", type=Path, action="append", default=[], metavar="FILE", help=page)
     report.set_defaults(func=run_report)
     add_judge_parser(actions)

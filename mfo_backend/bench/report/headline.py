@@ -4,15 +4,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ..rows.findings import against_the_loop, promises
 from ..rows.row import Row
-from ..rows.summary import SOLVED_FLIP, comparable_seconds, quantile, summaries
+from ..rows.summary import SOLVED_FLIP, comparable_seconds, error_of, grouped, is_at_noise, quantile
 from .table import Table, number
 
 OURS, PAPERS = "balanced", "mfo-hdr"
-_BLOCK = re.compile(r"(<!-- (bench|bench loop|bench promises) -->\n).*?(<!-- end -->)", re.DOTALL)
+# What a reader of the README asks about, and the scenarios that answer; together they are all of them
+KINDS = {
+    "a lamp, no noise": ("base", "parameters"),
+    "a light probe, 4 samples a pixel": ("noise",),
+    "a light probe, 64 samples a pixel": ("relighting", "objects"),
+    "glass": ("transparency", "transparency_4spp"),
+    "rendered by Cycles": ("cycles",),
+    "measured materials": ("measured",),
+}
+_BLOCK = re.compile(r"(<!-- (bench|bench short|bench loop|bench promises) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def headline(rows: Sequence[Row]) -> Table:
@@ -20,22 +29,35 @@ def headline(rows: Sequence[Row]) -> Table:
 
     The last column is the median, over the scenes that both have, of the loop's time over the preset's.
     """
+    scenarios = dict.fromkeys(scenario for scenario, _ in grouped(rows))
+    return _compared({f"`{name}`": [row for row in rows if row.scenario == name] for name in scenarios}, rows)
+
+
+def short(rows: Sequence[Row]) -> Table:
+    """The same per kind of picture, on the scenes that both have; kinds without any are left out."""
+    scenes = [{(row.scenario, row.scene) for row in rows if row.method == method} for method in (OURS, PAPERS)]
+    both = scenes[0] & scenes[1]
+    kinds = {
+        kind: [row for row in rows if row.scenario in scenarios and (row.scenario, row.scene) in both]
+        for kind, scenarios in KINDS.items()
+    }
+    return _compared({kind: found for kind, found in kinds.items() if found}, rows)
+
+
+def _compared(groups: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> Table:
+    """A line for each group; `rows` are all there are, which say what seconds are compared."""
     time_name, seconds_of = comparable_seconds(rows)
-    found = {(summary.scenario, summary.method): summary for summary in summaries(rows)}
     lines = []
-    for scenario in dict.fromkeys(scenario for scenario, _ in found):
-        line = [f"`{scenario}`"]
+    for label, group in groups.items():
+        line = [label]
         for method in (OURS, PAPERS):
-            mine = [row for row in rows if (row.scenario, row.method) == (scenario, method)]
-            if not mine:
-                line += ["–"] * 4
-                continue
-            summary = found[scenario, method]
+            mine = [row for row in group if row.method == method]
+            flips = [error_of(row.flip) for row in mine]
             times = [time for time in map(seconds_of, mine) if time is not None]
-            line += [f"{summary.solved} of {summary.runs}", str(summary.at_noise)]
-            line += [number(summary.flip[1]), number(quantile(times, 0.5))]
-        ratios = _ratios([row for row in rows if row.scenario == scenario], seconds_of)
-        lines.append([*line, number(quantile(ratios, 0.5))])
+            solved = f"{sum(flip <= SOLVED_FLIP for flip in flips)} of {len(mine)}"
+            found = [solved, str(sum(map(is_at_noise, mine))), *(number(quantile(v, 0.5)) for v in (flips, times))]
+            line += found if mine else ["–"] * len(found)
+        lines.append([*line, number(quantile(_ratios(group, seconds_of), 0.5))])
     unit = "CPU s" if time_name.startswith("processor") else "s"
     heads = [
         f"{who}{what}" for who in (f"`{OURS}`: ", "paper's loop: ") for what in ("solved", "at the noise", "FLIP", unit)
@@ -51,18 +73,19 @@ def has_block(page: str) -> bool:
 def fill(page: str, rows: Sequence[Row]) -> str:
     """The page with everything in its blocks made anew; unchanged without them.
 
-    A block goes from ``<!-- bench -->`` to ``<!-- end -->`` and has the short table; from ``<!-- bench loop -->`` it
-    has `against_the_loop`, from ``<!-- bench promises -->`` what `promises` says of the default preset.
+    A block goes from ``<!-- bench -->`` to ``<!-- end -->`` and has the `headline`; from ``<!-- bench short -->`` it
+    has the `short` table, from ``<!-- bench loop -->`` `against_the_loop`, from ``<!-- bench promises -->`` what
+    `promises` says of the default preset.
     """
     return _BLOCK.sub(lambda found: f"{found[1]}{_text(found[2], rows)}{found[3]}", page)
 
 
 def _text(name: str, rows: Sequence[Row]) -> str:
-    if name == "bench":
-        table: Table | None = headline(rows)
+    if name in ("bench", "bench short"):
+        table: Table | None = headline(rows) if name == "bench" else short(rows)
         below = (
-            f"\nSolved: mean FLIP over the object of at most {SOLVED_FLIP:g}; at the noise: the result is at most "
-            f"{SOLVED_FLIP:g} further from the reference than the truth is. FLIP and time are medians.\n"
+            f"\nSolved: mean FLIP over the object of at most {SOLVED_FLIP:g}. At the noise: the result is at most "
+            f"{SOLVED_FLIP:g} further from the reference\nthan the truth is. FLIP and time are medians.\n"
         )
     else:
         table = against_the_loop(rows) if name == "bench loop" else promises([r for r in rows if r.method == OURS])
@@ -71,6 +94,6 @@ def _text(name: str, rows: Sequence[Row]) -> str:
 
 
 def _ratios(rows: Sequence[Row], seconds_of: Callable[[Row], float | None]) -> list[float]:
-    times = {(row.method, row.scene): seconds_of(row) for row in rows}
-    pairs = [(times.get((OURS, row.scene)), seconds_of(row)) for row in rows if row.method == PAPERS]
+    times = {(row.scenario, row.scene): seconds_of(row) for row in rows if row.method == OURS}
+    pairs = [(times.get((row.scenario, row.scene)), seconds_of(row)) for row in rows if row.method == PAPERS]
     return [theirs / ours for ours, theirs in pairs if ours and theirs]

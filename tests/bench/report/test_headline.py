@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from mfo_backend.bench.report.headline import fill, has_block, headline
+from mfo_backend.bench.report.headline import KINDS, fill, has_block, headline, short
 from mfo_backend.bench.rows.row import Task
 from mfo_backend.bench.rows.row_file import RowFile
+from mfo_backend.bench.scenes.scenario import SCENARIOS
 from mfo_backend.cli.main import main
 
 from ..made_up_rows import row
@@ -31,6 +32,23 @@ def test_the_loop_is_compared_on_common_scenes() -> None:
         ["`base`", "3 of 3", "3", "0.01", "2", "1 of 2", "2", "0.255", "50", "25"],  # 80 / 2 and 20 / 2
         ["`noise`", "0 of 1", "1", "0.03", "4", "0 of 1", "1", "–", "–", "–"],
     ]
+
+
+def test_the_short_table_has_kinds_of_pictures_on_common_scenes() -> None:
+    rows = [
+        *ROWS,  # scene 1 of base is not the loop's
+        row(Task("parameters", 0, "balanced"), flip=0.03, processor_seconds=4.0),
+        row(Task("parameters", 0, "mfo-hdr"), flip=0.015, processor_seconds=24.0),
+    ]
+    assert list(short(rows).rows) == [
+        # a scene of the same number in another scenario is another scene: 80 / 2, 20 / 2 and 24 / 4
+        ["a lamp, no noise", "2 of 3", "3", "0.01", "2", "2 of 3", "3", "0.015", "24", "10"],
+        ["a light probe, 4 samples a pixel", "0 of 1", "1", "0.03", "4", "0 of 1", "1", "–", "–", "–"],
+    ]
+
+
+def test_the_kinds_leave_no_scenario_out() -> None:
+    assert sorted(name for names in KINDS.values() for name in names) == sorted(SCENARIOS)
 
 
 def test_only_the_block_changes() -> None:
@@ -78,5 +96,5 @@ def test_the_command_fills_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize("page", ["README.md", "docs/bench/README.md"])
 def test_pages_hold_the_committed_rows(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
-    assert "<!-- bench -->" in text
+    assert has_block(text)
     assert fill(text, RowFile(ROOT / "docs/bench/full").read()) == text
