@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     comparison = compare_images(reference, test, mask=mask, display=display)
     judgement = judge_images(reference, test, display=display)
     metrics = {**comparison.metrics, "jod": judgement.jod, "hdrvdp3_q_jod": judgement.hdrvdp3_q_jod}
-    notes = [*comparison.notes, *judgement.notes]
+    notes = [*reference.notes, *test.notes, *comparison.notes, *judgement.notes]
     pictures = {} if arguments.out is None else _write_maps(arguments.out, comparison)
     if arguments.json:
         content = {"metrics": metrics, "judges": judgement.conditions, "pictures": pictures, "notes": notes}

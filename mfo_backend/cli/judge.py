@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     write_atomically(folder.pictures / f"{name}.png", png_bytes(displayed(picture, view)))
     write_atomically(folder.pictures / f"{name}_difference.png", png_bytes(magma(comparison.maps["flip"])))
     if arguments.json:
-        print(json.dumps({"status": "ok", "metrics": comparison.metrics, "notes": list(comparison.notes)}))
+        print(json.dumps({"status": "ok", "metrics": comparison.metrics, "notes": [*picture.notes, *comparison.notes]}))
         return 0
     for metric, value in comparison.metrics.items():
         print(f"{metric:13} {'-' if value is None else f'{value:.6g}':>12}")

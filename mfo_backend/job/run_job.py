@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from dataclasses import replace
 from pathlib import Path
 
 from ..render.memory import require_memory
@@ -83,7 +84,7 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
     small = LivePictures(reference, view)
     events.attach(folder, small.current, small.difference)
 
-    said = (*request.notes, *notes)
+    said = tuple(dict.fromkeys((*request.notes, *notes)))  # the export may have said the same of the reference
 
     def listener(event: Event) -> None:
         if isinstance(event, BestValues):
@@ -110,7 +111,7 @@ def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[st
     """
     path = folder.file(request.reference, what="request.json: reference.path")
     image = read_image(path, (request.width, request.height))
-    return check_reference(Image(image.pixels, request.encoding, image.alpha), request.width, request.height)
+    return check_reference(replace(image, encoding=request.encoding), request.width, request.height)
 
 
 def _fail(events: EventWriter, status: Status, sentence: str) -> Status:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
+from .colour_space import convert, to_rec709
 from .picture_size import Size, check_declared_size
 
 MAX_SAMPLES = 2**30  # of all channels and parts, which the package reads together; ZIP makes a thousandth of zeros
@@ -29,7 +30,7 @@ def read_exr(path: Path, size: Size | None = None) -> Image:
     Raises
     ------
     BadInputError
-        If the file cannot be read, declares too large a size or holds no colour.
+        If the file cannot be read, declares too large a size, holds no colour or one of an unknown space.
     """
     import OpenEXR
 
@@ -38,16 +39,26 @@ def read_exr(path: Path, size: Size | None = None) -> Image:
     index, colour, alpha = _choose(path, names)
     check_declared_size(path.name, _size(headers[index], "displayWindow"), size)
     _check_channels(path, headers[index], [*colour, *([alpha] if alpha else [])])
+    # what holds for all parts may stand in the first alone
+    matrix, space = to_rec709(path.name, {**headers[0], **headers[index]})
     try:
         # the package prints what is wrong with a damaged file on stdout, which belongs to our caller
         with contextlib.redirect_stdout(io.StringIO()):
             channels = OpenEXR.File(str(path), separate_channels=True).channels(index)
+        _refuse_integers(path, [channels[name] for name in colour])
         planes = [_in_display_window(channels[name].pixels, headers[index]) for name in colour]
         coverage = _in_display_window(channels[alpha].pixels, headers[index]) if alpha else None
+    except BadInputError:
+        raise
     except Exception as error:  # also when only some scan lines are there: the part is then missing
         raise _damaged(path) from error
-    pixels = np.stack(planes * 3 if len(planes) == 1 else planes, axis=-1)
-    return Image(np.ascontiguousarray(pixels, np.float32), Encoding.LINEAR, coverage)
+    if len(planes) == 1:  # a grey, which is one in every colour space
+        return Image(np.repeat(planes[0][..., None], 3, axis=-1), Encoding.LINEAR, coverage)
+    pixels = np.stack(planes, axis=-1)
+    if matrix is None:
+        return Image(pixels, Encoding.LINEAR, coverage)
+    converted, note = convert(pixels, matrix, path.name, space)
+    return Image(converted, Encoding.LINEAR, coverage, (note,))
 
 
 def check_exr(path: Path) -> list[dict[str, Any]]:
@@ -144,12 +155,18 @@ def _check_channels(path: Path, header: dict[str, Any], names: list[str]) -> Non
             raise BadInputError(f"Image {path.name!r} has subsampled channels: export it with full resolution RGB.")
 
 
+def _refuse_integers(path: Path, channels: list[Any]) -> None:
+    """Here and not by the header: the package does not tell a channel's type before its pixels are read."""
+    if any(channel.pixels.dtype.kind != "f" for channel in channels):
+        raise BadInputError(
+            f"Image {path.name!r} holds 32-bit integers, which are no radiance: export it with half or float channels."
+        )
+
+
 def _in_display_window(plane: NDArray, header: dict[str, Any]) -> Pixels:
     """The plane of the data window cut or padded with black to the display window."""
     left, top, right, bottom = _window(header, "displayWindow")
     data_left, data_top, data_right, data_bottom = _window(header, "dataWindow")
-    if plane.dtype.kind != "f":
-        raise ValueError(f"channel holds {plane.dtype}")
     plane = plane.astype(np.float32)
     if (left, top, right, bottom) == (data_left, data_top, data_right, data_bottom):
         return plane

@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image
+from .colour_space import convert, to_rec709
 from .picture_size import Size, check_declared_size
 
-_SIZE = re.compile(rb"^-Y (\d+) \+X (\d+)$")
+_SIZE = re.compile(rb"^([-+])([XY]) (\d+) ([-+])([XY]) (\d+)$")
 
 
 def read_hdr(path: Path, size: Size | None = None) -> Image:
-    """The scene-linear picture in a Radiance file of the usual orientation (-Y +X), run-length coded or flat.
+    """The scene-linear picture in a Radiance file of any of the eight orientations, run-length coded or flat.
+
+    Colours of other primaries than Rec.709 are converted, with a note. An EXPOSURE is noted and not undone, as in
+    Blender.
 
     Raises
     ------
@@ -26,34 +30,66 @@ def read_hdr(path: Path, size: Size | None = None) -> Image:
     """
     data = path.read_bytes()
     try:
-        header, body, (height, width) = _split(data)
+        header, body, (first, second) = _split(data)
     except ValueError as error:
         raise _damaged(path) from error
     if b"FORMAT=32-bit_rle_xyze" in header:
         raise BadInputError(f"Image {path.name!r} is coded as XYZ: export it as RGB.")
-    check_declared_size(path.name, (width, height), size)
+    (_, axis, lines), (_, _, columns) = first, second
+    check_declared_size(path.name, (columns, lines) if axis == b"Y" else (lines, columns), size)
     try:
-        rgbe = _decode(body, height, width)
+        rgbe = _upright(_decode(body, lines, columns), first, second)
     except (IndexError, ValueError) as error:
         raise _damaged(path) from error
     exponent = rgbe[..., 3].astype(np.int32)
     scale = np.where(exponent > 0, np.ldexp(np.float32(1), exponent - 136), 0).astype(np.float32)
-    return Image(rgbe[..., :3] * scale[..., None], Encoding.LINEAR)
+    pixels, notes = rgbe[..., :3] * scale[..., None], []
+    if (first[:2], second[:2]) != ((b"-", b"Y"), (b"+", b"X")):
+        order = " ".join((sign + name).decode() for sign, name, _ in (first, second))
+        notes.append(f"{path.name}: its lines run {order}; it was read upright, which Blender does not do.")
+    primaries = [float(number) for number in _values(header, b"PRIMARIES")[-1:] for number in number.split()]
+    if any(primaries):  # some programs write zeros
+        matrix, space = to_rec709(path.name, {"chromaticities": primaries})
+        if matrix is not None:
+            pixels, note = convert(pixels, matrix, path.name, space)
+            notes.append(note)
+    exposure = np.prod([float(value) for value in _values(header, b"EXPOSURE")])
+    if exposure != 1:
+        notes.append(f"{path.name}: its header says that it was exposed by {exposure:.4g}, which was not undone.")
+    return Image(pixels, Encoding.LINEAR, notes=tuple(notes))
+
+
+def _values(header: bytes, name: bytes) -> list[bytes]:
+    """What stands behind ``NAME=`` in the header, where it is numbers."""
+    return re.findall(rb"^" + name + rb"=[ \t]*([-+.eE\d \t]*\d[. \t]*)\r?$", header, re.MULTILINE)
 
 
 def _damaged(path: Path) -> BadInputError:
     return BadInputError(f"Image {path.name!r} cannot be read: the file is damaged or not a Radiance image.")
 
 
-def _split(data: bytes) -> tuple[bytes, bytes, tuple[int, int]]:
+_Axis = tuple[bytes, bytes, int]  # sign, axis and count, as in the line "-Y 480 +X 640"
+
+
+def _split(data: bytes) -> tuple[bytes, bytes, tuple[_Axis, _Axis]]:
     end = data.find(b"\n\n")
     line_end = data.find(b"\n", end + 2)
     if not data.startswith(b"#?") or end < 0 or line_end < 0:
         raise ValueError("no header")
     size = _SIZE.match(data[end + 2 : line_end].strip())
-    if size is None:
+    if size is None or size[2] == size[5]:
         raise ValueError("no size")
-    return data[:end], data[line_end + 1 :], (int(size[1]), int(size[2]))
+    return data[:end], data[line_end + 1 :], ((size[1], size[2], int(size[3])), (size[4], size[5], int(size[6])))
+
+
+def _upright(lines: NDArray[np.uint8], first: _Axis, second: _Axis) -> NDArray[np.uint8]:
+    """Scan lines as rows from the top, each from the left; -Y and +X run that way."""
+    usual = {b"Y": b"-", b"X": b"+"}
+    if first[0] != usual[first[1]]:
+        lines = lines[::-1]
+    if second[0] != usual[second[1]]:
+        lines = lines[:, ::-1]
+    return lines if first[1] == b"Y" else np.swapaxes(lines, 0, 1)
 
 
 def _decode(body: bytes, height: int, width: int) -> NDArray[np.uint8]:

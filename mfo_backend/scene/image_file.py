@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading and writing picture files: EXR and HDR are scene-linear, PNG, JPEG and TIFF hold sRGB display values."""
+"""Reading and writing picture files: EXR and HDR are scene-linear, all others hold sRGB display values."""
 
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,25 +14,38 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
 from .exr_file import read_exr, write_exr
 from .hdr_file import read_hdr
+from .picture_kind import SHOWN, refuse_another_kind
 from .picture_size import Size, check_declared_size
 from .png_file import deep_colour
 from .scene_xml import is_file
 
 __all__ = ["check_reference", "read_image", "write_exr", "write_png"]
 
-_DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+_DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 _SUFFIXES = (".exr", ".hdr", *_DISPLAY_SUFFIXES)
+_ORIENTATION = 274  # tag of EXIF 2.3
+_SIDEWAYS = (5, 6, 7, 8)
+_TURN_BACK = {
+    2: "FLIP_LEFT_RIGHT",
+    3: "ROTATE_180",
+    4: "FLIP_TOP_BOTTOM",
+    5: "TRANSPOSE",
+    6: "ROTATE_90",
+    7: "TRANSVERSE",
+    8: "ROTATE_270",
+}
 # Pillow goes by the content, whatever the file is called, and hands PostScript to a program of its own
-_FORMATS = ("PNG", "JPEG", "TIFF")
+_FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP")
 
 
 def read_image(path: Path | str, size: Size | None = None) -> Image:
     """The picture in a file.
 
     EXR (any compression, half or float; channels RGB, RGBA or Y, also layered as Blender writes them) and Radiance HDR
-    are scene-linear. PNG, JPEG and TIFF are taken as sRGB display values in [0, 1]; a grey picture becomes three equal
-    channels. PNG and grey pictures keep 16 bits a channel; Pillow reads colour TIFF of 16 bits with 8. With `size`
-    (width, height) a picture of another one is refused by its header alone.
+    are scene-linear and converted to Rec.709 where they name another space. PNG, JPEG, TIFF, BMP and WebP are taken as
+    sRGB display values in [0, 1]; a grey picture becomes three equal channels. PNG and grey pictures keep 16 bits a
+    channel; Pillow reads colour TIFF of 16 bits with 8. With `size` (width, height) a picture of another one is refused
+    by its header alone.
 
     Raises
     ------
@@ -44,6 +58,7 @@ def read_image(path: Path | str, size: Size | None = None) -> Image:
         raise BadInputError(f"Image {path.name!r} is of an unknown kind: use {', '.join(s[1:] for s in _SUFFIXES)}.")
     if not is_file(path):
         raise BadInputError(f"Image {str(path)!r} does not exist: check the path.")
+    refuse_another_kind(path)
     if suffix == ".exr":
         return read_exr(path, size)
     return read_hdr(path, size) if suffix == ".hdr" else _read_display(path, size)
@@ -80,9 +95,9 @@ def check_reference(image: Image, width: int, height: int) -> tuple[Image, tuple
         raise BadInputError("Reference is all black: it must show the lit object, so check the lights and the file.")
     negative = int((image.pixels < 0).any(axis=-1).sum())
     if not negative:
-        return image, ()
+        return image, image.notes
     note = f"Reference has {negative} pixels with negative values; they were set to 0."
-    return Image(np.maximum(image.pixels, np.float32(0)), image.encoding, image.alpha), (note,)
+    return replace(image, pixels=np.maximum(image.pixels, np.float32(0))), (*image.notes, note)
 
 
 def _read_display(path: Path, size: Size | None) -> Image:
@@ -99,17 +114,26 @@ def _read_display(path: Path, size: Size | None) -> Image:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with PillowImage.open(path, formats=_FORMATS) as picture:
-                check_declared_size(path.name, picture.size, size)
+                is_tiff = picture.format == "TIFF"  # which Pillow turns, and leaves every other kind as it is stored
+                orientation = picture.getexif().get(_ORIENTATION, 1) if is_tiff else 1
+                stored = picture.size[::-1] if orientation in _SIDEWAYS else picture.size
+                check_declared_size(path.name, stored, size)
                 picture.load()
+                if orientation in _TURN_BACK:
+                    picture = picture.transpose(PillowImage.Transpose[_TURN_BACK[orientation]])
+                orientation = orientation if is_tiff else picture.getexif().get(_ORIENTATION, 1)
     except BadInputError:
         raise
     except Exception as error:  # Pillow raises OSError, SyntaxError, ValueError and others on damaged files
         raise BadInputError(f"Image {path.name!r} cannot be read: the file is damaged or not an image.") from error
     if picture.mode.startswith("I") or picture.mode == "F":
         return _read_grey(path, np.asarray(picture))
+    shown = SHOWN.get(orientation, "")
+    note = f"{path.name}: its EXIF data want it shown {shown}; it was taken as it is stored, as in Blender."
     rgba = np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
     has_alpha = "A" in picture.getbands() or "transparency" in picture.info
-    return Image(_contiguous(rgba[..., :3]), Encoding.SRGB, _contiguous(rgba[..., 3]) if has_alpha else None)
+    alpha = _contiguous(rgba[..., 3]) if has_alpha else None
+    return Image(_contiguous(rgba[..., :3]), Encoding.SRGB, alpha, (note,) if shown else ())
 
 
 def _read_grey(path: Path, grey: NDArray) -> Image:

@@ -21,11 +21,15 @@ class Encoding(Enum):
 
 @dataclass(frozen=True)
 class Image:
-    """An RGB picture: `pixels` is float32 (height, width, 3); `alpha` is float32 (height, width) or None."""
+    """An RGB picture: `pixels` is float32 (height, width, 3); `alpha` is float32 (height, width) or None.
+
+    `notes` are sentences on what was done to the numbers of its file, or not done, that a user should know.
+    """
 
     pixels: Pixels
     encoding: Encoding
     alpha: Pixels | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.dtype != np.float32:

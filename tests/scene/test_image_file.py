@@ -11,6 +11,7 @@ import pytest
 from PIL import Image as PillowImage
 
 from mfo_backend.scene.image_file import check_reference, read_image, write_exr, write_png
+from mfo_backend.scene.picture_kind import SHOWN
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
 
@@ -157,6 +158,74 @@ def test_radiance(tmp_path, coded):
         read_image(tmp_path / "b.hdr")
 
 
+@pytest.mark.parametrize("size_line", [f"{a}Y 3 {b}X 9" for a in "-+" for b in "-+"] + ["+X 9 -Y 3", "-X 9 +Y 3"])
+def test_radiance_of_any_orientation(tmp_path, size_line):
+    """Every pixel of the file is written at the place that its line names."""
+    levels = np.arange(1, 28, dtype=np.uint8).reshape(3, 9) * 4
+    (first, _), (second, _) = (size_line.split()[i : i + 2] for i in (0, 2))
+    rows = levels if first[0] == {"Y": "-", "X": "+"}[first[1]] else np.flip(levels, 0 if first[1] == "Y" else 1)
+    rows = rows if second[0] == {"Y": "-", "X": "+"}[second[1]] else np.flip(rows, 0 if second[1] == "Y" else 1)
+    lines = rows if first[1] == "Y" else rows.T
+    body = b"".join(bytes([v, v, v, 136]) for v in lines.ravel())
+    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + size_line.encode() + b"\n" + body)
+    image = read_image(tmp_path / "a.hdr")
+    np.testing.assert_array_equal(image.pixels[..., 1], levels)
+    assert bool(image.notes) == (size_line != "-Y 3 +X 9")
+
+
+def test_radiance_header_of_exposure_and_primaries(tmp_path):
+    def read(line):
+        head = b"#?RADIANCE\n" + line + b"FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
+        (tmp_path / "a.hdr").write_bytes(head + bytes([100, 50, 25, 136]))
+        return read_image(tmp_path / "a.hdr")
+
+    plain = read(b"")
+    assert plain.notes == ()
+    assert read(b"PRIMARIES= 0 0 0 0 0 0 0 0\nEXPOSURE=1.0\n").notes == ()
+    exposed = read(b"EXPOSURE=2\nEXPOSURE= 4.0\n")
+    np.testing.assert_array_equal(exposed.pixels, plain.pixels)
+    assert exposed.notes == ("a.hdr: its header says that it was exposed by 8, which was not undone.",)
+    wide = read(b"PRIMARIES= .708 .292 .170 .797 .131 .046 .3127 .3290\n")
+    assert wide.pixels[0, 0, 0] > plain.pixels[0, 0, 0]
+    assert "converted from the primaries in its header" in wide.notes[0]
+
+
+@pytest.mark.parametrize("suffix", [".webp", ".bmp"])
+def test_webp_and_bmp(tmp_path, suffix):
+    levels = np.random.default_rng(0).integers(0, 256, (5, 7, 3), np.uint8)
+    PillowImage.fromarray(levels).save(tmp_path / f"a{suffix}", **({"lossless": True} if suffix == ".webp" else {}))
+    np.testing.assert_allclose(read_image(tmp_path / f"a{suffix}").pixels * 255, levels, atol=1e-4)
+
+
+@pytest.mark.parametrize("orientation", range(2, 9))
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".tif", ".webp"])
+def test_exif_orientation_is_said_and_left(tmp_path, suffix, orientation):
+    turned = PillowImage.Exif()
+    turned[274] = orientation
+    levels = np.zeros((16, 32, 3), np.uint8)
+    levels[8:, :16] = 255
+    PillowImage.fromarray(levels).save(tmp_path / f"a{suffix}", exif=turned)
+    image = read_image(tmp_path / f"a{suffix}", (32, 16))
+    np.testing.assert_allclose(image.pixels * 255, levels, atol=12)  # JPEG and WebP are lossy
+    assert len(image.notes) == 1
+    assert f"want it shown {SHOWN[orientation]}; it was taken as it is stored" in image.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "sentence"),
+    [
+        ("a.png", b"\x76\x2f\x31\x01", r"'a\.png' is an OpenEXR file that is called \.png: rename it to \.exr"),
+        ("a.exr", b"\xff\xd8\xff\xe0", r"is a PNG, JPEG, TIFF or WebP file that is called \.exr: rename it to \.png"),
+        ("a.exr", b"#?RADIANCE", r"is a Radiance HDR file that is called \.exr: rename it to \.hdr"),
+        ("a.jpg", b"\0\0\0\x1cftypheic", "is an HEIC, AVIF or film file, which is not read: save it as PNG or OpenEXR"),
+    ],
+)
+def test_another_kind_than_the_name_says(tmp_path, name, start, sentence):
+    (tmp_path / name).write_bytes(start + bytes(32))
+    with pytest.raises(BadInputError, match=sentence):
+        read_image(tmp_path / name)
+
+
 def exr_bytes(tmp_path):
     write_exr(tmp_path / "whole.exr", np.random.default_rng(0).random((200, 40, 3)).astype(np.float32))
     return (tmp_path / "whole.exr").read_bytes()
@@ -249,7 +318,7 @@ def test_postscript_is_not_handed_to_a_program(tmp_path, suffix, monkeypatch):
     [
         ({"Z": picture()[..., 0].copy()}, "has no colour: needed are channels R, G, B or Y, found Z"),
         ({"R": picture()[..., 0].copy(), "G": picture()[..., 0].copy()}, "has no colour: .* found G, R"),
-        ({c: np.ones((4, 4), np.uint32) for c in "RGB"}, "cannot be read"),
+        ({c: np.ones((4, 4), np.uint32) for c in "RGB"}, "holds 32-bit integers, which are no radiance"),
     ],
 )
 def test_exr_without_usable_channels(tmp_path, content, sentence):
