@@ -17,10 +17,19 @@ from .export.image_pixels import UnreadableImageError, is_data, read_pixels, wit
 from .export.read_camera import has_camera, note_picture_settings, picture_size
 from .export.read_material import principled_node, read_target
 from .export.read_scene import MESH_TYPES
-from .export.reference import DISPLAY_SUFFIXES, LINEAR_SUFFIXES, holds_display_colours, refuse_size, refuse_suffix
+from .export.reference import (
+    DISPLAY_SUFFIXES,
+    LINEAR_SUFFIXES,
+    holds_display_colours,
+    refuse_kind,
+    refuse_size,
+    refuse_suffix,
+)
+from .export.reference_colour import other_space
 from .export.reference_view import SCENE, mixed_by, needs_table, output_view
 from .export.render_state import rendered_objects
 from .export.shader_graph import source_of
+from .export.turned_picture import turn_notes
 from .picture_header import read_header
 from .properties import SOCKET_ITEMS, crossed_limits
 from .versions import overrides_of
@@ -122,7 +131,7 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
 def _reference(scene: bpy.types.Scene) -> list[Finding]:
     settings = scene.mfo
     try:
-        found = _image_reference(settings) if settings.reference_source == "IMAGE" else _file_reference(settings)
+        found = _image_reference(settings) if settings.reference_source == "IMAGE" else _file_reference(scene)
     except ExportError as problem:
         return [Finding(STOPS, str(problem), problem.fixes)]
     except OSError as problem:
@@ -130,14 +139,15 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
     problems = []
     if all(found.size):
         problems += _refused(refuse_size, found.name, found.size, picture_size(scene.render))
-    words = "scene-linear Rec.709"
+    words = f"scene-linear {found.space}, converted to Rec.709" if found.space else "scene-linear Rec.709"
     if not found.is_linear:
         problems += _refused(needs_table, scene, found.name, settings.reference_view)
         words = "taken as a photograph or a render under Standard"
         if settings.reference_view == SCENE:
             words = f"display colours under the view {output_view(scene)[0].view_transform}"
             words = f"taken as rendered in this scene, {words}" if mixed_by(scene) else words
-    return problems or [Finding(FINE, f"Reference: {found.words}, {words}.")]
+    said = [Finding(IGNORED, note, (Fix("upright"),)) for note in found.turned]
+    return problems or [*said, Finding(FINE, f"Reference: {found.words}, {words}.")]
 
 
 @dataclass(frozen=True)
@@ -146,9 +156,12 @@ class _Picture:
     size: tuple[int, int]  # width and height, 0 where unknown
     words: str
     is_linear: bool
+    space: str = ""  # of linear colours that are converted
+    turned: tuple[str, ...] = ()  # what is to be said of a turn by EXIF data
 
 
-def _file_reference(settings: bpy.types.PropertyGroup) -> _Picture:
+def _file_reference(scene: bpy.types.Scene) -> _Picture:
+    settings = scene.mfo
     if not settings.reference_path:
         raise ExportError("No reference is chosen: give the picture whose material is to be recovered.")
     path = Path(bpy.path.abspath(settings.reference_path))
@@ -156,11 +169,14 @@ def _file_reference(settings: bpy.types.PropertyGroup) -> _Picture:
         raise ExportError(f"The reference {path} does not exist: choose another file.")
     refuse_suffix(path)
     header = read_header(path)
+    refuse_kind(path, header)
     if header is None:
         raise ExportError(f"The reference {path.name} holds no picture its name promises: choose another file.")
     words = f"{header.width} x {header.height}, {header.depth} {header.kind}" if header.width else header.kind
     is_linear = path.suffix.lower() in LINEAR_SUFFIXES
-    return _Picture(path.name, (header.width, header.height), words, is_linear)
+    said = turn_notes(path.name, header, picture_size(scene.render))
+    space = other_space(header) if is_linear else ""
+    return _Picture(path.name, (header.width, header.height), words, is_linear, space, said)
 
 
 def _image_reference(settings: bpy.types.PropertyGroup) -> _Picture:

@@ -74,6 +74,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
             reference=chosen.reference.absolute(),
             fit=fit,
             reference_view=chosen.reference_view,
+            upright=chosen.upright,
         )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
@@ -172,6 +173,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--fit", default="{}", help="the `fit` object of request.json")
     command.add_argument("--reference-view", default="scene", help="scene or standard: how a display picture was made")
+    command.add_argument("--upright", action="store_true", help="turn the picture as its EXIF data say")
     command = add("apply", apply)
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--save-as", required=True, type=Path)

@@ -5,12 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
+import numpy as np
 from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 
+from .export.image_pixels import UnreadableImageError, read_pixels
+from .export.png_file import write_png
 from .export.read_material import principled_node
 from .export.shader_graph import surface_of
+from .export.turned_picture import turned
+from .picture_header import read_header
+from .preferences import new_job_folder
 from .versions import PRINCIPLED, active_output, node_tree_of, nodes_enabled
 
 # sockets of other shaders that mean the same on a Principled BSDF
@@ -109,6 +116,28 @@ def _reference_view(context: bpy.types.Context, made: str) -> None:
     context.scene.mfo.reference_view = made
 
 
+def _upright(context: bpy.types.Context, _argument: str) -> None:
+    """Write a turned copy beside the jobs and make it the reference; the picture itself stays as it is."""
+    settings = context.scene.mfo
+    path = Path(bpy.path.abspath(settings.reference_path))
+    try:
+        header = read_header(path)
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except (OSError, RuntimeError) as error:
+        raise MendingError(f"The reference {path.name} cannot be read ({error}): choose another file.") from error
+    try:
+        image.colorspace_settings.name = "Non-Color"  # the display values as they are
+        pixels = turned(read_pixels(image)[:, :, :3], header.orientation if header is not None else 1)
+        copy = new_job_folder(context, "reference") / f"{path.stem} upright.png"
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        write_png(copy, np.rint(pixels.clip(0.0, 1.0) * 255.0).astype(np.uint8))
+    except (OSError, UnreadableImageError) as error:
+        raise MendingError(f"The turned copy of {path.name} cannot be written ({error}).") from error
+    finally:
+        bpy.data.images.remove(image)
+    settings.reference_path = str(copy)
+
+
 def _colorspace(context: bpy.types.Context, name: str) -> None:
     context.scene.mfo.reference_image.colorspace_settings.name = name
 
@@ -176,6 +205,9 @@ KINDS = {
     "show_in_render": Kind("Show in Render", "Turn Disable in Renders off for it and its collections", _show_in_render),
     "reference_view": Kind(
         "Photo or Standard", "Take the reference as a photograph or a render under Standard", _reference_view
+    ),
+    "upright": Kind(
+        "Turn Upright", "Write a copy that is turned as the picture's EXIF data say, and use that", _upright
     ),
     "colorspace": Kind("{}", "Give the reference image this colour space", _colorspace),
     "new_material": Kind("Add Material", "Put a new material with a Principled BSDF into the slot", _new_material),

@@ -22,8 +22,12 @@ LINES_PER_BLOCK = 16
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
-def write_exr(path: Path, pixels: NDArray[np.float32]) -> None:
-    """Write scene-linear Rec.709 `pixels`, float32 (height, width, 1, 3 or 4), first row at the top.
+def write_exr(
+    path: Path, pixels: NDArray[np.float32], *, space: str = "", primaries: tuple[float, ...] = REC709
+) -> None:
+    """Write scene-linear `pixels`, float32 (height, width, 1, 3 or 4), first row at the top.
+
+    They are Rec.709, or of the `primaries` (none: not said) or the `space` (a name of the Color Interop Forum) given.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def write_exr(path: Path, pixels: NDArray[np.float32]) -> None:
         raw = lines[start : start + LINES_PER_BLOCK].tobytes()
         packed = zlib.compress(_predict(raw), 4)
         blocks.append((start, packed if len(packed) < len(raw) else raw))
-    header = _header(width, height, [name for name, _ in order])
+    header = _header(width, height, [name for name, _ in order], space, primaries)
     offset = len(header) + 8 * len(blocks)
     with path.open("wb") as file:
         file.write(header)
@@ -62,12 +66,13 @@ def _predict(raw: bytes) -> bytes:
     return split.astype(np.uint8).tobytes()
 
 
-def _header(width: int, height: int, channels: list[str]) -> bytes:
+def _header(width: int, height: int, channels: list[str], space: str, primaries: tuple[float, ...]) -> bytes:
     window = struct.pack("<iiii", 0, 0, width - 1, height - 1)
     listed = b"".join(name.encode() + b"\0" + struct.pack("<iBxxxii", FLOAT, 0, 1, 1) for name in channels) + b"\0"
     attributes = [
         ("channels", "chlist", listed),
-        ("chromaticities", "chromaticities", struct.pack("<8f", *REC709)),
+        *([("chromaticities", "chromaticities", struct.pack("<8f", *primaries))] if primaries else []),
+        *([("colorInteropID", "string", space.encode("latin-1"))] if space else []),
         ("compression", "compression", bytes([ZIP])),
         ("dataWindow", "box2i", window),
         ("displayWindow", "box2i", window),

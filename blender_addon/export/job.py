@@ -43,13 +43,14 @@ def export_job(
     reference: Path | bpy.types.Image | None,
     fit: dict[str, Any],
     reference_view: str = SCENE,
+    upright: bool = False,
     tell: Callable[[float], None] = lambda _share: None,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
     `reference_view` says how a display picture was made: "scene", rendered in this scene, or "standard", a photograph
-    or a render under Standard. `tell` gets the share that is done, of work that a million triangles make some seconds
-    long.
+    or a render under Standard. `upright` turns a picture as its EXIF data say. `tell` gets the share that is done, of
+    work that a million triangles make some seconds long.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def export_job(
     assert data is not None
     tell(0.4)
     size = (data.camera.width, data.camera.height)
-    picture = read_reference(reference, context.scene, size, made=reference_view)
+    picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
     for said in picture.notes if picture is not None else ():
         findings.note(said)
     files = scene_files(data, findings)

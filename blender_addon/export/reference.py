@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .exr_file import write_exr
+from ..picture_header import PictureHeader, read_header
+from .exr_file import REC709, write_exr
 from .findings import ExportError, Fix
 from .image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from .png_file import write_png
+from .reference_colour import file_notes, image_notes
 from .reference_view import SCENE, needs_table, view_note
+from .turned_picture import turn_notes, turned
 from .view_lut import ViewLut, bake_view_lut
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
@@ -28,7 +31,8 @@ DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 class Reference:
     """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8).
 
-    `view` is the view of a display picture where no formula has it; `notes` say what was taken for granted.
+    `view` is the view of a display picture where no formula has it; `notes` say what was taken for granted. `space` and
+    `primaries` are what the file of linear `pixels` says of their colours.
     """
 
     name: str
@@ -37,6 +41,8 @@ class Reference:
     pixels: NDArray[np.float32] | NDArray[np.uint8] | None = None
     view: ViewLut | None = None
     notes: tuple[str, ...] = ()
+    space: str = ""
+    primaries: tuple[float, ...] = REC709
 
     def write(self, folder: Path) -> None:
         """Put the picture into `folder`.
@@ -51,7 +57,8 @@ class Reference:
         if self.source is not None:
             shutil.copyfile(self.source, folder / self.name)
         elif self.encoding == "linear":
-            write_exr(folder / self.name, np.asarray(self.pixels, dtype=np.float32))
+            pixels = np.asarray(self.pixels, dtype=np.float32)
+            write_exr(folder / self.name, pixels, space=self.space, primaries=self.primaries)
         else:
             write_png(folder / self.name, np.asarray(self.pixels, dtype=np.uint8))
 
@@ -62,11 +69,12 @@ def read_reference(
     size: tuple[int, int],
     *,
     made: str = SCENE,
+    upright: bool = False,
 ) -> Reference | None:
     """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
 
     `made` is one of `REFERENCE_VIEWS`. A display picture that was rendered in this scene comes with a table of the
-    scene's view where no formula undoes that.
+    scene's view where no formula undoes that. `upright` turns a picture as its EXIF data say; else it is as stored.
 
     Raises
     ------
@@ -77,21 +85,43 @@ def read_reference(
         return None
     stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
     if isinstance(reference, bpy.types.Image):
-        return _from_image(reference, scene, size, stretched, made)
+        found = _from_image(reference, scene, size, stretched, made)
+        return replace(found, notes=(*found.notes, *image_notes(reference)))
     path = Path(bpy.path.abspath(str(reference)))
     if not path.is_file():
         raise ExportError(f"The reference {path} does not exist: choose another file.")
     suffix = path.suffix.lower()
     refuse_suffix(path)
-    if stretched:
+    header = read_header(path)
+    refuse_kind(path, header)
+    turn = header.orientation if header is not None and upright else 1
+    said = () if header is None or upright else turn_notes(path.name, header, rendered_size(scene))
+    is_linear = suffix in LINEAR_SUFFIXES
+    if stretched or turn != 1:
         image = bpy.data.images.load(str(path), check_existing=False)
         try:
-            return _from_image(image, scene, size, stretched, made)
+            if suffix == ".exr":
+                image.colorspace_settings.name = "Non-Color"  # the numbers as they are, with what the file says of them
+            found = _from_image(image, scene, size, stretched, made, turn)
         finally:
             bpy.data.images.remove(image)
-    if suffix in LINEAR_SUFFIXES:
-        return Reference(f"reference{suffix}", "linear", source=path)
-    return Reference(f"reference{suffix}", "srgb", source=path, **_view(scene, path.name, made))
+        if suffix == ".exr" and header is not None:
+            found = replace(found, space=header.space, primaries=header.primaries)
+    elif is_linear:
+        found = Reference(f"reference{suffix}", "linear", source=path)
+    else:
+        found = Reference(f"reference{suffix}", "srgb", source=path, **_view(scene, path.name, made))
+    colours = file_notes(path, found.name, header, scene) if is_linear else ()
+    return replace(found, notes=(*found.notes, *said, *colours))
+
+
+def refuse_kind(path: Path, header: PictureHeader | None) -> None:
+    """Raise `ExportError` for a scene-linear file with the name of a display picture, or the other way round."""
+    if header is None:
+        return
+    is_linear = header.kind in ("OpenEXR", "Radiance HDR")
+    if is_linear != (path.suffix.lower() in LINEAR_SUFFIXES):
+        raise ExportError(f"The reference {path.name} is a {header.kind} file: give its name the ending of that kind.")
 
 
 def refuse_suffix(path: Path) -> None:
@@ -102,6 +132,8 @@ def refuse_suffix(path: Path) -> None:
 
 def holds_display_colours(image: bpy.types.Image) -> bool:
     """Whether an image of the .blend went through a view; else it is taken as scene-linear."""
+    if image.is_float and image.source == "GENERATED":
+        return False  # floats that no file has encoded
     return image.colorspace_settings.name in SRGB_NAMES and image.file_format not in LINEAR_FORMATS
 
 
@@ -115,18 +147,23 @@ def refuse_size(name: str, found: tuple[int, int], wanted: tuple[int, int]) -> N
         )
 
 
+def rendered_size(scene: bpy.types.Scene) -> tuple[int, int]:
+    """Width and height of the pictures that the scene renders, in pixels as they are, square or not."""
+    render = scene.render
+    share = render.resolution_percentage
+    return render.resolution_x * share // 100, render.resolution_y * share // 100
+
+
 def _from_image(
-    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, made: str
+    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, made: str, turn: int = 1
 ) -> Reference:
     try:
         pixels = np.ascontiguousarray(read_pixels(image)[:, :, :3])
     except UnreadableImageError as problem:
         raise ExportError(f"The reference '{image.name}' {problem}.") from None
+    pixels = turned(pixels, turn)
     height, width = pixels.shape[:2]
-    render = scene.render
-    wanted = (render.resolution_x * render.resolution_percentage // 100,
-              render.resolution_y * render.resolution_percentage // 100) if stretched else size  # fmt: skip
-    refuse_size(image.name, (width, height), wanted)
+    refuse_size(image.name, (width, height), rendered_size(scene) if stretched else size)
     if stretched:
         pixels = _stretch(pixels, size)
     if not holds_display_colours(image):

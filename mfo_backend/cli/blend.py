@@ -51,6 +51,9 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
         help="how a PNG, JPEG or TIFF was made: rendered in this scene, under its view (scene, the default), or a "
         "photograph or a render under Standard (standard)",
     )
+    parser.add_argument(
+        "--upright", action="store_true", help="turn the picture as its EXIF data say (Blender shows it as stored)"
+    )
     # its name until the scene's view became the default
     parser.add_argument(
         "--bake-view", dest="reference_view", action="store_const", const="scene", help=argparse.SUPPRESS
@@ -81,6 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
         job,
         options,
         reference_view=arguments.reference_view,
+        upright=arguments.upright,
     )
     saved, notes = None, tuple(fit.result["notes"])
     if arguments.apply:
@@ -105,10 +109,12 @@ def fit_blend(
     fit: Mapping[str, Any],
     *,
     reference_view: str = "scene",
+    upright: bool = False,
 ) -> BlendFit:
     """Export a job from a .blend file and run it with a progress bar on stderr.
 
-    `reference_view` says how a display picture was made: one of `REFERENCE_VIEWS`.
+    `reference_view` says how a display picture was made: one of `REFERENCE_VIEWS`; `upright` turns it as its EXIF data
+    say.
 
     Raises
     ------
@@ -124,6 +130,7 @@ def fit_blend(
         f"--job={job}",
         f"--fit={json.dumps(fit)}",
         f"--reference-view={reference_view}",
+        *(["--upright"] if upright else []),
     )
     done = run_folder(job, fit_scene, is_new=is_new)
     if done.result is None:

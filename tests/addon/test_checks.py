@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 
@@ -221,6 +223,31 @@ def test_the_question_how_the_reference_was_made(scene: SimpleNamespace) -> None
     assert said.endswith("taken as a photograph or a render under Standard.")
     current.mfo.reference_path = "//a.exr"
     assert not asks_view(current)
+
+
+def test_a_turned_copy_becomes_the_reference(scene: SimpleNamespace, tmp_path: Path) -> None:
+    from PIL import Image, ImageOps
+
+    exif = Image.Exif()
+    exif[274] = 6
+    levels = np.random.default_rng(0).integers(0, 256, (96, 64, 3), np.uint8)
+    Image.fromarray(levels).save(tmp_path / "phone.png", exif=exif)
+    settings = scene.bpy.context.scene.mfo
+    assert stopping(scene) == {}
+    settings.reference_source, settings.reference_path = "FILE", str(tmp_path / "phone.png")
+    from blender_addon.checks import quick_check
+
+    (found,) = (f for f in quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer) if f.level == "stops")
+    assert [fix.kind for fix in found.fixes] == ["upright"]
+    assert scene.bpy.ops.mfo.mend(kind="upright") == {"FINISHED"}
+    copy = Path(settings.reference_path)
+    try:
+        assert copy.name == "phone upright.png"
+        with Image.open(tmp_path / "phone.png") as stored, Image.open(copy) as shown:
+            np.testing.assert_array_equal(np.asarray(shown), np.asarray(ImageOps.exif_transpose(stored)))
+        assert not [f for f in quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer) if f.level == "stops"]
+    finally:
+        shutil.rmtree(copy.parent)
 
 
 def test_no_button_replaces_the_reference_by_a_render() -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -47,6 +48,50 @@ def test_radiance(tmp_path: Path) -> None:
     header = read_header(tmp_path / "picture.hdr")
     assert header is not None
     assert (header.width, header.height) == (WIDTH, HEIGHT)
+
+
+@pytest.mark.parametrize("orientation", [1, 3, 6])
+@pytest.mark.parametrize("suffix", ["png", "jpg", "tif"])
+def test_orientation(tmp_path: Path, suffix: str, orientation: int) -> None:
+    exif = Image.Exif()
+    exif[274] = orientation
+    path = tmp_path / f"picture.{suffix}"
+    Image.fromarray(np.zeros((HEIGHT, WIDTH, 3), np.uint8)).save(path, exif=exif)
+    header = read_header(path)
+    assert header is not None
+    assert (header.width, header.height, header.orientation) == (WIDTH, HEIGHT, orientation)
+
+
+def test_a_tiff_whose_directory_stands_at_its_end(tmp_path: Path) -> None:
+    """As libtiff writes them, and so Blender; the pixels are more than what is read from the start."""
+    size = (800, 700)
+    path = tmp_path / "picture.tif"
+    Image.effect_noise(size, 50).convert("RGB").save(path, compression="tiff_adobe_deflate")
+    header = read_header(path)
+    assert header is not None
+    assert (header.width, header.height) == size
+
+
+def test_a_jpeg_with_long_data_before_its_size(tmp_path: Path) -> None:
+    Image.new("RGB", (WIDTH, HEIGHT)).save(tmp_path / "picture.jpg")
+    data = (tmp_path / "picture.jpg").read_bytes()
+    block = b"\xff\xe2" + (65000).to_bytes(2, "big") + bytes(64998)
+    for count in (3, 30):
+        (tmp_path / "picture.jpg").write_bytes(data[:2] + count * block + data[2:])
+        header = read_header(tmp_path / "picture.jpg")
+        assert header is not None
+        assert (header.kind, header.width) == ("JPEG", WIDTH if count == 3 else 0)
+
+
+def test_colours_of_an_exr(tmp_path: Path) -> None:
+    pixels = np.ones((HEIGHT, WIDTH, 3), np.float32)
+    primaries = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+    header = {"type": OpenEXR.scanlineimage, "colorInteropID": "lin_ap1_scene", "chromaticities": primaries}
+    OpenEXR.File(header, {"RGB": pixels}).write(str(tmp_path / "picture.exr"))
+    found = read_header(tmp_path / "picture.exr")
+    assert found is not None
+    assert found.space == "lin_ap1_scene"
+    assert found.primaries == pytest.approx(primaries)
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg", "tif", "bmp", "exr"])

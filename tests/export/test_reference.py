@@ -183,9 +183,111 @@ def test_pixel_aspect_stretches_the_reference(target: Any, export: Any, tmp_path
     assert any(note.startswith("Pixel aspect 2:1") for note in report.notes)
 
 
+def tagged(path: Path, pixels: np.ndarray, **header: Any) -> None:
+    OpenEXR = pytest.importorskip("OpenEXR")
+    OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, {"RGB": pixels}).write(str(path))
+
+
+AP1 = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+CONVERTED = "reference.exr: colours were converted from {} to linear Rec.709."
+
+
+@pytest.mark.parametrize(
+    ("header", "space"),
+    [
+        ({"colorInteropID": "lin_ap1_scene"}, "lin_ap1_scene"),
+        ({"chromaticities": AP1}, "the primaries in its header"),
+        ({"colorInteropID": "lin_rec709_scene"}, ""),
+        ({}, ""),
+    ],
+)
+def test_colour_space_of_an_exr_is_said_in_the_backends_words(
+    header: dict[str, Any], space: str, target: Any, export: Any, tmp_path: Path
+) -> None:
+    from mfo_backend.scene.image_file import read_image
+
+    tagged(tmp_path / "ref.exr", picture(), **header)
+    report = export(target, reference=tmp_path / "ref.exr")
+    said = [note for note in report.notes if "converted" in note]
+    assert said == ([CONVERTED.format(space)] if space else [])
+    assert tuple(said) == read_image(report.folder / "reference.exr").notes
+
+
+@pytest.mark.parametrize("header", [{"colorInteropID": "lin_ap1_scene"}, {"chromaticities": AP1}])
+def test_a_stretched_exr_keeps_what_it_says_of_its_colours(
+    header: dict[str, Any], target: Any, export: Any, tmp_path: Path
+) -> None:
+    from mfo_backend.scene.image_file import read_image
+
+    flat = np.full((4, 6, 3), 0.5, np.float32) * np.array([1.0, 0.5, 0.2], np.float32)
+    tagged(tmp_path / "ref.exr", flat, **header)
+    bpy.context.scene.render.pixel_aspect_x = 2.0
+    report = export(target, reference=tmp_path / "ref.exr")
+    stretched = read_image(report.folder / "reference.exr")
+    assert stretched.width == 12
+    np.testing.assert_allclose(stretched.pixels[0, 0], read_image(tmp_path / "ref.exr").pixels[0, 0], rtol=1e-5)
+
+
+def test_an_exr_without_a_tag_from_an_output_with_a_space_of_its_own(target: Any, export: Any, tmp_path: Path) -> None:
+    tagged(tmp_path / "ref.exr", picture())
+    output = bpy.context.scene.render.image_settings
+    output.file_format, output.color_management = "OPEN_EXR", "OVERRIDE"
+    output.linear_colorspace_settings.name = "ACEScg"
+    (said,) = (n for n in export(target, reference=tmp_path / "ref.exr").notes if "does not say its colour space" in n)
+    assert "this scene writes ACEScg" in said
+    output.linear_colorspace_settings.name = "Linear Rec.709"
+    assert not [n for n in export(target, reference=tmp_path / "ref.exr").notes if "colour space" in n]
+
+
+def test_an_image_whose_colour_space_blender_overlooks(target: Any, export: Any, tmp_path: Path) -> None:
+    tagged(tmp_path / "ref.exr", picture(), chromaticities=AP1)
+    image = bpy.data.images.load(str(tmp_path / "ref.exr"))
+    assert any("Blender takes the reference 'ref.exr' as Linear" in n for n in export(target, reference=image).notes)
+    image.colorspace_settings.name = "ACEScg"
+    assert not [n for n in export(target, reference=image).notes if "Blender takes" in n]
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_pictures_that_their_exif_data_want_turned(orientation: int, target: Any, export: Any, tmp_path: Path) -> None:
+    """Pillow turns them likewise."""
+    from PIL import Image, ImageOps
+
+    exif = Image.Exif()
+    exif[274] = orientation
+    sideways = orientation >= 5
+    levels = np.random.default_rng(0).integers(0, 256, (6, 4, 3) if sideways else (4, 6, 3), np.uint8)
+    Image.fromarray(levels).save(tmp_path / "ref.png", exif=exif)
+    if sideways:
+        with pytest.raises(
+            ExportError, match=r"stored as 4x6 .* is the 6x4 of this scene: take a turned copy"
+        ) as caught:
+            export(target, reference=tmp_path / "ref.png")
+        assert [fix.kind for fix in caught.value.fixes] == ["upright"]
+    else:
+        said = [n for n in export(target, reference=tmp_path / "ref.png").notes if "EXIF" in n]
+        assert len(said) == (orientation > 1)
+    report = export(target, reference=tmp_path / "ref.png", upright=True)
+    assert not [n for n in report.notes if "EXIF" in n]
+    with Image.open(tmp_path / "ref.png") as stored, Image.open(report.folder / "reference.png") as found:
+        np.testing.assert_array_equal(np.asarray(found), np.asarray(ImageOps.exif_transpose(stored)))
+
+
+def test_floats_that_no_file_encoded_are_linear(target: Any, export: Any) -> None:
+    """Cycles takes the numbers of a generated float image as they are, whatever its colour space is."""
+    image = bpy.data.images.new("Bright", 6, 4, float_buffer=True)
+    image.colorspace_settings.name = "sRGB"
+    image.pixels.foreach_set(np.tile(np.array([3.0, 2.0, 0.5, 1.0], np.float32), 6 * 4))
+    report = export(target, reference=image)
+    assert report.request["reference"]["encoding"] == "linear"
+    np.testing.assert_array_equal(read(report.folder / "reference.exr")[0, 0], [3.0, 2.0, 0.5])
+
+
 def test_wrong_references(target: Any, export: Any, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"none\.exr does not exist: choose another file"):
         export(target, reference=tmp_path / "none.exr")
+    write_exr(tmp_path / "exr.png", picture())
+    with pytest.raises(ExportError, match=r"exr\.png is a OpenEXR file: give its name the ending of that kind"):
+        export(target, reference=tmp_path / "exr.png")
     (tmp_path / "ref.txt").write_text("")
     with pytest.raises(ExportError, match=r"ref\.txt is no picture we read: use EXR"):
         export(target, reference=tmp_path / "ref.txt")
