@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One case of `studies.verdicts` from its scene to its row: fit by `mfo blend`, judged by a Cycles render."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from .cases import KINDS, Case, sockets_of
+
+ROOT = Path(__file__).resolve().parents[2]
+DIFFERENT = 5  # exit code of `mfo` for a result that does not match
+
+
+@dataclass(frozen=True)
+class Row:
+    """A measured case.
+
+    `flip` is the mean FLIP between the reference, scene-linear, and Cycles' render of the fitted file with as many
+    samples, over the whole picture; `floor` the same of the reference's own scene with other noise. `target_flip` and
+    `target_floor` are those of the pixels of the target. `values` holds each fitted value, what it truly is, its
+    standard deviation and its level.
+    """
+
+    kind: str
+    case: dict[str, Any]
+    verdict: str
+    cause: str
+    exit_code: int
+    flip: float
+    floor: float
+    target_flip: float
+    target_floor: float
+    start_flip: float
+    seconds: float
+    values: dict[str, dict[str, Any]]
+    notes: list[str]
+    error: str = ""
+
+    @property
+    def excess(self) -> float:
+        """FLIP above the noise, of the whole picture or of the target, whichever is more."""
+        return max(self.flip - self.floor, self.target_flip - self.target_floor)
+
+
+def measure(kind: str, number: int, folder: Path) -> Row:
+    """Build the scene, fit it, render the fitted file; a failure is a row with its sentence."""
+    case = KINDS[kind](number)
+    try:
+        return _measured(kind, case, folder / kind / case.name)
+    except RuntimeError as error:
+        nothing = float("nan")
+        return Row(kind, asdict(case), "failed", "", 1, *(nothing,) * 6, {}, [], error=str(error))
+
+
+def _measured(kind: str, case: Case, folder: Path) -> Row:
+    if not (folder / "floor.exr").is_file():
+        run("studies.verdicts.scene", kind, case.number, folder)
+    picture = folder / f"reference.{case.picture}"
+    words = ("--object", "Target", "--reference", picture, "--out", folder / "job", "--json")
+    baked = ("--bake-view",) if case.picture == "png" else ()
+    code, result = run("mfo_backend", "blend", folder / "start.blend", *words, *baked, allowed=(0, DIFFERENT))
+    after = folder / "after.exr"
+    run("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job", "--out", after,
+        "--samples", case.samples, "--seed", 2)  # fmt: skip
+    truth = {"metallic": 0.0} | {name.lower().replace(" ", "_"): value for name, value in sockets_of(case).items()}
+    values = {
+        name: {
+            "value": value,
+            "truth": None if case.plant else truth.get(name, result["initial"].get(name)),
+            **result["certainty"].get(name, {}),
+        }
+        for name, value in result["recovered"].items()
+    }
+    return Row(
+        kind, asdict(case), result.get("verdict", {}).get("verdict", ""), result.get("verdict", {}).get("cause", ""),
+        code, *_flips(folder), start_flip=result["errors"]["flip"][0], seconds=result["seconds"], values=values,
+        notes=result["notes"],
+    )  # fmt: skip
+
+
+def _flips(folder: Path) -> tuple[float, float, float, float]:
+    from mfo_backend.metrics.flip_error import flip_error
+    from mfo_backend.scene.image_file import read_image
+
+    reference, floor, after = (read_image(folder / f"{name}.exr") for name in ("reference", "floor", "after"))
+    mask = read_image(folder / "job" / "pictures" / "counted.png").pixels[..., 0] > 0.5
+    maps = [flip_error(reference, picture).map for picture in (after, floor)]
+    flip, base = (float(of.mean()) for of in maps)
+    return flip, base, *(float(of[mask].mean()) for of in maps)
+
+
+def run(module: str, *words: Any, allowed: tuple[int, ...] = (0,)) -> Any:
+    """The JSON object on the last line of a Python module's output, with the exit code where several are allowed.
+
+    Raises
+    ------
+    RuntimeError
+        With the sentence or the last lines of a program that failed.
+    """
+    done = subprocess.run([sys.executable, "-m", module, *map(str, words)], capture_output=True, text=True, cwd=ROOT)
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    answer = json.loads(lines[-1]) if lines else {}
+    if done.returncode not in allowed or not lines:
+        raise RuntimeError(f"{module} ended with {done.returncode}: {answer.get('sentence', done.stderr[-500:])}")
+    return (done.returncode, answer) if len(allowed) > 1 else answer

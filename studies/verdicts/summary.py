@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Counts over the rows of `studies.verdicts`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .measure import Row
+
+WRONG = 0.05  # FLIP above the noise from which on a result must not be called the same
+VERDICTS = ("same", "close", "different", "failed")
+OFF, DEVIATIONS = 0.02, 3.0  # a determined value is wrong beyond both
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Confusion counts, and how many determined values are wrong."""
+    lines = ["| case | " + " | ".join(VERDICTS) + " |", "|---|" + "---|" * len(VERDICTS)]
+    groups = {
+        "nothing planted": [row for row in rows if not row.case["plant"]],
+        "planted": [row for row in rows if row.case["plant"]],
+        f"more than {WRONG} above the noise": [row for row in rows if row.excess > WRONG],
+        "at the noise (0.02)": [row for row in rows if row.excess <= 0.02],
+    }
+    for plant in sorted({row.case["plant"] for row in rows} - {""}):
+        groups[plant] = [row for row in rows if row.case["plant"] == plant]
+    for name, group in groups.items():
+        count = Counter(row.verdict for row in group)
+        lines.append(f"| {name} | " + " | ".join(str(count[verdict]) for verdict in VERDICTS) + " |")
+    wrong, determined = _determined(rows)
+    lines += ["", f"{wrong} of {determined} values called determined are off by more than {OFF} and 3 deviations."]
+    causes = Counter((row.case["plant"], row.cause) for row in rows if row.verdict != "same")
+    lines += [f"{plant or 'nothing'}: {cause or 'no cause'} {number}" for (plant, cause), number in causes.items()]
+    return "\n".join(lines)
+
+
+def _determined(rows: Sequence[Row]) -> tuple[int, int]:
+    values = [value for row in rows for value in row.values.values() if value.get("level") == "determined"]
+    known = [value for value in values if value["truth"] is not None]
+    return sum(_is_wrong(value) for value in known), len(known)
+
+
+def _is_wrong(value: dict[str, Any]) -> bool:
+    found, truth = np.ravel(value["value"]), np.ravel(value["truth"])
+    away = np.abs(found - truth[: len(found)])
+    return bool(np.any((away > OFF) & (away > DEVIATIONS * np.ravel(value["sd"]))))
