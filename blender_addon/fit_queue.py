@@ -25,7 +25,7 @@ class PreparedFit:
 
 @dataclass(frozen=True)
 class EndedFit:
-    """A fit of the queue that has ended: a sentence, and CHECKMARK or ERROR."""
+    """A fit of the queue that has ended: a sentence, and the icon of its verdict."""
 
     material_name: str
     sentence: str

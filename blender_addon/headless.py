@@ -82,11 +82,26 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:
-    """Put the values of a finished job on its material and save the file under another name."""
+    """Put the values of a finished job on its material and save the file under another name.
+
+    A result that does not match its reference is refused without `--force`.
+    """
     bpy = _open(chosen.file)
+    _refuse_mismatch(chosen)
     material, _result, values, notes = _put_values(bpy, chosen)
     _save(bpy, chosen.save_as)
     return {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
+
+
+def _refuse_mismatch(chosen: argparse.Namespace) -> None:
+    from .job_result import JobResultError, must_ask, read_job_result
+
+    try:
+        result = read_job_result(Path(chosen.job).absolute())
+    except JobResultError as error:
+        raise HeadlessError(str(error)) from error
+    if must_ask(result.verdict) and not chosen.force:
+        raise HeadlessError(f"{result.sentence} Nothing was applied; --force applies it anyway.")
 
 
 def _put_values(bpy: Any, chosen: argparse.Namespace) -> tuple[Any, Any, dict[str, Any], list[str]]:
@@ -178,6 +193,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--save-as", required=True, type=Path)
     command.add_argument("--material", default="")
+    command.add_argument("--force", action="store_true", help="also a result that does not match its reference")
     for name, run in (("render", render), ("check", check)):
         command = add(name, run)
         command.add_argument("--out", required=True, type=Path)

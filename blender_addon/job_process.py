@@ -36,8 +36,9 @@ _EXIT_SENTENCES = {
     2: "The backend could not use its input",
     3: "Something the backend needs is not installed",
     4: "Cancelled",
+    5: "The result does not match the reference",
 }
-_EXIT_STATUS = {2: "bad_input", 3: "setup", 4: "cancelled"}
+_EXIT_STATUS = {2: "bad_input", 3: "setup", 4: "cancelled", 5: "different"}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,8 @@ class JobResultError(Exception):
 class JobResult:
     """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result).
 
-    `certainty` holds the levels of `docs/reference/job_folder.md` by parameter name, where the preset finds them out.
+    `certainty` holds the levels of `docs/reference/job_folder.md` by parameter name, where the preset finds them out,
+    and `certainty_words` what a user reads of them. `verdict` is same, close, different, or empty where there is none.
     """
 
     folder: Path
@@ -42,7 +43,14 @@ class JobResult:
     notes: tuple[str, ...]
     seconds: float
     weak_combinations: tuple[str, ...] = ()  # sentences on values that can be traded against each other
+    verdict: str = ""
+    certainty_words: Mapping[str, str] = field(default_factory=dict)
     image: tuple[int, int] = (0, 0)  # width and height of the job's pictures
+
+
+def must_ask(verdict: str) -> bool:
+    """Whether a result of this verdict goes onto its material only if that is asked for explicitly."""
+    return verdict == "different"
 
 
 def read_job_result(folder: Path) -> JobResult:
@@ -75,6 +83,8 @@ def read_job_result(folder: Path) -> JobResult:
             recovered={str(k): _value(v) for k, v in result["recovered"].items()},
             errors={str(k): (float(a), float(b)) for k, (a, b) in result.get("errors", {}).items()},
             certainty={str(k): str(c["level"]) for k, c in result.get("certainty", {}).items()},
+            certainty_words={str(k): str(c.get("words", "")) for k, c in result.get("certainty", {}).items()},
+            verdict=str(result.get("verdict") or ""),
             notes=tuple(map(str, result.get("notes", ()))),
             seconds=float(result.get("seconds", 0.0)),
             weak_combinations=tuple(str(c["sentence"]) for c in result.get("weak_combinations", ())),

@@ -173,6 +173,7 @@ class MFO_PG_row(bpy.types.PropertyGroup):
     start: StringProperty()
     result: StringProperty()
     certainty: StringProperty()  # level in result.json, empty where unknown
+    words: StringProperty()  # of that level
 
 
 def _split_moved(runtime: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -188,6 +189,8 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
     material: StringProperty()
     job_folder: StringProperty(subtype="DIR_PATH")
     sentence: StringProperty()
+    verdict: StringProperty()  # same, close or different; empty where unknown
+    asked: StringProperty()  # job folder whose mismatch the user was told when applying it
     fraction: FloatProperty(min=0.0, max=1.0)
     progress_text: StringProperty()
     detail: StringProperty()
@@ -225,6 +228,7 @@ class MFO_PG_past_result(bpy.types.PropertyGroup):
     flip_before: FloatProperty(default=-1.0)
     flip: FloatProperty(default=-1.0)
     partial: BoolProperty()
+    verdict: StringProperty()  # same, close or different; empty where unknown
     values: CollectionProperty(type=MFO_PG_socket_value)
 
 

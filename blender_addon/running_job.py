@@ -29,6 +29,7 @@ from .write_back import WriteBackError
 TICK = 0.15  # seconds between two looks at the process
 PATIENCE = 60  # looks at a modal operator before a result goes into its history without an undo step
 _GOOD = {"converged", "stale", "unchanged", "max_iterations"}
+_ENDED = _GOOD | {"different"}  # the fit came to its end, whatever it found
 
 
 @dataclass
@@ -196,7 +197,7 @@ def _handle(job: RunningJob, event: Event) -> None:
                 _show_preview(job, "difference", event["difference"])
         elif event["event"] == "stage_end":
             line = "{stage}: {loss_start:.3g} to {loss_best:.3g}, {iterations} iterations ({status})"
-            add_message(runtime, line.format_map(event), "CHECKMARK")
+            add_message(runtime, line.format_map(event), "DOT")
     except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
         return  # a newer backend says less or more than we know; its result is what counts
     redraw()
@@ -221,11 +222,11 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     current = None
     atexit.unregister(close)
     _remove_unfinished(job.process.folder)
-    runtime.state = "DONE" if outcome.status in _GOOD else "FAILED"
+    runtime.state = "DONE" if outcome.status in _ENDED else "FAILED"
     runtime.sentence = outcome.sentence
     runtime.progress_text, runtime.detail = "", ""
     try:
-        if outcome.status in _GOOD or (job.process.folder / "result.json").is_file():
+        if outcome.status in _ENDED or (job.process.folder / "result.json").is_file():
             found = read_job_result(job.process.folder)
             shown_result.show(found, job.fit.material_uid)
             unrecorded.append((found, job.fit.material_uid))
@@ -233,7 +234,8 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
             runtime.state = "FAILED" if died else "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
-    fit_queue.ended(job.fit.material_name, runtime.sentence, "CHECKMARK" if runtime.state == "DONE" else "ERROR")
+    icon = shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO") if runtime.state == "DONE" else "ERROR"
+    fit_queue.ended(job.fit.material_name, runtime.sentence, icon)
     if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:
         shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
         runtime.job_folder = ""

@@ -11,6 +11,7 @@ from .write_back import result_to_sockets, socket_to_parameter
 
 PICTURES = ("reference", "start", "result", "difference", "curve", "cycles", "cycles_difference")
 _ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
+VERDICT_ICONS = {"same": "CHECKMARK", "close": "QUESTION", "different": "ERROR"}  # others have no verdict
 _KEPT = ("split",)  # settings of the view, not of a fit
 
 result: JobResult | None = None
@@ -29,11 +30,13 @@ def show(found: JobResult, uid: int) -> None:
     sockets = result_to_sockets(found)
     result, material_uid = found, uid
     runtime = bpy.context.window_manager.mfo_runtime
+    runtime.verdict = found.verdict
     runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
     for name, (before, after) in found.errors.items():
         _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
     for name, value in sockets.items():
         _add_row(runtime.values, name, found.sockets_start.get(name), value)
+        runtime.values[-1].words = found.certainty_words.get(socket_to_parameter(name), "")
         runtime.values[-1].certainty = found.certainty.get(socket_to_parameter(name), "")
     for note in found.notes:
         if note not in runtime.messages:

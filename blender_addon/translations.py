@@ -127,6 +127,7 @@ _GERMAN = {
     "linked": "verbunden",
 }
 _GERMAN_OPERATORS = {
+    "Apply Anyway": "Trotzdem anwenden",
     "Add to Queue": "In die Warteschlange",
     "Apply Earlier Result": "Früheres Ergebnis anwenden",
     "Apply Values": "Werte anwenden",

@@ -7,14 +7,24 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from .. import running_job, shown_result
-from ..job_result import JobResult, JobResultError, read_job_result
+from ..job_result import JobResult, JobResultError, must_ask, read_job_result
 from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values, toggle_values
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+
+
+PRESS_AGAIN = "Press Apply again to apply it anyway."
+
+
+def was_asked(context: bpy.types.Context, folder: str) -> bool:
+    """Whether the user was told before that the result of this job does not match; from now on that is so."""
+    runtime = context.window_manager.mfo_runtime
+    before, runtime.asked = runtime.asked, folder
+    return before == folder
 
 
 class MFO_OT_apply(bpy.types.Operator):
@@ -30,6 +40,7 @@ class MFO_OT_apply(bpy.types.Operator):
     material: StringProperty(
         name="Material", description="Material to change; empty: the one that was fitted", options=_SCRIPT
     )
+    force: BoolProperty(name="Force", description="Also a result that does not match its reference", options=_SCRIPT)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -46,10 +57,22 @@ class MFO_OT_apply(bpy.types.Operator):
             return False
         return True
 
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """By a button: a result that does not match is applied at the second press."""
+        found = shown_result.result
+        if not self.job_folder and found is not None and must_ask(found.verdict):
+            if not was_asked(context, str(found.folder)):
+                self.report({"WARNING"}, f"{found.sentence} {PRESS_AGAIN}")
+                return {"CANCELLED"}
+            self.force = True
+        return self.execute(context)
+
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Find result and material, set the sockets, report what was skipped."""
         try:
             result = self._result()
+            if must_ask(result.verdict) and not self.force:
+                raise WriteBackError(f"{result.sentence} Nothing was applied; force=True applies it anyway.")
             material = self._material(result)
             notes = apply_values(material, result_to_sockets(result), result.folder)
         except (JobResultError, WriteBackError) as error:

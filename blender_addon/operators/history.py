@@ -7,13 +7,15 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from .. import history, preflight, running_job, shown_result
-from ..job_result import JobResultError, read_job_result
+from ..job_result import JobResultError, must_ask, read_job_result
 from ..write_back import WriteBackError, apply_values
+from .apply import PRESS_AGAIN, was_asked
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
+_MISMATCH = "This result did not match its reference."
 
 
 class MFO_OT_record_results(bpy.types.Operator):
@@ -47,12 +49,27 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
     bl_label = "Apply Earlier Result"
     bl_options = {"REGISTER", "UNDO"}
 
+    force: BoolProperty(name="Force", description="Also a result that does not match its reference", options=_SCRIPT)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """By a button: a result that does not match is applied at the second press."""
+        entry = history.chosen(_material(context))
+        if entry is not None and must_ask(entry.verdict):
+            if not was_asked(context, entry.job_folder):
+                self.report({"WARNING"}, f"{_MISMATCH} {PRESS_AGAIN}")
+                return {"CANCELLED"}
+            self.force = True
+        return self.execute(context)
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the sockets from the values in the .blend; the job folder may be gone."""
         material = _material(context)
         entry = history.chosen(material)
         assert material is not None
         assert entry is not None  # see poll
+        if must_ask(entry.verdict) and not self.force:
+            self.report({"ERROR"}, f"{_MISMATCH} Nothing was applied; force=True applies it anyway.")
+            return {"CANCELLED"}
         try:
             notes = apply_values(material, history.values_of(entry), Path(entry.job_folder))
         except WriteBackError as error:

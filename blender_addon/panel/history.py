@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..shown_result import VERDICT_ICONS
+
 
 class MFO_UL_history(bpy.types.UIList):
     """One line for each result: when, how, and the FLIP it reached."""
@@ -21,12 +23,12 @@ class MFO_UL_history(bpy.types.UIList):
         _active_data: object,
         _active_property: str,
     ) -> None:
-        """Draw one result; the one on the material has a check mark."""
+        """Draw one result; the one on the material has a full dot, one that looks the same a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
         split = layout.split(factor=0.5)
-        split.label(text=item.name[5:16], icon="CHECKMARK" if applied else "TIME")
+        split.label(text=item.name[5:16], icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
         right = split.split(factor=0.58)
-        right.label(text="partial" if item.partial else item.preset)
+        right.label(text="partial" if item.partial else item.preset, icon=VERDICT_ICONS.get(item.verdict, "BLANK1"))
         right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
 
 
@@ -46,6 +48,6 @@ class History:
         layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
         layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
         row = layout.row(align=True)
-        row.operator("mfo.apply_past", text="Apply", icon="CHECKMARK")
+        row.operator("mfo.apply_past", text="Apply", icon="PASTEDOWN")
         row.operator("mfo.show_past", text="Show", icon="IMAGE_DATA")
         row.operator("mfo.remove_past", text="", icon="TRASH")

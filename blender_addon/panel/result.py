@@ -6,13 +6,16 @@ from __future__ import annotations
 import bpy
 
 from .. import previews, shown_result
+from ..job_result import must_ask
 from .layout import draw_sentence
 
 # levels of result.json: icon before the value, and its meaning in the legend
 _CERTAINTY = {
-    "determined": ("CHECKMARK", "determined by the picture"),
+    "determined": ("RADIOBUT_ON", "determined by the picture"),
     "weak": ("QUESTION", "weakly determined"),
     "not_visible": ("HIDE_ON", "not visible, kept as it was"),
+    "not_told_apart": ("ARROW_LEFTRIGHT", "changed, but not told apart from others"),
+    "doubtful": ("ERROR", "doubtful: the picture is not matched"),
 }
 
 
@@ -35,7 +38,8 @@ class Result:
         column = layout.column(align=True)
         row = column.row(align=True)
         row.scale_y = 1.4
-        row.operator("mfo.apply", text="Apply", icon="CHECKMARK")
+        asked = must_ask(runtime.verdict) and runtime.asked == runtime.job_folder
+        row.operator("mfo.apply", text="Apply Anyway" if asked else "Apply", icon="PASTEDOWN")
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         applied = material is not None and bool(material.mfo.originals)
         shows_own = material is not None and applied and material.mfo.shows_original

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from .. import fit_queue, previews, running_job
+from .. import fit_queue, previews, running_job, shown_result
 from ..backend_section import draw_setup, has_trouble, needs_setup
+from ..job_result import must_ask
 from ..operators.fit_options import selected_targets
 from .layout import draw_pictures, draw_sentence, letters
 
@@ -40,8 +41,10 @@ class Run:
             draw_setup(layout, width=letters(context))
         if runtime.state in {"DONE", "FAILED"}:
             box = layout.box()
-            box.alert = runtime.state == "FAILED"
-            draw_sentence(box, context, runtime.sentence, "ERROR" if runtime.state == "FAILED" else "CHECKMARK")
+            failed = runtime.state == "FAILED"
+            box.alert = failed or must_ask(runtime.verdict)
+            icon = "ERROR" if failed else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")
+            draw_sentence(box, context, runtime.sentence, icon)
             for message in runtime.messages if runtime.state == "FAILED" else ():
                 if message.icon == "ERROR":  # the others are notes of the export
                     draw_sentence(box, context, message.name, message.icon)

@@ -16,6 +16,7 @@ from ..job.fit_scene import fit_scene
 from ..job.protocol_stream import take_stdout
 from ..types.errors import BadInputError, MfoError, SetupError
 from ..types.status import Status
+from ..types.verdict import Verdict
 from .blender_host import BlenderHost, find_blender_host
 from .fit_options import add_fit_options, fit_from_options
 from .result_text import result_text
@@ -23,6 +24,7 @@ from .run import leave
 from .run_folder import run_folder
 
 REFERENCE_VIEWS = ("scene", "standard")
+NOT_APPLIED = "Nothing was applied or saved, as the result does not match the reference; --force applies it anyway."
 _ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
 
@@ -61,6 +63,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     add_fit_options(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="job folder (default: a new temporary one)")
     parser.add_argument("--apply", action="store_true", help="put the recovered values on the material and save")
+    parser.add_argument("--force", action="store_true", help="with --apply: also where the result does not match")
     parser.add_argument("--save-as", type=Path, metavar="BLEND", help="with --apply: save here, not over FILE")
     parser.add_argument("--blender", metavar="PROGRAM", help="a Blender program (default: MFO_BLENDER, bpy, PATH)")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
@@ -87,17 +90,24 @@ def run(arguments: argparse.Namespace) -> int:
         upright=arguments.upright,
     )
     saved, notes = None, tuple(fit.result["notes"])
-    if arguments.apply:
+    if arguments.apply and may_apply(fit.result, forced=arguments.force):
         saved = arguments.save_as or arguments.file
-        notes += apply_result(host, arguments.file, fit.job, saved)
+        notes += apply_result(host, arguments.file, fit.job, saved, force=arguments.force)
+    elif arguments.apply:
+        notes += (NOT_APPLIED,)
     if stream is not None:
         answer = {**fit.result, "notes": notes, "folder": str(fit.job), "saved": str(saved) if saved else None}
         print(json.dumps(answer, ensure_ascii=False), file=stream)
         stream.close()
     else:
         lines = [*(f"note: {note}" for note in notes), result_text(fit.result), f"Report: {fit.job / 'index.html'}"]
-        print("\n".join([*lines, *([f"Saved: {saved}"] if saved else [])]))
+        print("\n".join([*lines, *([f"Saved: {saved}"] if saved else []), fit.result["sentence"]]))
     return leave(Status(fit.result["status"]))
+
+
+def may_apply(result: Mapping[str, Any], *, forced: bool) -> bool:
+    """Whether a result may go onto its material: one that does not match its reference only if that is asked for."""
+    return forced or result.get("verdict") != Verdict.DIFFERENT.value
 
 
 def fit_blend(
@@ -138,7 +148,8 @@ def fit_blend(
     return BlendFit(job, done.result)
 
 
-def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path) -> tuple[str, ...]:
+def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path, *, force: bool = False) -> tuple[str, ...]:
     """Save `blend` with the recovered values on its material; returns what was skipped, in sentences."""
-    applied = host.call("apply", blend, f"--job={job}", f"--save-as={save_as}")
+    forced = ["--force"] if force else []
+    applied = host.call("apply", blend, f"--job={job}", f"--save-as={save_as}", *forced)
     return tuple(applied.get("notes", ()))

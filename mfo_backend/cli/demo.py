@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         folder / "job",
         fit_from_options(arguments),
     )
-    apply_result(host, folder / "start.blend", fit.job, folder / "recovered.blend")
+    apply_result(host, folder / "start.blend", fit.job, folder / "recovered.blend", force=True)
     after = render("recovered.blend", "after.exr", _JUDGE_SEED)
     view = DisplayView()
     flips = [flip_error(reference, picture, display=view).mean for picture in (before, after)]

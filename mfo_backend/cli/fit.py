@@ -60,7 +60,7 @@ def work(arguments: argparse.Namespace, fitter: Fitter) -> int:
         print(json.dumps({**done.result, "folder": str(folder)}, ensure_ascii=False), file=stream)
         stream.close()
     else:
-        print(f"{done.sentence}\n\n{result_text(done.result)}\n\nReport: {folder / 'index.html'}")
+        print(f"{result_text(done.result)}\n\nReport: {folder / 'index.html'}\n{done.sentence}")
     return leave(done.status)
 
 

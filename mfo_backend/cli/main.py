@@ -29,7 +29,7 @@ COMMANDS = {
     "bench": "measure speed against error on random scenes",
     "run": "run a job folder (what the Blender add-on starts)",
 }
-_EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled."
+_EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled, 5 no match."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

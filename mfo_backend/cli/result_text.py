@@ -11,7 +11,8 @@ def result_text(result: Mapping[str, Any]) -> str:
     """Values and image differences before and after, from the content of result.json."""
     rows = [("", "start", "result", "")]
     for name, value in result["recovered"].items():
-        level = result.get("certainty", {}).get(name, {}).get("level", "")
+        certainty = result.get("certainty", {}).get(name, {})
+        level = certainty.get("words") or certainty.get("level", "")
         rows.append((name, _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " ")))
     rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
     if result.get("model_gap"):

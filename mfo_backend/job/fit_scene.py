@@ -82,6 +82,7 @@ def fit_scene(
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit, so the imports below stay here
+    from ..fit.judge.judged_result import judged_result
     from ..fit.recover_material import recover_material
     from ..render.interruptible import InterruptibleRenderer, NativeThread
     from ..render.renderer import load_renderer
@@ -110,10 +111,14 @@ def fit_scene(
     outcome = recover_material(
         renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
     )
-    result = outcome.result
+    result, shown = outcome.result, outcome.result_image
+    if not should_stop():
+        result, shown = judged_result(
+            result, reference, outcome.start_image, shown, renderer.target_mask(), view, noted=bool(request.notes)
+        )
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    return JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant)
+    return JobOutcome(result, outcome.start_image, shown, outcome.counted, variant)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

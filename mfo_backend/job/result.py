@@ -51,13 +51,17 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "schema_version": SCHEMA_VERSION,
         "status": result.status.value,
         "sentence": result.message,
+        **_verdict(result),
         "model": result.model,
         "partial": result.status is Status.CANCELLED,
         "initial": result.initial,
         "recovered": result.recovered,
         "bounds": result.bounds,
         "errors": result.errors,
-        "certainty": {n: {"sd": c.sd, "level": c.level.value} for n, c in result.certainty.items()},
+        "certainty": {
+            n: {"sd": c.sd, "level": c.level.value, "along": c.along, "words": c.words}
+            for n, c in result.certainty.items()
+        },
         "weak_combinations": [
             {"parameters": w.parameters, "step": w.step, "sentence": w.sentence} for w in result.weak_combinations
         ],
@@ -80,6 +84,23 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "passes": result.passes,
         "notes": [*notes, *result.notes],
         "versions": versions(variant),
+    }
+
+
+def _verdict(result: FitResult) -> dict[str, Any]:
+    """Verdict, its sentence, its likely cause and what it rests on; nulls where there is none."""
+    judgement = result.judgement
+    if judgement is None:
+        return {"verdict": None, "verdict_sentence": "", "verdict_cause": None, "difference": None}
+    around = judgement.around
+    return {
+        "verdict": judgement.verdict.value,
+        "verdict_sentence": judgement.sentence,
+        "verdict_cause": judgement.cause.value if judgement.cause is not None else None,
+        "difference": {
+            "target": asdict(judgement.target),
+            "around": asdict(around) if around is not None else None,
+        },
     }
 
 

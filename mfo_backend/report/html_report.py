@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..types.result import FitResult
 from ..types.status import Status
+from ..types.verdict import Verdict
 from .loss_plot import loss_plot
 from .value_table import value_rows
 
@@ -21,7 +22,8 @@ _CAPTIONS = {
     "difference": ("Difference", "FLIP of reference and result"),
 }
 _ERROR_NAMES = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
-_TONES = {Status.FAILED: "bad", Status.CANCELLED: "warn", Status.MAX_ITERATIONS: "warn"}
+_TONES = {Status.FAILED: "bad", Status.CANCELLED: "warn"}
+_VERDICT_TONES = {Verdict.SAME: "good", Verdict.CLOSE: "warn", Verdict.DIFFERENT: "bad"}
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def report_html(content: ReportContent) -> str:
 <main>
 <h1>{escape(content.title)}</h1>
 <p class="soft">{escape(content.subtitle)}</p>
-<p class="status {_TONES.get(result.status, "good")}">{escape(result.message)}</p>
+{_headline(result)}
 {_figures(result)}
 {"".join(sections)}
 <footer>{versions}</footer>
@@ -72,6 +74,14 @@ def report_html(content: ReportContent) -> str:
 </body>
 </html>
 """
+
+
+def _headline(result: FitResult) -> str:
+    """The verdict; how the fit ended where there is none. A tick only where the result looks the same."""
+    verdict = result.judgement.verdict if result.judgement is not None else None
+    tone = _VERDICT_TONES[verdict] if verdict is not None else _TONES.get(result.status, "warn")
+    tick = "✓ " if verdict is Verdict.SAME else ""
+    return f'<p class="status {tone}">{tick}{escape(result.message)}</p>'
 
 
 def _section(title: str, body: str) -> str:

@@ -12,6 +12,8 @@ from ..types.certainty import Certainty, Level
 from ..types.parameter import Value
 from ..types.result import FitResult
 
+_WITH_SPREAD = (Level.DETERMINED, Level.WEAK)
+
 
 def value_rows(result: FitResult) -> str:
     """One table row per fitted parameter."""
@@ -45,8 +47,8 @@ def _certainty(certainty: Certainty | None) -> str:
     """The level in words with the standard deviation, where that says something."""
     if certainty is None:
         return ""
-    spread = f" ±{max(certainty.sd):.2g}" if certainty.level is not Level.NOT_VISIBLE else ""
-    return certainty.level.value.replace("_", " ") + spread
+    spread = f" ±{max(certainty.sd):.2g}" if certainty.level in _WITH_SPREAD else ""
+    return escape(certainty.words) + spread
 
 
 def _shown(value: Value | None) -> str:

@@ -12,15 +12,37 @@ class Level(Enum):
 
     DETERMINED = "determined"
     WEAK = "weak"
-    NOT_VISIBLE = "not_visible"
+    NOT_VISIBLE = "not_visible"  # and kept as in the scene
+    NOT_TOLD_APART = "not_told_apart"  # changed, together with others whose effect looks alike
+    DOUBTFUL = "doubtful"  # well determined if the picture were matched, which it is not
 
 
 @dataclass(frozen=True)
 class Certainty:
-    """Standard deviation of each component of a value, in the value's own unit, and what it means."""
+    """Standard deviation of each component of a value, in the value's own unit, and what it means.
+
+    `along` names the values that this one can be traded against, most of all first.
+    """
 
     sd: tuple[float, ...]
     level: Level
+    along: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The level for a user."""
+        if self.level is Level.NOT_TOLD_APART and self.along:
+            return f"not told apart from {', '.join(name.replace('_', ' ').title() for name in self.along)}"
+        return _WORDS[self.level]
+
+
+_WORDS = {
+    Level.DETERMINED: "determined",
+    Level.WEAK: "weakly determined",
+    Level.NOT_VISIBLE: "not visible, kept",
+    Level.NOT_TOLD_APART: "changed, hardly visible",
+    Level.DOUBTFUL: "doubtful, as the picture is not matched",
+}
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from .certainty import Certainty, WeakCombination
 from .model_gap import ModelGap
 from .parameter import Value
 from .status import Status
+from .verdict import Judgement
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class FitResult:
     `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
     well the picture determines each value, where the preset finds out, and `weak_combinations` which values it
     determines together only; `notes` are sentences on what was left out or
-    kept. `model_gap` is None where it could not be measured.
+    kept. `model_gap` and `judgement` are None where they could not be measured.
     """
 
     status: Status
@@ -60,3 +61,4 @@ class FitResult:
     notes: tuple[str, ...] = ()
     weak_combinations: tuple[WeakCombination, ...] = ()
     model_gap: ModelGap | None = None
+    judgement: Judgement | None = None

@@ -17,6 +17,7 @@ class Status(Enum):
     BAD_INPUT = "bad_input"
     SETUP = "setup"
     FAILED = "failed"
+    DIFFERENT = "different"
 
     @property
     def sentence(self) -> str:
@@ -25,7 +26,9 @@ class Status(Enum):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of the `mfo` command: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled."""
+        """Exit code of the `mfo` command: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled,
+        5 the result does not match the reference.
+        """
         return _EXIT_CODES.get(self, 0)
 
 
@@ -38,5 +41,6 @@ _SENTENCES = {
     Status.BAD_INPUT: "The input cannot be used.",
     Status.SETUP: "Something the backend needs is missing; run `mfo doctor`.",
     Status.FAILED: "The fit failed.",
+    Status.DIFFERENT: "The result does not match the reference.",
 }
-_EXIT_CODES = {Status.FAILED: 1, Status.BAD_INPUT: 2, Status.SETUP: 3, Status.CANCELLED: 4}
+_EXIT_CODES = {Status.FAILED: 1, Status.BAD_INPUT: 2, Status.SETUP: 3, Status.CANCELLED: 4, Status.DIFFERENT: 5}

@@ -77,7 +77,7 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
         for name, value in result["recovered"].items()
     }
     return Row(
-        kind, asdict(case), result.get("verdict", {}).get("verdict", ""), result.get("verdict", {}).get("cause", ""),
+        kind, asdict(case), result.get("verdict") or "", result.get("verdict_cause") or "",
         code, *_flips(folder), start_flip=result["errors"]["flip"][0], seconds=result["seconds"], values=values,
         notes=result["notes"],
     )  # fmt: skip

@@ -37,7 +37,9 @@ def build(case: Case, folder: Path) -> None:
     _set_material(start_of(case))
     _save(folder / "start.blend")
     if case.plant == "other_picture":
-        other = replace(case, number=case.number + 1000, plant="", shape="monkey" if case.shape != "monkey" else "torus")
+        other = replace(
+            case, number=case.number + 1000, plant="", shape="monkey" if case.shape != "monkey" else "torus"
+        )
         _scene(other)
         _set_material(sockets_of(other))
     else:
@@ -83,7 +85,9 @@ def _target(case: Case, draw: random.Random) -> None:
             rotation=(math.radians(70), 0.0, draw.uniform(-0.5, 0.5)),
         )  # fmt: skip
     else:
-        bpy.ops.mesh.primitive_monkey_add(size=2.1, location=(0.0, 0.0, 1.15), rotation=(-0.2, 0.0, draw.uniform(-0.5, 0.5)))
+        bpy.ops.mesh.primitive_monkey_add(
+            size=2.1, location=(0.0, 0.0, 1.15), rotation=(-0.2, 0.0, draw.uniform(-0.5, 0.5))
+        )
         subdivision = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
         subdivision.levels = subdivision.render_levels = 3
     target = bpy.context.object

@@ -139,6 +139,7 @@ def write_result(folder: Path, name: str, status: str, sentence: str, request: d
         "errors": {"flip": [0.21, 0.012], "hdr_flip": [0.3, 0.05], "mse": [0.1, 0.0004]},
         "weak_combinations": [{"parameters": ["metallic"], "step": {}, "sentence": "Metallic and roughness."}],
         "certainty": {"roughness": {"sd": [0.01], "level": "determined"}, "metallic": {"sd": [0.2], "level": "weak"}},
+        "verdict": "same", "verdict_sentence": sentence, "verdict_cause": None,
         "notes": ["Light 'Sun': specular factor is ignored."], "versions": {}, "request_fit": request["fit"],
     }  # fmt: skip
     (folder / f"{name}.tmp").write_text(json.dumps(result))

@@ -21,6 +21,7 @@ from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.model_gap import ModelGap
 from mfo_backend.types.result import CurvePoint, FitResult, StageReport
 from mfo_backend.types.status import Status
+from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -200,3 +201,25 @@ def test_linear_pixels_go_through_the_view() -> None:
     shown = displayed_linear(pixels, DisplayView(exposure_ev=1.0))
     # twice 0.25 is 0.5, whose sRGB value is 0.7354; twice 0.107 is 0.214, whose value is 0.5 (IEC 61966-2-1)
     np.testing.assert_allclose(shown, [[[0.7354, 0.5, 0.0], [1.0, 0.0, 1.0]]], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "tone"), [(Verdict.SAME, "good"), (Verdict.CLOSE, "warn"), (Verdict.DIFFERENT, "bad")]
+)
+def test_the_verdict_is_at_the_top_and_only_the_same_has_a_tick(
+    content: ReportContent, verdict: Verdict, tone: str
+) -> None:
+    cause = None if verdict is Verdict.SAME else Cause.LIGHT
+    judgement = Judgement(verdict, cause, Difference(0.1, 0.05, 0.02, 0.01))
+    page = report_html(
+        dataclasses.replace(
+            content, result=dataclasses.replace(content.result, judgement=judgement, message=judgement.sentence)
+        )
+    )
+    tick = "✓ " if verdict is Verdict.SAME else ""
+    assert f'<p class="status {tone}">{tick}{judgement.sentence}</p>' in page
+    assert page.index(judgement.sentence) < page.index("<h2>")
+
+
+def test_a_result_without_a_verdict_has_no_tick(content: ReportContent) -> None:
+    assert "✓" not in report_html(content)

@@ -27,6 +27,7 @@ WEAK_BELOW = 0.15
 # Relative error a picture has even where the residual says 0: float32, quantisation, small differences of renderers
 MODEL_ERROR = 0.002
 INFLATION = 1.2  # where own noise in the derivatives is not known
+TOGETHER, MOST_NAMED = 0.5, 2  # correlation from which on two values move together; so many are named
 PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite
 
 
@@ -69,8 +70,12 @@ def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:
     return (table.upper - table.lower) * np.sqrt(np.maximum(np.diag(spread), 0.0))
 
 
-def certainties(sd: Vector, table: ParameterTable) -> dict[str, Certainty]:
-    """Certainty of each value; a colour is as sure as its worst channel."""
+def certainties(sd: Vector, table: ParameterTable, spread: Vector | None = None) -> dict[str, Certainty]:
+    """Certainty of each value; a colour is as sure as its worst channel.
+
+    By the covariance `spread` (k, k), where given, a certainty names the values that it can be traded against.
+    """
+    along = {} if spread is None else _traded(spread, table)
     result = {}
     for parameter in table:
         part = sd[table.slice_of(parameter.name)]
@@ -79,5 +84,18 @@ def certainties(sd: Vector, table: ParameterTable) -> dict[str, Certainty]:
             level = Level.DETERMINED
         else:
             level = Level.WEAK if worst < WEAK_BELOW else Level.NOT_VISIBLE
-        result[parameter.name] = Certainty(tuple(float(v) for v in part), level)
+        result[parameter.name] = Certainty(tuple(float(v) for v in part), level, along.get(parameter.name, ()))
     return result
+
+
+def _traded(spread: Vector, table: ParameterTable) -> dict[str, tuple[str, ...]]:
+    """For each value the names of others whose errors go along with its own, the most so first."""
+    sd = np.sqrt(np.maximum(np.diag(spread), 1e-30))
+    correlation = np.abs(spread / np.outer(sd, sd))
+    found = {}
+    for name in table.names:
+        rows = correlation[table.slice_of(name)]
+        shared = {other: float(rows[:, table.slice_of(other)].max()) for other in table.names if other != name}
+        together = sorted((n for n, c in shared.items() if c > TOGETHER), key=lambda n: -shared[n])
+        found[name] = tuple(together[:MOST_NAMED])
+    return found

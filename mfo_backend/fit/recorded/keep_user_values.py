@@ -122,7 +122,7 @@ class _Judged:
         rows, own = rows_of_samples(problem.evaluate.samples(x), residual)
         spread = covariance(rows, own, table, model_error=0.0 if self._weighted else MODEL_ERROR)
         spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
-        return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table), spread
+        return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table, spread), spread
 
     def noise(self, cost: float) -> float:
         """Mean square of a residual that is noise."""

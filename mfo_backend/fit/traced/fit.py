@@ -184,4 +184,4 @@ def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certain
         found = np.maximum(variance, np.diag(end.covariance)) if doubted else np.diag(end.covariance)
         variance = np.where(end.kept, variance, found)
     least = np.where(ends[-1].unseen, WEAK_BELOW * (table.upper - table.lower), 0.0)
-    return certainties(np.maximum(np.sqrt(variance), least), table)
+    return certainties(np.maximum(np.sqrt(variance), least), table, ends[-1].covariance)

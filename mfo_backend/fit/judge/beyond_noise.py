@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much of the difference of two pictures noise does not explain.
+
+Noise of path-traced pictures is independent from pixel to pixel, whatever its size and its tails, so products of the
+differences of near pixels have the mean 0; what renderers, scenes and materials differ in is wider than a pixel and
+adds its square. Flipping the sign of each pixel's difference is as likely as not under noise alone, so the root of the
+sum of the products' squares is the standard deviation of their sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.colour import srgb_from_linear
+from ...metrics.flip import flip_map
+from ...types.verdict import Difference
+from .neighbours import sums_around
+
+# Pixels between two whose differences are multiplied. Those next to each other may share some of their noise: by
+# compression, by resampling
+APART = ((0, 2), (2, 0), (2, 2), (2, -2), (0, 3), (3, 0))
+# The same of means over blocks, which share nothing
+NEXT = ((0, 1), (1, 0), (1, 1), (1, -1))
+BLUR = 2.0  # pixels: of what an eye is asked about, so that it does not look at noise
+REACH = 4  # pixels to each side of one that its noise is taken from
+LEAST_PIXELS = 40  # fewer say too little
+CHANCE = 2.0  # standard deviations of chance that are taken from what neighbours share
+
+Light = NDArray[np.floating]
+Mask = NDArray[np.bool_]
+
+
+def beyond_noise(
+    reference: Light, result: Light, mask: Mask, lags: Sequence[tuple[int, int]] = APART
+) -> Difference | None:
+    """The difference over a mask of two pictures (height, width, 3) in linear light, 1 being a display's white.
+
+    Values above 1 count in means of neighbours and are clipped afterwards. Both may hold noise. None for few pixels.
+    """
+    if np.count_nonzero(mask) < LEAST_PIXELS:
+        return None
+    shown = [_display(_blurred(light, mask)) for light in (reference, result)]
+    seen = _mean_flip(shown[0], shown[1], mask)
+    apart = np.where(mask[..., None], reference - result, 0.0).astype(np.float64)
+    noise = np.sqrt(_noise_variance(apart, mask, lags))[..., None]
+    drawn = noise * np.random.default_rng(0).standard_normal(apart.shape)
+    noisy = _display(np.maximum(_blurred(result, mask) + _blurred(drawn, mask), 0.0))
+    displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
+    shared, deviation = _shared_square(displayed, mask, lags)
+    return Difference(
+        seen,
+        _mean_flip(shown[1], noisy, mask),
+        max(shared, 0.0) ** 0.5,
+        max(shared - CHANCE * deviation, 0.0) ** 0.5,
+    )
+
+
+def _shared_square(apart: Light, mask: Mask, lags: Sequence[tuple[int, int]]) -> tuple[float, float]:
+    """Mean product of the differences of near pixels, and its standard deviation under independent noise."""
+    total = squares = count = 0.0
+    for here, there in map(_pair, lags):
+        products = (apart[here] * apart[there]).mean(axis=-1)
+        both = mask[here] & mask[there]
+        total += float(products[both].sum())
+        squares += float(np.square(products[both]).sum())
+        count += np.count_nonzero(both)
+    return total / max(count, 1.0), squares**0.5 / max(count, 1.0)
+
+
+def _noise_variance(apart: Light, mask: Mask, lags: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+    """Variance (height, width) around each pixel without what its neighbours share, a mean over the channels."""
+    products, pairs = np.zeros(mask.shape), np.zeros(mask.shape)
+    for here, there in map(_pair, lags):
+        both = mask[here] & mask[there]
+        products[here] += (apart[here] * apart[there]).mean(axis=-1) * both
+        pairs[here] += both
+    shared = sums_around(products, REACH) / np.maximum(sums_around(pairs, REACH), 1.0)
+    squares = sums_around(np.square(apart).mean(axis=-1) * mask, REACH)
+    variance = squares / np.maximum(sums_around(mask.astype(np.float64), REACH), 1.0)
+    return np.where(mask, np.maximum(variance - np.maximum(shared, 0.0), 0.0), 0.0)
+
+
+def _pair(lag: tuple[int, int]) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Index of all pixels that have another so many rows and columns away, and of these."""
+    rows, columns = lag
+    forward, back = slice(columns, None), slice(None, -columns or None)
+    if columns < 0:
+        forward, back = slice(None, columns), slice(-columns, None)
+    return (slice(None, -rows or None), back), (slice(rows, None), forward)
+
+
+def _blurred(light: Light, mask: Mask) -> NDArray[np.float64]:
+    """A Gaussian mean over the pixels of the mask, 0 elsewhere."""
+    from scipy.ndimage import gaussian_filter
+
+    inside = np.where(mask[..., None], light, 0.0).astype(np.float64)
+    weight = gaussian_filter(mask.astype(np.float64), BLUR, mode="constant", truncate=3.0)[..., None]
+    mean = gaussian_filter(inside, (BLUR, BLUR, 0.0), mode="constant", truncate=3.0)
+    return np.where(mask[..., None], mean / np.maximum(weight, 1e-6), 0.0)
+
+
+def _display(light: Light) -> NDArray[np.float32]:
+    return srgb_from_linear(np.clip(light, 0.0, 1.0).astype(np.float32))
+
+
+def _mean_flip(first: NDArray[np.float32], second: NDArray[np.float32], mask: Mask) -> float:
+    return float(flip_map(first, second)[mask].mean(dtype=np.float64))

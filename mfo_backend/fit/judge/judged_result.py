@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A fit's result with its verdict: what is said of it and of its values, and the start where that is better."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.tone_mapping import View
+from ...types.certainty import Certainty, Level
+from ...types.image import Image, Pixels
+from ...types.parameter import Value
+from ...types.result import FitResult
+from ...types.status import Status
+from ...types.verdict import Verdict
+from ..result.outcome import START_KEPT
+from .verdict import is_worse, judge
+
+MOVED = 1e-6  # relative to a value and to 1: float32 from file to file
+
+
+def judged_result(
+    result: FitResult,
+    reference: Image,
+    start: Pixels,
+    end: Pixels,
+    mask: NDArray[np.bool_],
+    view: View,
+    *,
+    noted: bool = False,
+) -> tuple[FitResult, Pixels]:
+    """The result with its verdict, and its picture: of the start where the end is farther from the reference.
+
+    Pictures are scene-linear, `mask` sees the target, `noted` says that the export has left something out. Under a
+    verdict of `different` the status says so too, and no value is called determined.
+    """
+    if _has_moved(result) and is_worse(reference, start, end, mask, view):
+        errors = {name: (before, before) for name, (before, _) in result.errors.items()}
+        result = replace(
+            result, recovered=dict(result.initial), errors=errors, certainty={}, weak_combinations=(),
+            message=f"{result.status.sentence} {START_KEPT}",
+        )  # fmt: skip
+        end = start
+    judgement = judge(reference, end, mask, view, noted=noted)
+    if judgement is None:
+        return replace(result, certainty=_said(result, doubted=False)), end
+    different = judgement.verdict is Verdict.DIFFERENT
+    return replace(
+        result,
+        judgement=judgement,
+        status=Status.DIFFERENT if different and result.status.exit_code == 0 else result.status,
+        message=judgement.sentence + result.message.removeprefix(result.status.sentence),
+        certainty=_said(result, doubted=different),
+    ), end
+
+
+def _has_moved(result: FitResult) -> bool:
+    return any(_moved(result.initial.get(name), value) for name, value in result.recovered.items())
+
+
+def _moved(before: Value | None, after: Value) -> bool:
+    return before is None or not np.allclose(before, after, rtol=MOVED, atol=MOVED)
+
+
+def _said(result: FitResult, *, doubted: bool) -> dict[str, Certainty]:
+    """Certainties in words that are true: `not visible` is a value that was kept, `determined` one of a true result."""
+    said = {}
+    for name, certainty in result.certainty.items():
+        level = certainty.level
+        if level is Level.NOT_VISIBLE and _moved(result.initial.get(name), result.recovered[name]):
+            level = Level.NOT_TOLD_APART
+        elif level is Level.DETERMINED and doubted:
+            level = Level.DOUBTFUL
+        said[name] = replace(certainty, level=level)
+    return said

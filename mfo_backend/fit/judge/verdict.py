@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a fit's result looks like its reference, and what keeps it from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.block_means import block_side, block_sums
+from ...metrics.colour import linear_from_srgb, srgb_from_linear
+from ...metrics.tone_mapping import DisplayView, View
+from ...render.widened_mask import widened
+from ...types.image import Encoding, Image, Pixels
+from ...types.verdict import Difference, Judgement, Verdict
+from .beyond_noise import NEXT, beyond_noise
+from .likely_cause import likely_cause
+
+# Measured on Cycles scenes by `studies.verdicts`, see docs/verdicts.md: without anything planted the first was at most
+# 0.02, the second 0.008; of results more than 0.05 of FLIP above the noise it is above one of them.
+SAME_VISIBLE, SAME_SHARED = 0.025, 0.01
+DIFFERENT_VISIBLE, DIFFERENT_SHARED = 0.1, 0.05
+# Of what surrounds the target: nothing there is fitted, and it is exported less exactly than the target
+AROUND_SHARED = 0.03
+AROUND_BLOCKS = 32  # along the longer side: the surroundings are rendered with few samples
+BESIDE = 3  # pixels next to the target that are not its surroundings
+PLAIN = 0.004  # deviation of display values: so even a background was cut out, not rendered
+BRIGHTEST = 4.0  # times a display's white: fireflies count as if they were so bright
+WORSE = 0.01  # FLIP more than that of the start from which on a result is worse
+
+Mask = NDArray[np.bool_]
+
+
+def judge(reference: Image, result: Pixels, mask: Mask, view: View, *, noted: bool = False) -> Judgement | None:
+    """The verdict on a result's scene-linear picture (height, width, 3) where `mask` sees the target.
+
+    `view` is what a display reference was made with; `noted` whether the export has left something out. None if the
+    target fills too few pixels to say.
+    """
+    side = block_side(mask)
+    target = _light_means(reference, result, view, mask, side)
+    inside = block_sums(mask[..., None].astype(np.float64), side)[..., 0] > 0.5 * side**2
+    difference = beyond_noise(*target, inside)
+    if difference is None:
+        return None
+    blocks = math.ceil(max(mask.shape) / AROUND_BLOCKS)
+    surroundings = _light_means(reference, result, view, mask, blocks)
+    near = widened(mask, BESIDE)
+    outside = block_sums(near[..., None].astype(np.float64), blocks)[..., 0] == 0.0
+    around = None if _is_cut_out(reference, near) else beyond_noise(*surroundings, outside, NEXT)
+    differs = around is not None and around.shared_at_least > AROUND_SHARED
+    verdict = _verdict(difference)
+    if verdict is Verdict.SAME and differs:
+        verdict = Verdict.CLOSE
+    if verdict is Verdict.SAME:
+        return Judgement(verdict, None, difference, around)
+    first, second = (_display(light) for light in surroundings)
+    shown, result_shown = (_display(light) for light in target)
+    cause = likely_cause(shown, result_shown, inside, (first, second, outside) if differs else None, noted=noted)
+    return Judgement(verdict, cause, difference, around)
+
+
+def is_worse(reference: Image, start: Pixels, result: Pixels, mask: Mask, view: View) -> bool:
+    """Whether a result's picture is visibly farther from the reference than that of the start."""
+    side = block_side(mask)
+    inside = block_sums(mask[..., None].astype(np.float64), side)[..., 0] > 0.5 * side**2
+    before, after = (
+        beyond_noise(*_light_means(reference, picture, view, mask, side), inside) for picture in (start, result)
+    )
+    return before is not None and after is not None and after.visible > before.visible + WORSE
+
+
+def _verdict(difference: Difference) -> Verdict:
+    visible, shared = difference.visible, difference.shared_at_least
+    if visible <= SAME_VISIBLE and shared <= SAME_SHARED:
+        return Verdict.SAME
+    if visible > DIFFERENT_VISIBLE or shared > DIFFERENT_SHARED:
+        return Verdict.DIFFERENT
+    return Verdict.CLOSE
+
+
+def _light_means(
+    reference: Image, result: Pixels, view: View, mask: Mask, side: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both pictures in light, 1 being a display's white, as means over blocks; radiance is averaged before a view."""
+    if reference.encoding is Encoding.LINEAR:
+        scale = np.float32(2.0 ** DisplayView.for_scene(reference.pixels, mask).exposure_ev)
+        first, second = (np.clip(p * scale, 0.0, BRIGHTEST) for p in (reference.pixels, result))
+        return _means(first, side), _means(second, side)
+    means = _means(np.maximum(result, 0.0), side).astype(np.float32)
+    return _means(linear_from_srgb(reference.pixels), side), np.asarray(view.light(means), np.float64)
+
+
+def _means(pixels: Pixels, side: int) -> NDArray[np.float64]:
+    return block_sums(pixels.astype(np.float64), side) / side**2
+
+
+def _display(light: NDArray[np.floating]) -> NDArray[np.float32]:
+    return srgb_from_linear(np.clip(light, 0.0, 1.0).astype(np.float32))
+
+
+def _is_cut_out(reference: Image, near: Mask) -> bool:
+    """Whether the reference shows one even colour around the target, or nothing does."""
+    outside = ~near if reference.alpha is None else ~near & (reference.alpha > 0.5)
+    return not outside.any() or bool(np.all(reference.pixels[outside].std(axis=0) < PLAIN))

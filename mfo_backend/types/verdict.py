@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a result looks like its reference: one vocabulary for files, exit codes, command line, report and panel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Verdict(Enum):
+    """What an eye would say of result and reference side by side; the value is the word in JSON."""
+
+    SAME = "same"
+    CLOSE = "close"
+    DIFFERENT = "different"
+
+    @property
+    def sentence(self) -> str:
+        """What a user reads."""
+        return _SENTENCES[self]
+
+
+class Cause(Enum):
+    """What most likely keeps a result from its reference; the value is the word in JSON."""
+
+    CAMERA_OR_SHAPE = "camera_or_shape"
+    LIGHT = "light"
+    SURROUNDINGS = "surroundings"
+    PICTURE = "picture"
+    NOTED = "noted"
+    MATERIAL = "material"
+
+    @property
+    def sentence(self) -> str:
+        """What a user reads."""
+        return _CAUSES[self]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far two pictures are apart and how much of that noise explains.
+
+    Attributes
+    ----------
+    seen
+        Mean FLIP of the pictures without their finest detail, in [0, 1].
+    noise
+        The same of two pictures that differ by as much noise as these have and by nothing else.
+    shared
+        Root mean square of the difference that neighbouring pixels share, in display values of [0, 1]; noise has none.
+    shared_at_least
+        The same less two standard deviations of chance.
+    """
+
+    seen: float
+    noise: float
+    shared: float
+    shared_at_least: float
+
+    @property
+    def visible(self) -> float:
+        """FLIP that noise does not explain."""
+        return max(self.seen - self.noise, 0.0)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict on a result, its likely cause where it can be told, and the differences it rests on.
+
+    `around` is the difference outside of the target; None where there is nothing to compare.
+    """
+
+    verdict: Verdict
+    cause: Cause | None
+    target: Difference
+    around: Difference | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Verdict and cause for a user."""
+        return self.verdict.sentence if self.cause is None else f"{self.verdict.sentence} {self.cause.sentence}"
+
+
+_SENTENCES = {
+    Verdict.SAME: "The result looks the same as the reference.",
+    Verdict.CLOSE: "The result is close to the reference: compare before applying.",
+    Verdict.DIFFERENT: "The result does not match the reference.",
+}
+_CAUSES = {
+    Cause.CAMERA_OR_SHAPE: "The difference lies at edges: check the camera and the shape of the object.",
+    Cause.LIGHT: "The surroundings of the object are lit differently, too: check lamps, world and exposure.",
+    Cause.SURROUNDINGS: "Something around the object differs as well: check what is missing, hidden or moved.",
+    Cause.PICTURE: "Hardly anything around the object agrees: check world, lamps and whether it is this scene.",
+    Cause.NOTED: "The notes name what the fit does not know of this scene; that may be the reason.",
+    Cause.MATERIAL: "The surroundings match, the object does not: it may have a texture that the scene lacks, or be of "
+    "another kind of material than the chosen values can make.",
+}

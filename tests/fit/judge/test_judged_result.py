@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of a result and of its values, by verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mfo_backend.fit.judge.judged_result import judged_result
+from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.types.certainty import Certainty, Level
+from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.result import FitResult
+from mfo_backend.types.status import Status
+from mfo_backend.types.verdict import Verdict
+
+MASK = np.ones((48, 48), bool)
+VIEW = DisplayView()
+
+
+def flat(level):
+    return np.full((48, 48, 3), level, np.float32)
+
+
+def result(status=Status.CONVERGED):
+    return FitResult(
+        status=status,
+        message=f"{status.sentence} More.",
+        model="blender_principled",
+        initial={"roughness": 0.5, "coat_weight": 0.0, "sheen_weight": 0.0, "metallic": 0.0},
+        recovered={"roughness": 0.2, "coat_weight": 0.7, "sheen_weight": 0.0, "metallic": 0.1},
+        bounds={},
+        stages=(),
+        errors={"flip": (0.3, 0.1)},
+        seconds=1.0,
+        passes=1.0,
+        certainty={
+            "roughness": Certainty((0.01,), Level.DETERMINED),
+            "coat_weight": Certainty((0.5,), Level.NOT_VISIBLE, ("roughness", "base_color")),
+            "sheen_weight": Certainty((0.5,), Level.NOT_VISIBLE, ("roughness",)),
+            "metallic": Certainty((0.5,), Level.NOT_VISIBLE),
+        },
+    )
+
+
+def judged(reference, start, end, given=None):
+    return judged_result(given or result(), Image(flat(reference), Encoding.LINEAR), flat(start), flat(end), MASK, VIEW)
+
+
+def words(found):
+    return {name: certainty.words for name, certainty in found.certainty.items()}
+
+
+def test_a_match_keeps_its_status_and_what_is_sure():
+    found, picture = judged(0.3, 0.1, 0.3)
+    assert found.judgement.verdict is Verdict.SAME
+    assert found.status is Status.CONVERGED
+    assert found.message == "The result looks the same as the reference. More."
+    assert words(found) == {
+        "roughness": "determined",
+        "coat_weight": "not told apart from Roughness, Base Color",
+        "sheen_weight": "not visible, kept",
+        "metallic": "changed, hardly visible",
+    }
+    assert np.array_equal(picture, flat(0.3))
+
+
+def test_nothing_is_determined_where_the_picture_is_not_matched():
+    found, _ = judged(0.3, 0.005, 0.05)
+    assert found.judgement.verdict is Verdict.DIFFERENT
+    assert found.status is Status.DIFFERENT
+    assert found.status.exit_code == 5
+    assert found.message.startswith("The result does not match the reference.")
+    assert "converged" not in found.message
+    assert words(found)["roughness"] == "doubtful, as the picture is not matched"
+
+
+def test_a_cancelled_fit_stays_cancelled():
+    assert judged(0.3, 0.005, 0.05, result(Status.CANCELLED))[0].status is Status.CANCELLED
+
+
+def test_what_is_worse_than_the_start_is_not_the_result():
+    found, picture = judged(0.3, 0.29, 0.1)
+    assert found.recovered == found.initial
+    assert found.errors == {"flip": (0.3, 0.3)}
+    assert found.certainty == {}
+    assert found.message.endswith("Nothing was better than the start, so the start was kept.")
+    assert np.array_equal(picture, flat(0.29))

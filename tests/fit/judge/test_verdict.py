@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Verdicts and causes on pictures whose difference and noise are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from mfo_backend.fit.judge.beyond_noise import beyond_noise
+from mfo_backend.fit.judge.verdict import is_worse, judge
+from mfo_backend.metrics.colour import srgb_from_linear
+from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.verdict import Cause, Verdict
+
+SIZE = 96
+VIEW = DisplayView()
+ROWS, COLUMNS = np.indices((SIZE, SIZE))
+MASK = (ROWS - 48) ** 2 + (COLUMNS - 48) ** 2 < 26**2
+
+
+def scene(*, ball=0.6, floor=0.3, right=0, red=1.0):
+    """A shaded ball before a floor with stripes, (SIZE, SIZE, 3); moved `right` by so many pixels."""
+    columns = COLUMNS - right
+    shade = np.clip(1.0 - ((ROWS - 40) ** 2 + (columns - 42) ** 2) / 2500.0, 0.05, 1.0)
+    stripes = floor * (1.0 + 0.4 * np.sin(0.3 * columns + 0.2 * ROWS))
+    disc = (ROWS - 48) ** 2 + (columns - 48) ** 2 < 26**2
+    grey = np.where(disc, ball * shade, stripes)
+    return (grey[..., None] * (red, 1.0, 1.0)).astype(np.float32)
+
+
+def noisy(picture, share, seed):
+    """With noise that grows as the root of the light and has the tails of path tracing."""
+    draw = np.random.default_rng(seed)
+    return np.maximum(picture + share * np.sqrt(picture) * draw.standard_t(4, picture.shape), 0.0).astype(np.float32)
+
+
+def verdict_of(reference, result, *, noted=False, encoding=Encoding.LINEAR):
+    if encoding is Encoding.SRGB:
+        reference = srgb_from_linear(np.clip(reference, 0.0, 1.0))
+    found = judge(Image(reference, encoding), result, MASK, VIEW, noted=noted)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("encoding", list(Encoding))
+@pytest.mark.parametrize("share", [0.0, 0.03, 0.12])
+def test_noise_alone_looks_the_same(share, encoding):
+    for seed in range(10):
+        reference, result = noisy(scene(), share, seed), noisy(scene(), share / 2.0, 100 + seed)
+        found = verdict_of(reference, result, encoding=encoding)
+        assert (found.verdict, found.cause) == (Verdict.SAME, None), (seed, found)
+        assert found.sentence == "The result looks the same as the reference."
+
+
+@pytest.mark.parametrize("share", [0.0, 0.03, 0.08])
+def test_the_larger_the_difference_the_worse_the_verdict(share):
+    order = [Verdict.SAME, Verdict.CLOSE, Verdict.DIFFERENT]
+    found = [verdict_of(noisy(scene(), share, 1), noisy(scene(ball=b), share, 2)).verdict for b in (0.6, 0.573, 0.3)]
+    assert found == order
+
+
+def test_what_neighbours_share_is_found_in_noise_of_any_size():
+    """Of a difference of 0.05 in display values, under noise up to twice as large."""
+    level = np.full((SIZE, SIZE, 3), 0.3)
+    other = 0.3 - 0.05 * (srgb_from_linear(np.float32(0.3)) - srgb_from_linear(np.float32(0.2))) / 0.1
+    apart = float(srgb_from_linear(np.float32(0.3)) - srgb_from_linear(np.float32(other)))
+    for share in (0.0, 0.05, 0.1):
+        found = beyond_noise(noisy(level, share, 1), noisy(np.full_like(level, other), share, 2), MASK)
+        assert found.shared == pytest.approx(apart, rel=0.02 + 2.0 * share)
+        assert found.shared_at_least <= found.shared
+
+
+def test_few_pixels_have_no_verdict():
+    mask = np.zeros_like(MASK)
+    mask[10:14, 10:14] = True
+    assert judge(Image(scene(), Encoding.LINEAR), scene(), mask, VIEW) is None
+
+
+@pytest.mark.parametrize(
+    ("reference", "result", "cause"),
+    [
+        (scene(right=3), scene(), Cause.CAMERA_OR_SHAPE),
+        (scene(ball=0.9, floor=0.45), scene(), Cause.LIGHT),
+        (scene(red=1.6), scene(red=1.0), Cause.LIGHT),
+        (np.where(MASK[..., None], scene(ball=0.2), scene()), scene(), Cause.MATERIAL),
+        (np.where((COLUMNS > 78)[..., None], scene() * 0.2, scene(ball=0.4)), scene(), Cause.SURROUNDINGS),
+        (np.random.default_rng(0).uniform(0, 1, (SIZE, SIZE, 3)), scene(), Cause.PICTURE),
+    ],
+    ids=["camera", "light", "tinted light", "material", "object beside it", "another picture"],
+)
+def test_the_cause_is_where_the_pictures_differ(reference, result, cause):
+    if cause is Cause.PICTURE:
+        reference = gaussian_filter(reference, (6, 6, 0)) * 4.0 - 1.5
+        reference = np.clip(reference, 0.0, 1.0)
+    found = verdict_of(noisy(reference.astype(np.float32), 0.03, 1), noisy(result, 0.02, 2))
+    assert found.verdict is not Verdict.SAME
+    assert found.cause is cause
+    assert found.sentence == f"{found.verdict.sentence} {cause.sentence}"
+
+
+def test_a_note_of_the_export_is_named_where_nothing_else_is():
+    reference = np.where(MASK[..., None], scene(ball=0.2), scene())
+    assert verdict_of(reference, scene(), noted=True).cause is Cause.NOTED
+
+
+def test_a_result_that_fits_under_another_light_is_not_the_same():
+    """The material makes up for the light on the target: the surroundings tell."""
+    reference = np.where(MASK[..., None], scene(), scene(floor=0.5))
+    found = verdict_of(noisy(reference, 0.03, 1), noisy(scene(), 0.03, 2))
+    assert (found.verdict, found.cause) == (Verdict.CLOSE, Cause.LIGHT)
+
+
+def test_a_background_that_was_cut_out_says_nothing():
+    reference = np.where(MASK[..., None], scene(), 1.0).astype(np.float32)
+    found = verdict_of(noisy(reference, 0.0, 1), noisy(scene(), 0.03, 2))
+    assert found.verdict is Verdict.SAME
+    assert found.around is None
+
+
+def test_worse_than_the_start_is_what_looks_farther_from_the_reference():
+    reference = Image(noisy(scene(), 0.1, 0), Encoding.LINEAR)
+    near, far = noisy(scene(ball=0.58), 0.05, 1), noisy(scene(ball=0.4), 0.05, 2)
+    assert is_worse(reference, near, far, MASK, VIEW)
+    assert not is_worse(reference, far, near, MASK, VIEW)
+    assert not is_worse(reference, near, noisy(scene(ball=0.58), 0.15, 3), MASK, VIEW)
