@@ -37,7 +37,7 @@ def copy_of(root: Path, commit: str, folder: Path) -> None:
         archive.extractall(folder, filter="data")
 
 
-def tests_for(root: Path, path: str) -> list[str]:
+def files_testing(root: Path, path: str) -> list[str]:
     """The test files of the folder of a source file: first those that bear its name, then those that speak of it."""
     source = Path(path)
     base = next(prefix for prefix in _TESTS if source.is_relative_to(prefix))
@@ -58,7 +58,7 @@ def outcome_of(mutant: Mutant, copy: Path) -> Outcome:
     source = (copy / mutant.path).read_bytes()
     (copy / mutant.path).write_bytes(mutant.applied(source))
     try:
-        return _pytest(tests_for(copy, mutant.path), copy)
+        return _pytest(files_testing(copy, mutant.path), copy)
     finally:
         (copy / mutant.path).write_bytes(source)
 

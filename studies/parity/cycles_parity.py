@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Our render of an exported scene against the Cycles render of the same scene, with the noise taken out.
 
-    python -m studies.parity.cycles_parity [--size 128] [--samples 512] [--spp 512] [--only "glass/area"] [--no-table]
+    python -m studies.parity.cycles_parity [--size 128] [--samples 512] [--spp 512] [--only glass/area ...]
 
-writes docs/reference/cycles_parity.md. Needs a Python with `bpy`.
+writes docs/reference/cycles_parity.md, unless only some scenes are asked for. Needs a Python with `bpy`.
 """
 
 from __future__ import annotations
