@@ -8,6 +8,7 @@ import importlib
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,7 +29,8 @@ class Rule:
 
 
 def _constant(value: Any) -> Callable[[Any], Any]:
-    return lambda original: lambda *given, **named: value
+    """Gives a new copy each time: callers append to lists."""
+    return lambda original: lambda *given, **named: copy(value)
 
 
 def _argument(number: int) -> Callable[[Any], Any]:

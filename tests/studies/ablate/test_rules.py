@@ -28,6 +28,13 @@ def test_a_rule_is_off_where_its_name_was_imported() -> None:
     assert stages.thinned_grid is where_to_look.thinned_grid
 
 
+def test_a_list_given_instead_is_a_new_one_each_time() -> None:
+    rule = next(rule for rule in RULES if rule.name == "opposite starts")
+    with switched_off(rule):
+        stages.agreeing_ends().append(1)
+        assert stages.agreeing_ends() == []
+
+
 def test_the_names_are_different() -> None:
     assert len({rule.name for rule in RULES}) == len(RULES)
 
