@@ -14,6 +14,7 @@ import importlib.metadata
 import itertools
 import json
 import sys
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -96,12 +97,14 @@ def table(found: dict[str, dict[str, float]], judged: NDArray[np.float64], chang
     count = len(judged) // len(CHANGES)
     kinds = [*CHANGES, "all"]
     jods = {kind: 10 - judged[[kind in (change, "all") for change in changes]] for kind in kinds}
-    lines = [
+    said = (
         f"{len(judged)} pairs: {count} random materials of Mitsuba's `principled` on a ball, five changes each, "
-        f"{size}x{size},",
-        f"{REFERENCE_SPP} samples per pixel (noise: 2 to 128), ColorVideoVDP {importlib.metadata.version('cvvdp')} on "
-        f"{HDR_VIEWING}.",
-        f"With {count} pairs a correlation of 0.8 is known to about +-{_spread(0.8, count):.2f} (two standard errors).",
+        f"{size}x{size}, {REFERENCE_SPP} samples per pixel (noise: 2 to 128), ColorVideoVDP "
+        f"{importlib.metadata.version('cvvdp')} on {HDR_VIEWING}. "
+        f"With {count} pairs a correlation of 0.8 is known to about +-{_spread(0.8, count):.2f} (two standard errors)."
+    )
+    lines = [
+        *textwrap.wrap(said, 118),
         "",
         f"| loss | {' | '.join(kinds)} |",
         f"|---|{'---|' * len(kinds)}",

@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from .parity_scene import LIGHTS, MATERIALS
 ROOT = Path(__file__).resolve().parents[2]
 
 TABLE = ROOT / "docs" / "reference" / "cycles_parity.md"
+WIDTH = 118  # of a line of the page
 BLOCK = 4  # pixels along each side of the means that are compared
 SPP_AT_ONCE = 32
 NOISY = {"glass": (2, 4)}  # smaller by, and more samples by: caustics
@@ -166,7 +168,7 @@ def main() -> None:
     if not chosen.only:
         numbers = {"size": chosen.size, "samples": chosen.samples, "spp": chosen.spp, "more": NOISY["glass"][1]}
         text = INTRODUCTION.format(**numbers, block=BLOCK)
-        said = "\n\nNotes of the exporter: " + " ".join(notes) if notes else ""
+        said = "\n\n" + textwrap.fill("Notes of the exporter: " + " ".join(notes), WIDTH) if notes else ""
         TABLE.write_text(text + "\n".join(rows) + said + "\n", "utf-8")
 
 

@@ -15,6 +15,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,6 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 
 TABLE = ROOT / "docs" / "reference" / "cycles_recovery.md"
+WIDTH = 118  # of a line of the page
 # the demo's own scene, then two of each light; the seed draws material, start, world and the light's place
 SCENES = (
     (1, "environment"),
@@ -216,9 +218,13 @@ def main() -> None:
     print(summary(found, len(scenes), unmeasured))
     if not chosen.only:
         text = INTRODUCTION.format(**asdict(effort), own=OWN_SAMPLES) + "\n".join(rows)
-        lines = [f"- {note} Scenes {', '.join(seeds)}." for note, seeds in notes.items()]
+        lines = [
+            textwrap.fill(f"- {note} Scenes {', '.join(seeds)}.", WIDTH, subsequent_indent="  ", break_long_words=False)
+            for note, seeds in notes.items()
+        ]
+        counted = textwrap.fill(summary(found, len(scenes), unmeasured), WIDTH)
         said = "\n\nNotes of the exporter and the fit:\n\n" + "\n".join(lines) if notes else ""
-        TABLE.write_text(f"{text}\n\n{summary(found, len(scenes), unmeasured)}{said}\n", "utf-8")
+        TABLE.write_text(f"{text}\n\n{counted}{said}\n", "utf-8")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -74,7 +75,10 @@ def _kill(record: Any) -> str:
         ("processes left after 12 s", a["orphans"], "-"),
         ("temporary files after the next start", len(a["left_after_next_start"]), len(b["left"])),
     ]
-    return _table(("", "Blender killed", "backend killed"), rows) + f"\nBlender was killed {after}.\n"
+    return (
+        _table(("", "Blender killed", "backend killed"), rows)
+        + f"\n{textwrap.fill(f'Blender was killed {after}.', 118)}\n"
+    )
 
 
 def _limits(record: Any) -> str:
