@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -11,14 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.tone_mapping import View
+from ..types.errors import UnrecordableError
 from ..types.event import Listener
 from ..types.image import Image, Pixels
 from ..types.parameter_bounds import narrowed
 from ..types.result import FitResult
 from .job_folder import JobFolder
+from .material_classes import (
+    MaterialClass,
+    changed,
+    is_better,
+    is_worth_another,
+    other_classes,
+    parameters_of,
+    value_of,
+)
 from .request import Request, request_to_json
 
 if TYPE_CHECKING:
+    from ..render.prepared_material import Materials
     from ..render.renderer import Renderer
 
 _WITHOUT_LIGHT_PATHS = (
@@ -88,37 +99,80 @@ def fit_scene(
     from ..render.renderer import load_renderer
     from ..render.variant import load_variant
 
-    def load() -> tuple[str, Renderer]:
-        variant = load_variant()
+    materials = request_materials(folder, request)
+
+    def load(materials: Materials, parameters: str | Sequence[str]) -> Renderer:
         renderer = load_renderer(
             folder.root / request.scene,
             request.target.shape_id,
             model=request.fit.model,
-            parameters=request.fit.parameters,
-            materials=request_materials(folder, request),
+            parameters=parameters,
+            materials=materials,
             light_paths=request.light_paths,
         )
         renderer.table = narrowed(renderer.table, request.fit.bounds)
         renderer.start = renderer.table.clip(renderer.start)
-        return variant, renderer
+        return renderer
 
+    def fit(renderer: Renderer, *, hand_over: bool = True) -> _Fitted:
+        outcome = recover_material(
+            renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop,
+            hand_over=hand_over,
+        )  # fmt: skip
+        result, shown = outcome.result, outcome.result_image
+        if not should_stop():
+            mask, noted = renderer.target_mask(), bool(request.notes)
+            result, shown = judged_result(result, reference, outcome.start_image, shown, mask, view, noted=noted)
+        return _Fitted(result, outcome.start_image, shown, outcome.counted)
+
+    variant = load_variant()
     if request.fit.preset == "paper":
         thread = NativeThread(should_stop)
-        variant, renderer = thread.call(load)
-        renderer = InterruptibleRenderer(renderer, thread)
+        fitted = fit(InterruptibleRenderer(thread.call(lambda: load(materials, request.fit.parameters)), thread))
     else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
-        variant, renderer = load()
-    outcome = recover_material(
-        renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop
-    )
-    result, shown = outcome.result, outcome.result_image
-    if not should_stop():
-        result, shown = judged_result(
-            result, reference, outcome.start_image, shown, renderer.target_mask(), view, noted=bool(request.notes)
-        )
+        renderer = load(materials, request.fit.parameters)
+        fitted = fit(renderer)
+        target = request.target.bsdf_id
+        for other in other_classes(materials[target]) if target in materials else ():
+            if should_stop() or not is_worth_another(fitted.result, request.fit.parameters):
+                break
+            names = parameters_of(other, renderer.table.names)
+            try:
+                again = fit(load(materials | {target: changed(materials[target], other)}, names), hand_over=False)
+            except UnrecordableError:
+                continue
+            fitted = _better(fitted, again, other, materials[target])
+    result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    return JobOutcome(result, outcome.start_image, shown, outcome.counted, variant)
+    return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A judged result and the pictures of `JobOutcome`."""
+
+    result: FitResult
+    start_image: Pixels
+    result_image: Pixels
+    counted: NDArray[np.bool_]
+
+
+def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapping[str, Any]) -> _Fitted:
+    """The first fit, or that of another class where it is clearly better; the user's values are its start, too."""
+    before, after = first.result, again.result
+    seconds, passes = before.seconds + after.seconds, before.passes + after.passes
+    if before.judgement is None or not is_better(after.judgement, before.judgement):
+        return replace(first, result=replace(before, seconds=seconds, passes=passes))
+    result = replace(
+        after,
+        initial={name: before.initial.get(name, value_of(material, name)) for name in after.recovered},
+        errors={name: (before.errors[name][0], error) for name, (_, error) in after.errors.items()},
+        notes=(*after.notes, other.note),
+        seconds=seconds,
+        passes=passes,
+    )
+    return replace(again, result=result, start_image=first.start_image)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

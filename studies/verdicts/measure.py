@@ -62,7 +62,7 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
         run("studies.verdicts.scene", kind, case.number, folder)
     picture = folder / f"reference.{case.picture}"
     words = ("--object", "Target", "--reference", picture, "--out", folder / "job", "--json")
-    baked = ("--bake-view",) if case.picture == "png" else ()
+    baked = ("--reference-view", "scene") if case.picture == "png" else ()
     code, result = run("mfo_backend", "blend", folder / "start.blend", *words, *baked, allowed=(0, DIFFERENT))
     after = folder / "after.exr"
     run("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job", "--out", after,

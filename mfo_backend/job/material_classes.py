@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kinds of material that one fit does not reach from another, as starts of further fits.
+
+Recorded paths hold opaque materials only, and from an opaque start no slope leads to glass. So where the user lets all
+values be fitted and the result does not look the same, the fit begins again from the material of another class.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..material.principled_dict import socket_value
+from ..material.principled_parameters import BLENDER_PRINCIPLED, SOCKET_OF_PARAMETER
+from ..types.parameter import Value
+from ..types.result import FitResult
+from ..types.verdict import Cause, Judgement, Verdict
+
+# Socket values that a class begins with; all others stay as in the scene
+GLASS = {"Transmission Weight": 1.0, "Metallic": 0.0, "Alpha": 1.0, "Roughness": 0.1, "Base Color": [0.9, 0.9, 0.9]}
+CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
+OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
+_OF_GLASS = ("transmission_weight", "ior")
+CLEARLY_BETTER = 0.5  # times the difference of the first result, and less than that by so much FLIP
+LEAST_GAIN = 0.01
+
+
+@dataclass(frozen=True)
+class MaterialClass:
+    """A class with the values it begins with, those it fits besides `all`, and what a user is told."""
+
+    name: str
+    sockets: Mapping[str, Any]
+    also: tuple[str, ...] = ()
+
+    @property
+    def note(self) -> str:
+        """For the notes of a result."""
+        return f"The material of the scene did not match, so the fit began again from one that is {self.name}."
+
+
+_CLASSES = (
+    MaterialClass("of glass", GLASS),
+    MaterialClass("cut out", CUT_OUT, ("alpha",)),
+    MaterialClass("opaque", OPAQUE),
+)
+
+
+def other_classes(material: Mapping[str, Any]) -> list[MaterialClass]:
+    """The classes that a material, as in request.json, is not of and may be changed to; none where links decide."""
+    sockets = material["sockets"]
+    own = _class_of(sockets)
+    return [
+        other for other in _CLASSES
+        if other.name != own and not any(sockets.get(name, {}).get("linked") for name in other.sockets)
+    ]  # fmt: skip
+
+
+def _class_of(sockets: Mapping[str, Any]) -> str:
+    def value(name: str, default: float) -> float:
+        found = sockets.get(name, {}).get("value")
+        return default if found is None else float(found)
+
+    if value("Alpha", 1.0) < 1.0:
+        return "cut out"
+    if value("Transmission Weight", 0.0) == 0.0:
+        return "opaque"
+    return "of glass" if value("Metallic", 0.0) == 0.0 else "glass under metal"
+
+
+def changed(material: Mapping[str, Any], to: MaterialClass) -> dict[str, Any]:
+    """The material with what the class begins with."""
+    other = copy.deepcopy(dict(material))
+    for name, value in to.sockets.items():
+        other["sockets"].setdefault(name, {})["value"] = value
+    return other
+
+
+def parameters_of(other: MaterialClass, names: Sequence[str]) -> str | list[str]:
+    """What a fit of the class changes, of values that a fit of `all` changes otherwise."""
+    if not other.also:
+        return "all"
+    return [*(name for name in names if name not in _OF_GLASS), *other.also]
+
+
+def value_of(material: Mapping[str, Any], name: str) -> Value:
+    """A value of a material by the name of its parameter; Blender's own where the material has none."""
+    socket = SOCKET_OF_PARAMETER[name]
+    found = material["sockets"].get(socket, {}).get("value")
+    return BLENDER_PRINCIPLED[name].default if found is None else socket_value(socket, found)
+
+
+def is_worth_another(result: FitResult, selection: str | Sequence[str]) -> bool:
+    """Whether a result may be of the wrong class and the user lets the fit change that."""
+    judgement = result.judgement
+    if judgement is None or selection != "all" or result.model != "blender_principled":
+        return False
+    # another class has another shadow, too, so light may seem to be the cause
+    return judgement.verdict is not Verdict.SAME and judgement.cause is not Cause.PICTURE
+
+
+def is_better(judgement: Judgement | None, than: Judgement) -> bool:
+    """Whether the result of another class is clearly nearer to the reference."""
+    if judgement is None:
+        return False
+    before, after = than.target.visible, judgement.target.visible
+    return after < min(CLEARLY_BETTER * before, before - LEAST_GAIN)
