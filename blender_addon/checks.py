@@ -27,7 +27,7 @@ from .export.reference import (
 )
 from .export.reference_colour import other_space
 from .export.reference_view import SCENE, mixed_by, needs_table, output_view
-from .export.render_state import rendered_objects
+from .export.render_state import instanced_objects, rendered_objects
 from .export.shader_graph import source_of
 from .export.turned_picture import turn_notes
 from .picture_header import read_header
@@ -72,7 +72,7 @@ def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fin
         fixes = [Fix("select", item.name) for item in scene.objects if _can_be_fitted(item, view_layer)]
         return [Finding(STOPS, f"{what}: select the object whose material is to be fitted.", tuple(fixes[:3]))]
     findings = Findings()
-    if target.name_full not in rendered_objects(view_layer):
+    if target.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
         findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
     slot = target.active_material_index
     material = target.material_slots[slot].material if slot < len(target.material_slots) else None

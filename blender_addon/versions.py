@@ -61,6 +61,17 @@ def shadow_terminator(item: bpy.types.Object) -> tuple[float, float]:
     return cycles.shadow_terminator_geometry_offset, cycles.shadow_terminator_offset
 
 
+def divides_adaptively(modifier: bpy.types.Modifier, item: bpy.types.Object) -> bool:
+    """Whether Cycles subdivides by the size on screen: a property of the modifier from Blender 5.0 on."""
+    if modifier.type != "SUBSURF" or not modifier.show_render:
+        return False
+    if hasattr(modifier, "use_adaptive_subdivision"):
+        return modifier.use_adaptive_subdivision
+    cycles = cycles_settings(bpy.context.scene)
+    experimental = getattr(cycles, "feature_set", "SUPPORTED") == "EXPERIMENTAL"
+    return experimental and getattr(cycles_settings(item), "use_adaptive_subdivision", False)
+
+
 def active_output(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
     """Return the output node that Cycles uses."""
     if tree is None:

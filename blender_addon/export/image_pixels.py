@@ -23,6 +23,10 @@ class UnreadableImageError(Exception):
     """The pixels cannot be had; the message is the end of a sentence that starts with the image's name."""
 
 
+class MissingImageError(UnreadableImageError):
+    """The file of the pixels is missing."""
+
+
 @contextmanager
 def without_pixels() -> Iterator[None]:
     """Within it `read_pixels` refuses what it always refuses and gives one grey pixel for the rest, at once."""
@@ -47,13 +51,33 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     UnreadableImageError
         If the file is missing, the image is a movie or tiled, or its colour space is not one we decode.
     """
+    pixels = read_encoded(image)
+    if is_data(image) or _only_looking:
+        return pixels
+    if image.is_float:  # Blender converts float files to its working space when it loads them
+        pixels[:, :, :3] = to_rec709(pixels[:, :, :3])
+    elif image.colorspace_settings.name in SRGB_NAMES:
+        pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
+    return pixels
+
+
+def read_encoded(image: bpy.types.Image) -> NDArray[np.float32]:
+    """Return what `read_pixels` does as Blender keeps it: bytes in the image's own colour space.
+
+    Raises
+    ------
+    UnreadableImageError
+        As `read_pixels`.
+    """
     if image.source in ("MOVIE", "SEQUENCE", "TILED"):
         raise UnreadableImageError(f"is a {image.source.lower()}; only single pictures are supported")
+    if image.type == "MULTILAYER":
+        raise UnreadableImageError("is an EXR file of several layers; only single pictures are supported")
     width, height = image.size
     if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)):
-        raise UnreadableImageError("has no pixels (is its file missing?)")
+        raise MissingImageError("has no pixels (is its file missing? use File > External Data > Find Missing Files)")
+    _refuse_colour_space(image)
     if _only_looking:
-        _refuse_colour_space(image)
         return np.full((1, 1, 4), 0.5, dtype=np.float32)
     channels = image.channels
     raw = np.empty(width * height * channels, dtype=np.float32)
@@ -64,14 +88,6 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
         pixels[:, :, :3] = raw[:, :, :1]
     else:
         pixels[:, :, :channels] = raw
-    if is_data(image):
-        return pixels
-    if image.is_float:  # Blender converts float files to its working space when it loads them
-        pixels[:, :, :3] = to_rec709(pixels[:, :, :3])
-        return pixels
-    _refuse_colour_space(image)
-    if image.colorspace_settings.name in SRGB_NAMES:
-        pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
     return pixels
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..versions import cycles_settings, light_color, light_is_normalized, light_strength, node_tree_of
+from .audit.object_table import LIGHT_CYCLES
+from .audit.rules import name_settings
 from .color_space import to_rec709
 from .findings import Findings
 from .light_model import Light
@@ -46,6 +48,7 @@ def read_light(
         return None
     if not data.use_shadow:
         findings.note(f"Light '{name}' casts no shadows in Blender; in the fit it does.")
+    name_settings(LIGHT_CYCLES, cycles, name, findings)
     _note_linking(evaluated, findings)
     _note_rays(evaluated, findings)
     light = Light(

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..versions import PRINCIPLED, active_output, default_surface_is_principled, node_tree_of
+from ..versions import PRINCIPLED, active_output, cycles_settings, default_surface_is_principled, node_tree_of
+from .audit.rules import name_settings
+from .audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from .color_space import to_rec709
 from .findings import Findings, Fix
 from .material_model import Material, Socket, grey
-from .shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
+from .shader_graph import MissingPictureError, UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 
 NORMAL_SOCKETS = ("Normal", "Coat Normal", "Tangent")
 SKIPPED_SOCKETS = ("Weight",)
@@ -52,6 +54,10 @@ def read_target(material: bpy.types.Material | None, owner: str, slot: int, find
                        Fix("new_material"))  # fmt: skip
         return None
     node = principled_node(material)
+    muted = next((each.name for each in _nodes(material) if each.bl_idname == PRINCIPLED and each.mute), None)
+    if node is None and muted is not None:
+        findings.error(f"Node '{muted}' of material '{material.name}' is muted: press M over it in the Shader Editor.")
+        return None
     if node is None:
         findings.error(
             f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly.",
@@ -60,6 +66,11 @@ def read_target(material: bpy.types.Material | None, owner: str, slot: int, find
         return None
     _note_volume(material, findings)
     return _read_principled(material, node, True, findings)
+
+
+def _nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
+    tree = node_tree_of(material)
+    return [] if tree is None else list(tree.nodes)
 
 
 def read_context(material: bpy.types.Material | None, owner: str, findings: Findings) -> Material:
@@ -139,6 +150,8 @@ def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings
                 "or use an image texture.",
                 Fix("unlink", socket.name),
             )
+        elif isinstance(problem, MissingPictureError):
+            findings.error(f"{socket.name} of material '{material}' is magenta in Cycles: it is linked to {problem}.")
         else:
             findings.note(
                 f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported; the "
@@ -148,6 +161,8 @@ def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings
 
 
 def _note_volume(material: bpy.types.Material, findings: Findings) -> None:
+    name_settings(MATERIAL, material, material.name, findings)
+    name_settings(MATERIAL_CYCLES, cycles_settings(material), material.name, findings)
     output = active_output(node_tree_of(material))
     if output is None:
         return

@@ -12,17 +12,36 @@ from .mesh_arrays import CornerMesh
 
 def read_mesh(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> CornerMesh | None:
     """Return the triangles of an evaluated object in its own space, or None if it has no faces."""
-    # the faces of curves, texts and metaballs come complete; with all layers asked for, Blender 4.2 evaluates the
-    # curve behind them as if it were a mesh and crashes
-    layers = evaluated.original.type == "MESH"
+    # the data of an instance is what geometry nodes have made; in edit mode it is not complete
+    if isinstance(evaluated.data, bpy.types.Mesh) and evaluated.mode != "EDIT":
+        return _corner_mesh(evaluated.data) if len(evaluated.data.polygons) else None
     try:
-        mesh = evaluated.to_mesh(preserve_all_data_layers=layers, depsgraph=depsgraph)
+        mesh = evaluated.to_mesh(preserve_all_data_layers=False, depsgraph=depsgraph)
     except RuntimeError:  # this type has no geometry that converts
         return None
     try:
         return _corner_mesh(mesh) if mesh is not None and len(mesh.polygons) else None
     finally:
         evaluated.to_mesh_clear()
+
+
+def material_of_slot(evaluated: bpy.types.Object, slot: int) -> bpy.types.Material | None:
+    """Return the material Cycles gives slot `slot`: the object's where its slot says so, else the mesh's.
+
+    The mesh's are those after all modifiers: geometry nodes may have set others than the object's slots show.
+    """
+    slots = evaluated.material_slots
+    if slot < len(slots) and slots[slot].link == "OBJECT":
+        return slots[slot].material
+    materials = getattr(evaluated.data, "materials", ())
+    if slot < len(materials):
+        return materials[slot]
+    return slots[slot].material if slot < len(slots) else None
+
+
+def slot_count(evaluated: bpy.types.Object) -> int:
+    """Return how many slots faces may name."""
+    return max(len(evaluated.material_slots), len(getattr(evaluated.data, "materials", ())))
 
 
 def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:

@@ -9,7 +9,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..versions import cycles_settings, has_compositor, overrides_of, shadow_terminator
+from ..versions import cycles_settings, divides_adaptively, has_compositor, overrides_of, shadow_terminator
+from .audit.object_table import OBJECT_CYCLES
+from .audit.rules import name_settings
+from .audit.scene_table import LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
+from .coincident import shared_faces
 from .findings import Findings, Fix
 from .material_model import Material
 from .mesh_arrays import CornerMesh, joined, world_mesh
@@ -17,9 +21,9 @@ from .ply_file import TriangleMesh
 from .read_camera import read_camera, read_pixel_filter
 from .read_light import read_light
 from .read_material import read_context, read_target
-from .read_mesh import read_mesh
-from .read_world import read_world
-from .render_state import render_state, rendered_objects
+from .read_mesh import material_of_slot, read_mesh, slot_count
+from .read_world import BLACK, read_world
+from .render_state import instanced_objects, layer_collections, render_state, rendered_layer, rendered_objects
 from .scene_data import TARGET_BSDF, TARGET_SHAPE, RenderSettings, SceneData, Shape, Terminator
 from .visibility import check_visible
 
@@ -31,7 +35,15 @@ BOUNCES = ("diffuse", "glossy", "transmission")
 
 def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
     """Return the scene as the render would see it, or None with errors in `findings`."""
+    layer = rendered_layer(context.scene, context.view_layer)
+    if layer != context.view_layer:
+        findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
+        with context.temp_override(view_layer=layer):
+            return read_scene(bpy.context, target, findings)
     scene, view_layer = context.scene, context.view_layer
+    others = [each.name for each in scene.view_layers if each.use and each != view_layer]
+    if others and view_layer.use:
+        findings.note(f"View layer '{view_layer.name}' is exported; also rendered are: {', '.join(others)}.")
     if target is None or target.type not in MESH_TYPES:
         what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
         findings.error(f"The object to fit is {what}: select an object with faces.")
@@ -54,11 +66,13 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         material = read_target(slots[slot].material if slot < len(slots) else None, target.name, slot, findings)
         if camera is None or material is None:
             return None
-        data = SceneData(camera, settings, read_world(scene, settings.exposure, findings))
+        _name_settings(scene, view_layer, findings)
+        world = read_world(scene, settings.exposure, findings) if view_layer.use_sky else BLACK
+        data = SceneData(camera, settings, world)
         walk = _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings)
         walk.run()
         if data.target is None:
-            if target.name_full not in rendered_objects(view_layer):
+            if target.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
                 findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
             elif walk.target_left_out:
                 findings.error(
@@ -70,8 +84,21 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
             return None
         if not data.world.is_lit and not data.lights and not data.emitting:
             findings.error("The scene has no light: add a light or give the world a colour.")
+        walk.note_coincident_faces()
         check_visible(data, target, scene, depsgraph, findings)
     return data
+
+
+def _name_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, findings: Findings) -> None:
+    """Report what the scene's settings do to a picture and the fit does not."""
+    name_settings(SCENE_CYCLES, cycles_settings(scene), scene.name, findings)
+    name_settings(RENDER, scene.render, scene.name, findings)
+    name_settings(VIEW_LAYER, view_layer, view_layer.name, findings)
+    for collection in layer_collections(view_layer):
+        name_settings(LAYER_COLLECTION, collection, collection.name, findings)
+    strips = getattr(scene.sequence_editor, "strips", None) or getattr(scene.sequence_editor, "sequences", ())
+    if scene.render.use_sequencer and len(strips):
+        findings.note("The render shows the strips of the Video Sequencer; the fit shows the scene.")
 
 
 def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
@@ -125,6 +152,7 @@ class _Walk:
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
         self.target_pieces: list[tuple[TriangleMesh, bool]] = []
         self.target_left_out = 0  # triangles
+        self.places: list[tuple[str, TriangleMesh]] = []
         data.materials[TARGET_BSDF] = material
         self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
 
@@ -141,6 +169,8 @@ class _Walk:
             elif item.type == "MESH":
                 # the faces of curves, texts and geometry nodes come as instances whose parent is the object itself
                 own = not instance.is_instance or instance.parent == item.original.evaluated_get(self.depsgraph)
+                # an object that only collection instances show is fitted in all of them
+                own |= item.original.name_full not in self.rendered
                 self._add_mesh(item, matrix, own and item.original == self.target)
             elif item.type not in (*MESH_TYPES, *SILENT_TYPES):
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
@@ -169,9 +199,13 @@ class _Walk:
         if mesh is None:
             return
         self._note_visibility(item)
-        last = max(len(item.material_slots) - 1, 0)
+        last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
-        for slot in np.unique(slots):
+        bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
+        fitted = {slot for slot, bsdf in bsdfs.items() if bsdf == TARGET_BSDF} if is_target else set()
+        if self.slot in fitted:  # the same material in another slot is not what was chosen
+            fitted = {self.slot}
+        for slot, bsdf in bsdfs.items():
             piece = world_mesh(mesh, slots == slot, matrix)
             left_out = int((slots == slot).sum()) - len(piece.triangles)
             if left_out:
@@ -179,20 +213,27 @@ class _Walk:
                     f"Object '{item.name}' has {left_out} triangles with corners at NaN, infinite or absurdly far "
                     "positions; they are left out."
                 )
-            if is_target and slot == self.slot:
+            if slot in fitted:
                 self.target_left_out += left_out
             if not len(piece.triangles):
                 continue
-            if is_target and slot == self.slot:
+            self.places.append((item.name, piece))
+            if slot in fitted:
                 self.target_pieces.append((piece, mesh.is_closed))
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
-            bsdf = self._bsdf(item, int(slot))
             self.data.shapes.append(Shape(name, piece, bsdf, mesh.is_closed, Terminator(*shadow_terminator(item))))
 
+    def note_coincident_faces(self) -> None:
+        """Report objects whose faces lie in the same place."""
+        for first, second in shared_faces(self.places):
+            self.findings.note(
+                f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
+                "Cycles and in the fit."
+            )
+
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
-        slots = item.material_slots
-        material = slots[slot].material if slot < len(slots) else None
+        material = material_of_slot(item, slot)
         key = "" if material is None else material.original.name_full
         if key not in self.bsdfs:
             self.bsdfs[key] = f"material_{len(self.bsdfs):04d}"
@@ -201,6 +242,11 @@ class _Walk:
         return self.bsdfs[key]
 
     def _note_visibility(self, item: bpy.types.Object) -> None:
+        name_settings(OBJECT_CYCLES, cycles_settings(item), item.name, self.findings)
+        if any(divides_adaptively(modifier, item) for modifier in item.modifiers):
+            self.findings.note(
+                f"Adaptive Subdivision of '{item.name}' is left out: its mesh has the modifier's level for renders."
+            )
         for system in item.particle_systems:
             if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
                 self.findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")

@@ -3,15 +3,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..versions import active_output, node_tree_of
+from ..versions import active_output, cycles_settings, node_tree_of
+from .audit.object_table import WORLD_CYCLES, WORLD_VISIBILITY
+from .audit.rules import name_settings
 from .color_space import to_rec709
 from .findings import Findings
-from .image_pixels import UnreadableImageError, read_pixels
-from .shader_graph import UnsupportedNodeError, mapping_matrix, read_socket, source_of, surface_of
+from .image_filter import equirectangular_pixels
+from .image_pixels import UnreadableImageError
+from .shader_graph import (
+    UnsupportedNodeError,
+    has_texture_mapping,
+    mapping_matrix,
+    read_socket,
+    source_of,
+    surface_of,
+)
 from .world_model import World, resample
 
 BLACK = World(np.zeros(3))
@@ -22,6 +34,8 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> W
     world = scene.world
     if world is None:
         return BLACK
+    name_settings(WORLD_CYCLES, cycles_settings(world), world.name, findings)
+    name_settings(WORLD_VISIBILITY, getattr(world, "cycles_visibility", None), world.name, findings)
     tree = node_tree_of(world)
     if tree is None:
         return World(to_rec709(list(world.color)) * exposure)
@@ -32,7 +46,8 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> W
     if node is None:
         return BLACK
     try:
-        return _background(node, exposure)
+        visibility = getattr(world, "cycles_visibility", None)
+        return replace(_background(node, exposure), camera=visibility is None or visibility.camera)
     except UnsupportedNodeError as problem:
         findings.error(
             f"World '{world.name}' uses {problem}, which cannot be exported: link one Background with a colour or an "
@@ -63,11 +78,10 @@ def _environment(node: bpy.types.Node) -> tuple[NDArray[np.float32], NDArray[np.
         raise UnsupportedNodeError(f"the node '{node.name}' without an image")
     if node.projection != "EQUIRECTANGULAR":
         raise UnsupportedNodeError(f"the node '{node.name}' with mirror ball projection")
-    mapping = node.texture_mapping
-    if any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0):
+    if has_texture_mapping(node):
         raise UnsupportedNodeError(f"the texture mapping inside the node '{node.name}'")
     try:
-        pixels = np.ascontiguousarray(read_pixels(node.image)[:, :, :3])
+        pixels = equirectangular_pixels(node.image, node.interpolation)
     except UnreadableImageError as problem:
         raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     source = source_of(node.inputs["Vector"])

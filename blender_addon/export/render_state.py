@@ -81,6 +81,34 @@ def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
     return names
 
 
+def instanced_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
+    """Return the names of the objects in collections that rendered objects of `view_layer` put an instance of."""
+    names: set[str] = set()
+    rendered = rendered_objects(view_layer)
+    todo = [item for item in view_layer.objects if item.name_full in rendered]
+    seen: set[str] = set()
+    while todo:
+        item = todo.pop()
+        inner = item.instance_collection if item.instance_type == "COLLECTION" else None
+        if inner is None or inner.name_full in seen:
+            continue
+        seen.add(inner.name_full)
+        shown = [each for each in inner.all_objects if not each.hide_render]
+        names.update(each.name_full for each in shown)
+        todo += shown
+    return names
+
+
+def rendered_layer(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.ViewLayer:
+    """Return `view_layer`, or the first of `scene` that is rendered if that one is not."""
+    return view_layer if view_layer.use else next((layer for layer in scene.view_layers if layer.use), view_layer)
+
+
+def layer_collections(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.LayerCollection]:
+    """The collections of `view_layer` that are not excluded, parents first."""
+    return (layer for layer in _layer_collections(view_layer.layer_collection) if not layer.exclude)
+
+
 def _use_render_settings(item: bpy.types.Object, put: Any) -> None:
     for modifier in item.modifiers:
         put(modifier, "show_viewport", modifier.show_render)

@@ -132,9 +132,11 @@ def _terminator(shape: Shape) -> list[Element]:
 
 def _hide_emitters(scene: SceneData, findings: Findings) -> bool:
     """Whether camera rays may pass through glowing objects and miss the world; both or none: Mitsuba has one switch."""
-    world_is_seen = scene.world.is_lit and not scene.settings.film_transparent
+    hidden = scene.settings.film_transparent or not scene.world.camera
+    world_is_seen = scene.world.is_lit and not hidden
     if not world_is_seen and not scene.emitting:
         return scene.world.is_lit
-    if scene.settings.film_transparent and scene.world.is_lit:
-        findings.note("The film is transparent, but glowing objects are in view: the world shows behind them.")
+    if hidden and scene.world.is_lit:
+        what = "The film is transparent" if scene.settings.film_transparent else "The world is hidden from the camera"
+        findings.note(f"{what}, but glowing objects are in view: the world shows behind them.")
     return False

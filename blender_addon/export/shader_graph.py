@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..versions import active_output
 from .color_space import to_rec709
-from .image_pixels import UnreadableImageError, read_pixels
+from .image_filter import filtered_pixels
+from .image_pixels import MissingImageError, UnreadableImageError
 from .material_model import Socket, Texture
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
@@ -33,15 +34,31 @@ class UnsupportedNodeError(Exception):
     """A node tree holds something that is not exported; the message names it, as part of a sentence."""
 
 
+class MissingPictureError(UnsupportedNodeError):
+    """A picture whose file is missing, for which Cycles shows magenta."""
+
+
 def source_of(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
-    """Return the output socket that feeds `socket`, reroutes skipped, or None if nothing does."""
+    """Return the output socket that feeds `socket`, or None if nothing does.
+
+    Reroutes are skipped, and so are muted nodes: what they let through is an input of theirs, or nothing.
+    """
     while socket.is_linked:
         link = socket.links[0]
         if link.is_muted or not link.is_valid:
             return None
-        if link.from_node.bl_idname != "NodeReroute":
-            return link.from_socket
-        socket = link.from_node.inputs[0]
+        node, output = link.from_node, link.from_socket
+        if node.bl_idname == "NodeReroute":
+            socket = node.inputs[0]
+            continue
+        if not node.mute:
+            return output
+        through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
+        if through is None:
+            return None
+        if not through.is_linked:
+            return output  # of a muted node, which is refused
+        socket = through
     return None
 
 
@@ -179,18 +196,33 @@ def _image(node: bpy.types.Node, output: str) -> Texture:
         raise UnsupportedNodeError(f"the node '{node.name}' with {node.projection.title()} projection")
     if node.extension not in WRAPS:
         raise UnsupportedNodeError(f"the node '{node.name}' with extension Clip")
+    wrap = WRAPS[node.extension]
     try:
-        pixels = read_pixels(node.image)
+        pixels = filtered_pixels(node.image, node.interpolation, wrap, alpha_read=_is_read(node.outputs["Alpha"]))
+    except MissingImageError as problem:
+        raise MissingPictureError(f"the image '{node.image.name}' that {problem}") from None
     except UnreadableImageError as problem:
         raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     chosen = pixels[:, :, 3:4] if output == "Alpha" else pixels[:, :, :3]
-    return Texture(chosen, _uv_matrix(node), WRAPS[node.extension], FILTERS[node.interpolation])
+    return Texture(chosen, _uv_matrix(node), wrap, FILTERS[node.interpolation])
+
+
+def _is_read(output: bpy.types.NodeSocket) -> bool:
+    """Whether Cycles reads an output: a link to it that is not muted."""
+    return any(not link.is_muted for link in output.links)
+
+
+def has_texture_mapping(node: bpy.types.Node) -> bool:
+    """Whether the mapping inside a texture node changes the coordinate; Blender shows it nowhere, old files have it."""
+    mapping = node.texture_mapping
+    moved = any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0)
+    turned = (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z) != ("X", "Y", "Z")
+    return moved or turned or mapping.use_min or mapping.use_max
 
 
 def _uv_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
     """Return the (3, 3) matrix from the mesh's UV to the picture's, for UV links with or without a Mapping node."""
-    mapping = node.texture_mapping
-    if any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0):
+    if has_texture_mapping(node):
         raise UnsupportedNodeError(f"the texture mapping inside the node '{node.name}'")
     source = source_of(node.inputs["Vector"])
     matrix = np.eye(3)

@@ -28,6 +28,7 @@ class World:
     color: NDArray[np.float64]
     pixels: NDArray[np.float32] | None = None
     lookup: NDArray[np.float64] | None = None
+    camera: bool = True  # whether the camera sees it
 
     @property
     def is_lit(self) -> bool:

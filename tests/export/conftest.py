@@ -18,13 +18,16 @@ collect_ignore = (
     []
     if find_spec("bpy")
     else [
+        "test_audit.py",
         "test_bad_input.py",
         "test_camera.py",
         "test_geometry.py",
+        "test_image_filter.py",
         "test_lamps.py",
         "test_light_levels.py",
         "test_materials.py",
         "test_reference.py",
+        "test_scene_walk.py",
         "test_smooth_facets.py",
         "test_untouched.py",
         "test_view_lut.py",

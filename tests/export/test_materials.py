@@ -287,7 +287,8 @@ def test_picture_files_of_a_saved_blend(scene: Any, export: Any, tmp_path: Any) 
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     errors, _ = check_export(bpy.context, bpy.data.objects["Target"])
     assert errors == [
-        "Base Color of material 'Target' is linked to the image 'grey.png' that has no pixels (is its file missing?), "
+        "Base Color of material 'Target' is linked to the image 'grey.png' that has no pixels (is its file missing? "
+        "use File > External Data > Find Missing Files), "
         "which cannot be exported: unlink it or use an image texture."
     ]
 
