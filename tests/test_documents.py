@@ -93,4 +93,5 @@ def test_files_named_in_a_page_exist(page: Path) -> None:
     named = re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|toml|lock|md))`", text)
     assert not [path for path in named if not any((root / path).exists() for root in roots)]
     modules = re.findall(r"python -m ((?:studies|tests)[\w.]+)", text)
-    assert not [module for module in modules if not (ROOT / (module.replace(".", "/") + ".py")).exists()]
+    folders = [ROOT / module.replace(".", "/") for module in modules]
+    assert not [f for f in folders if not f.with_suffix(".py").exists() and not (f / "__main__.py").exists()]

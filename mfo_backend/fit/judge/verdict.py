@@ -17,8 +17,8 @@ from ...types.verdict import Difference, Judgement, Verdict
 from .beyond_noise import NEXT, beyond_noise
 from .likely_cause import likely_cause
 
-# Measured on Cycles scenes by `studies.verdicts`, see docs/verdicts.md: without anything planted the first was at most
-# 0.02, the second 0.008; of results more than 0.05 of FLIP above the noise it is above one of them.
+# Measured on Cycles scenes by `studies.verdicts` (docs/method/verdicts.md): without anything planted the first was at
+# most 0.02, the second 0.008; of results more than 0.05 of FLIP above the noise it is above one of them.
 SAME_VISIBLE, SAME_SHARED = 0.025, 0.01
 DIFFERENT_VISIBLE, DIFFERENT_SHARED = 0.1, 0.05
 # Of what surrounds the target: nothing there is fitted, and it is exported less exactly than the target
