@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from ..bench.report.figure import require_matplotlib
 from ..bench.report.headline import fill, has_block
 from ..bench.report.report import write_report
 from ..bench.rows.row import Row
@@ -58,6 +59,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the bench with real fits, then report."""
+    require_matplotlib()
     assets = Assets.find()
     keep_setup(arguments.out, _setup(arguments, assets))
     pictures = (arguments.out / "pictures").absolute()

@@ -29,15 +29,17 @@ def add_surface_parser(actions) -> None:  # type: ignore[no-untyped-def]  # argp
 
 def run_surface(arguments: argparse.Namespace) -> int:
     """Measure, draw and write the pictures of the stages."""
+    from ..bench.report.figure import require_matplotlib, svg
     from ..render.llvm import configure_llvm, needs_llvm
 
+    require_matplotlib()
     names = tuple(arguments.parameters.split(","))
     if len(names) != 2 or arguments.size < 8 or arguments.grid < 3:
         raise BadInputError("Give two parameters such as roughness,metallic, 8 pixels or more and a grid of 3 or more.")
     if needs_llvm():
         configure_llvm()  # before the first import of drjit
     from ..bench.judge.surface import measure_surface
-    from ..bench.report.surface_plot import surface_svg
+    from ..bench.report.surface_plot import surface_figure
     from ..metrics.tone_mapping import DisplayView
     from ..report.picture import displayed_linear, png_bytes
 
@@ -47,7 +49,7 @@ def run_surface(arguments: argparse.Namespace) -> int:
         arguments.scenario, arguments.scene, arguments.method, (names[0], names[1]),
         size=arguments.size, grid=arguments.grid, folder=(folder / "scene").absolute(),
     )  # fmt: skip
-    (folder / "surface.svg").write_text(surface_svg(surface), "utf-8")
+    (folder / "surface.svg").write_text(svg(surface_figure(surface)), "utf-8")
     lit = np.asarray(surface.pictures["truth"].max(axis=2) > 0.0)
     view = DisplayView.for_scene(surface.pictures["truth"], lit)
     for name, pixels in surface.pictures.items():

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mfo_backend.bench.report.svg_axes import COLOURS, SvgAxes, around
+from mfo_backend.bench.report.figure import COLOURS, legend_above, log_axis, new_figure, svg
 from mfo_backend.bench.report.table import Table, number
 from mfo_backend.bench.scenes.scene import materials_of
 from studies.recovery.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene
@@ -108,14 +108,15 @@ def plot(series: Series, points: Sequence[Point]) -> str:
     """An SVG with the costs over the quantity, both axes logarithmic."""
     x = [float(point.x) for point in points]
     costs = {of: [1e3 * point.seconds[of] for point in points] for of in points[0].seconds}
-    every = around([cost for column in costs.values() for cost in column])
-    axes = SvgAxes("Cost", series.quantity, "CPU milliseconds", around(x), every, log_y=True)
-    for colour, column in zip(COLOURS, costs.values(), strict=False):
-        axes.line(list(zip(x, column, strict=True)), colour)
-        for at, cost in zip(x, column, strict=True):
-            axes.dot(at, cost, colour)
-    axes.legend(list(zip(costs, COLOURS, strict=False)))
-    return axes.svg()
+    figure, (axes,) = new_figure()
+    log_axis("x", axes, min(x), max(x))
+    every = [cost for column in costs.values() for cost in column]
+    log_axis("y", axes, min(every), max(every))
+    for colour, (of, column) in zip(COLOURS, costs.items(), strict=False):
+        axes.plot(x, column, "o-", color=colour, label=of)
+    axes.set(xlabel=series.quantity, ylabel="CPU milliseconds")
+    legend_above(axes)
+    return svg(figure)
 
 
 def pixels(repeat: int) -> list[Point]:

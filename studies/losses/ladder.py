@@ -19,6 +19,7 @@ from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = "1"  # of PyTorch, read when it loads; pictures this small gain nothing from more
 
+from mfo_backend.bench.report.figure import svg
 from studies.losses.ladder_report import plot, table, write_between_markers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,7 +52,7 @@ def main() -> None:
     if arguments.doc:
         document = Path(arguments.doc)
         write_between_markers(document, table(rows))
-        (document.parents[1] / "pictures" / "ladder.svg").write_text(plot(rows), "utf-8")
+        (document.parents[1] / "pictures" / "ladder.svg").write_text(svg(plot(rows)), "utf-8")
 
 
 if __name__ == "__main__":

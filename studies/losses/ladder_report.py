@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from mfo_backend.bench.report.svg_axes import COLOURS, SvgAxes, around
+from mfo_backend.bench.report.figure import COLOURS, legend_above, log_axis, new_figure
 
 BEGIN, END = "<!-- studies/losses/ladder.py writes from here -->", "<!-- to here -->"
 SOLVED = 0.02  # mean FLIP over the object that few see
@@ -78,8 +78,8 @@ def table(rows: Rows) -> str:
     return "\n".join(lines)
 
 
-def plot(rows: Rows) -> str:
-    """An SVG with a dot for every method: median passes against mean FLIP, named by what it ends with."""
+def plot(rows: Rows) -> Figure:
+    """A figure with a dot for every method: median passes against mean FLIP, named by what it ends with."""
     losses = loss_costs(rows)
     dots = []
     for name in methods_of(rows):
@@ -88,35 +88,25 @@ def plot(rows: Rows) -> str:
         flip = float(np.mean([row["methods"][name]["flip"] for row in rows]))
         passes = float(np.median([cost(row, name, losses) for row in rows]))
         dots.append((name, max(passes, 1.0), max(flip, 1e-5)))
-    axes = SvgAxes(
-        "Mean FLIP of each ladder against its cost",
-        "passes, the time of the losses included (median)",
-        "mean FLIP over the object",
-        (
-            around([passes for _, passes, _ in dots])[0] / 1.6,
-            around([passes for _, passes, _ in dots])[1],
-        ),  # room for names
-        around([flip for _, _, flip in dots]),
-        log_y=True,
-    )
+    figure, (axes,) = new_figure(7.0, 4.5)
+    log_axis("x", axes, min(passes for _, passes, _ in dots) / 1.6, max(passes for _, passes, _ in dots))  # for names
+    log_axis("y", axes, min(flip for _, _, flip in dots), max(flip for _, _, flip in dots))
+    for group, colour in zip(_GROUPS, COLOURS, strict=True):
+        mine = [(passes, flip) for name, passes, flip in dots if _group(name) == group]
+        axes.plot([passes for passes, _ in mine], [flip for _, flip in mine], "o", color=colour, label=group)
     named: list[tuple[float, float]] = []
     for name, passes, flip in sorted(dots, key=lambda dot: dot[2]):
-        colour = COLOURS[_GROUPS.index(_group(name))]
-        axes.dot(passes, flip, colour)
         beaten = any(p <= passes and f <= flip and (p, f) != (passes, flip) for _, p, f in dots)
-        at = axes.x(passes), axes.y(flip)
-        free = all(abs(at[0] - x) > 60 or abs(at[1] - y) > 11 for x, y in named)
+        at = axes.transData.transform((passes, flip))
+        free = all(abs(at[0] - x) > 90 or abs(at[1] - y) > 14 for x, y in named)  # dots of the screen
         if (name in _NAMED or not beaten) and free:
-            named.append(at)
-            places = [(axes.x(p), axes.y(f)) for _, p, f in dots]
-            crowded = any(0 < at[0] - x < 70 and abs(at[1] - y) < 9 for x, y in places)
-            x, anchor = (at[0] + 8, "start") if crowded else (at[0] - 8, "end")
-            axes.parts.append(
-                f'<text x="{x:.1f}" y="{at[1] + 4:.1f}" text-anchor="{anchor}" font-size="11" '
-                f'fill="{colour}">{escape(name)}</text>'
-            )
-    axes.legend([(group, colour) for group, colour in zip(_GROUPS, COLOURS, strict=True)])
-    return axes.svg() + "\n"
+            named.append((at[0], at[1]))
+            colour = COLOURS[_GROUPS.index(_group(name))]
+            text = {"textcoords": "offset points", "ha": "right", "va": "center", "color": colour, "fontsize": 8}
+            axes.annotate(name, (passes, flip), (-6, 0), **text)
+    axes.set(xlabel="passes, the time of the losses included (median)", ylabel="mean FLIP over the object")
+    legend_above(axes)
+    return figure
 
 
 def _group(name: str) -> str:

@@ -15,6 +15,7 @@ from ..rows.row import Row
 from ..rows.row_file import RowFile
 from ..rows.summary import SOLVED_FLIP, TARGETS, Summary, comparable, quantile, summaries
 from ..runs.method import METHODS
+from .figure import svg
 from .gallery import gallery
 from .hard_section import hard_section
 from .paper_tables import paper_tables
@@ -64,7 +65,7 @@ class Section:
         """A section element."""
         text = "".join(f"<p>{escape(paragraph)}</p>" for paragraph in self.text)
         tables = "".join(table.html() for table in self.tables)
-        figures = "".join(f"<figure>{svg}</figure>" for svg in self.plots.values())
+        figures = "".join(f"<figure>{plot}</figure>" for plot in self.plots.values())
         plots = f'<div class="pictures plots">{figures}</div>' if figures else ""
         return f"<section><h2>{escape(self.title)}</h2>{text}{tables}{plots}{self.pictures}</section>"
 
@@ -95,8 +96,8 @@ def write_report(folder: Path, *, notes: Sequence[str] = ()) -> str:
             sections.append(Section(title, tables=[table]))
     sections.append(Section("How to read this", [*_READING, *said]))
     for section in sections:
-        for name, svg in section.plots.items():
-            write_atomically(folder / name, svg.encode("utf-8"))
+        for name, plot in section.plots.items():
+            write_atomically(folder / name, plot.encode("utf-8"))
     summary = Table(("scenario", *_HEADS), [(s.scenario, *_cells(s)) for s in summaries(rows)])
     write_atomically(folder / "summary.csv", summary.csv().encode("utf-8"))
     head = _head(rows)
@@ -129,7 +130,7 @@ def _scenario(folder: Path, rows: Sequence[Row], name: str) -> Section:
     plots = {f"pareto-{name}.svg": pareto(standing)}
     plots |= {f"ecdf-{name}-{target:g}.svg": time_to_quality(standing, target) for target in TARGETS}
     plots[f"passes-{name}-{SOLVED_FLIP:g}.svg"] = data_profile(standing, SOLVED_FLIP)
-    section.plots = {file: svg for file, svg in plots.items() if svg}
+    section.plots = {file: svg(figure) for file, figure in plots.items() if figure is not None}
     shown = [m for m in dict.fromkeys(row.method for row in standing) if m in _SHOWN]
     section.pictures = gallery(folder / "pictures", mine, shown)
     return section

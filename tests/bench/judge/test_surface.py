@@ -10,7 +10,8 @@ import pytest
 
 from mfo_backend.bench.judge import surface as module
 from mfo_backend.bench.judge.surface import Surface, measure_surface
-from mfo_backend.bench.report.surface_plot import heat, surface_svg
+from mfo_backend.bench.report.figure import svg
+from mfo_backend.bench.report.surface_plot import surface_figure
 from mfo_backend.bench.scenes.assets import Assets
 from mfo_backend.cli.main import main
 
@@ -32,13 +33,13 @@ def test_the_way_of_a_fit_lies_on_the_surface(tmp_path, monkeypatch):
     row, column = (int(np.argmin(np.abs(surface.nodes[axis] - surface.truth[axis]))) for axis in (1, 0))
     for losses in surface.losses.values():
         assert np.mean(losses < losses[row, column]) < 0.2
-    root = ElementTree.fromstring(surface_svg(surface))
-    assert len(list(root.iter("{http://www.w3.org/2000/svg}image"))) == 2
-
-
-def test_low_losses_are_dark_and_the_first_row_is_below():
-    picture = heat(np.array([[1.0, 1.0], [10.0, 10.0]]), side=4).sum(axis=2)
-    assert picture[-1].max() < picture[0].min()
+    figure = surface_figure(surface)
+    for axes, losses in zip(figure.axes, surface.losses.values(), strict=True):
+        (mesh,) = axes.collections
+        np.testing.assert_array_equal(np.argsort(mesh.get_array().ravel()), np.argsort(losses.ravel()))
+        assert axes.get_xlim() == (surface.nodes[0][0], surface.nodes[0][-1])
+        assert axes.lines[-1].get_xydata().tolist() == [list(surface.truth)]
+    ElementTree.fromstring(svg(figure))
 
 
 @pytest.mark.parametrize("names", ["roughness", "base_color,roughness", "roughness,roughness"])
