@@ -18,6 +18,7 @@ from .material_model import Material
 from .read_scene import read_scene
 from .reference import Reference, read_reference
 from .reference_view import SCENE, output_view
+from .scene_bakes import SceneBakes
 from .scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
 from .scene_file import SceneFiles, scene_files
 
@@ -58,7 +59,8 @@ def export_job(
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
     findings = Findings()
-    data = read_scene(context, obj, findings)
+    with SceneBakes(context) as bakes:
+        data = read_scene(context, obj, findings, bakes)
     findings.raise_first()
     assert data is not None
     tell(0.4)

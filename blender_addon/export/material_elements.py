@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from .findings import Findings
-from .material_model import Material, Socket, Texture
+from .material_model import Material, Part, Socket, Texture
 from .principled_mapping import UNMATCHED, sockets_to_mitsuba
-from .xml_scene import Element, add, bitmap, plugin, rgb, scalar, transform
+from .xml_scene import Element, add, bitmap, plugin, reference, rgb, scalar, transform
 
 # sockets whose pictures Mitsuba's model can take as they are
 TEXTURED = {
@@ -34,6 +34,12 @@ def bsdf_element(
         return add(plugin("bsdf", "twosided", identifier), inner)
     if material.model == "null":
         return plugin("bsdf", "null", identifier)
+    if material.model == "bumped":
+        assert material.normal is not None
+        normals = texture_element("normalmap", material.normal, save(material.normal))
+        return add(plugin("bsdf", "normalmap", identifier), normals, reference(material.parts[0].bsdf))
+    if material.model == "mix":
+        return _mixed(material.parts, identifier, save)
     inner = _principled(material, save, findings, every)
     alpha = material.sockets.get("Alpha", Socket(1.0))
     masked = alpha.texture is not None or alpha.value < 1.0
@@ -46,6 +52,20 @@ def bsdf_element(
     body = inner if transmits else add(plugin("bsdf", "twosided"), inner)
     opacity = _value("opacity", min(max(float(alpha.value), 0.0), 1.0), alpha.texture, save)
     return add(plugin("bsdf", "mask", identifier), opacity, body)
+
+
+def _mixed(parts: Sequence[Part], identifier: str, save: Callable[[Texture], str]) -> Element:
+    """Blends of two within each other: each shows its first part, or with the weight of the rest all others."""
+    first, rest = parts[0].share, sum((part.share for part in parts[1:]), np.zeros((1, 1, 1), np.float32))
+    whole = first + rest
+    weight = np.divide(rest, whole, out=np.zeros(whole.shape, np.float32), where=whole > 0.0)
+    if weight.size == 1:
+        shown = scalar("weight", float(weight.flat[0]))
+    else:
+        texture = Texture(weight, np.eye(3), "clamp")
+        shown = texture_element("weight", texture, save(texture))
+    others = reference(parts[1].bsdf) if len(parts) == 2 else _mixed(parts[1:], "", save)
+    return add(plugin("bsdf", "blendbsdf", identifier), shown, reference(parts[0].bsdf), others)
 
 
 def emission_element(material: Material, scale: float, save: Callable[[Texture], str]) -> Element | None:

@@ -34,13 +34,19 @@ class Socket:
 
 @dataclass
 class Material:
-    """What a surface is made of. `model` is principled, diffuse, emission or null (nothing there)."""
+    """What a surface is made of. `model` is principled, diffuse, emission, null (nothing there), mix or bumped.
+
+    A mix and a bumped surface have `parts`, and of sockets those of emission alone. `normal` (height, width, 3) has
+    normals in the frame of the UV map, n / 2 + 1 / 2.
+    """
 
     name: str
     model: str
     sockets: dict[str, Socket] = field(default_factory=dict)
     distribution: str = "MULTI_GGX"
     subsurface_method: str = "RANDOM_WALK"
+    parts: tuple[Part, ...] = ()
+    normal: Texture | None = None
 
     def value(self, name: str, default: Any) -> Any:
         """Value of socket `name`, or `default` if this Blender's Principled has no such socket."""
@@ -52,6 +58,14 @@ class Material:
         """Emitted radiance, linear Rec.709; coat and sheen above it are not counted."""
         color = np.asarray(self.value("Emission Color", (1.0, 1.0, 1.0)), dtype=np.float64)
         return color * float(self.value("Emission Strength", 0.0))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A share of a surface, 0 to 1, perhaps a picture (height, width, 1), and the id of the material it has."""
+
+    share: NDArray[np.float32]
+    bsdf: str
 
 
 def grey(name: str) -> Material:

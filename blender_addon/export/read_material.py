@@ -10,6 +10,7 @@ from .audit.rules import name_settings
 from .audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from .color_space import to_rec709
 from .findings import Findings, Fix
+from .image_pixels import without_pixels
 from .material_model import Material, Socket, grey
 from .shader_graph import MissingPictureError, UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 
@@ -103,6 +104,27 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     if model == "principled" or (model == "diffuse" and node.inputs["Roughness"].default_value > 0.0):
         findings.note(f"Material '{material.name}': {node.bl_label} is approximated by its closest simple equivalent.")
     return Material(material.name, model, sockets)
+
+
+def needs_bake(material: bpy.types.Material | None) -> bool:
+    """Whether a material holds more than the simple equivalents of `read_context` can say; looks at no pixel."""
+    node = surface_of(node_tree_of(material)) if material is not None else None
+    if node is None:
+        return False
+    if node.bl_idname != PRINCIPLED and node.bl_idname not in SIMPLE_SHADERS:
+        return True
+    names = SIMPLE_SHADERS[node.bl_idname][1].values() if node.bl_idname != PRINCIPLED else None
+    with without_pixels():
+        for socket in node.inputs:
+            if socket.name in NORMAL_SOCKETS:
+                if socket.name == "Normal" and source_of(socket) is not None:
+                    return True
+            elif names is None or socket.name in names:
+                try:
+                    read_socket(socket)
+                except UnsupportedNodeError:
+                    return True
+    return False
 
 
 def _read_principled(

@@ -15,15 +15,16 @@ from .audit.rules import name_settings
 from .audit.scene_table import LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from .coincident import shared_faces
 from .findings import Findings, Fix
-from .material_model import Material
+from .material_model import Material, grey
 from .mesh_arrays import CornerMesh, joined, world_mesh
 from .ply_file import TriangleMesh
 from .read_camera import read_camera, read_pixel_filter
 from .read_light import read_light
-from .read_material import read_context, read_target
+from .read_material import needs_bake, read_context, read_target
 from .read_mesh import material_of_slot, read_mesh, slot_count
 from .read_world import BLACK, read_world
 from .render_state import instanced_objects, layer_collections, render_state, rendered_layer, rendered_objects
+from .scene_bakes import SceneBakes, Surface
 from .scene_data import TARGET_BSDF, TARGET_SHAPE, RenderSettings, SceneData, Shape, Terminator
 from .visibility import check_visible
 
@@ -33,13 +34,18 @@ DEFAULT_SPP = 64
 BOUNCES = ("diffuse", "glossy", "transmission")
 
 
-def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: Findings) -> SceneData | None:
-    """Return the scene as the render would see it, or None with errors in `findings`."""
+def read_scene(
+    context: bpy.types.Context, target: bpy.types.Object, findings: Findings, bakes: SceneBakes | None = None
+) -> SceneData | None:
+    """Return the scene as the render would see it, or None with errors in `findings`.
+
+    What only Cycles can tell is asked of `bakes`, while the rest is read.
+    """
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
         findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
         with context.temp_override(view_layer=layer):
-            return read_scene(bpy.context, target, findings)
+            return read_scene(bpy.context, target, findings, bakes)
     scene, view_layer = context.scene, context.view_layer
     others = [each.name for each in scene.view_layers if each.use and each != view_layer]
     if others and view_layer.use:
@@ -67,9 +73,9 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
         if camera is None or material is None:
             return None
         _name_settings(scene, view_layer, findings)
-        world = read_world(scene, settings.exposure, findings) if view_layer.use_sky else BLACK
+        world = read_world(scene, settings.exposure, findings, bakes) if view_layer.use_sky else BLACK
         data = SceneData(camera, settings, world)
-        walk = _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings)
+        walk = _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings, bakes)
         walk.run()
         if data.target is None:
             if target.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
@@ -82,6 +88,8 @@ def read_scene(context: bpy.types.Context, target: bpy.types.Object, findings: F
             else:
                 findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
             return None
+        if bakes is not None:
+            bakes.finish(data, findings)
         if not data.world.is_lit and not data.lights and not data.emitting:
             findings.error("The scene has no light: add a light or give the world a colour.")
         walk.note_coincident_faces()
@@ -146,7 +154,9 @@ class _Walk:
         depsgraph: bpy.types.Depsgraph,
         rendered: set[str],
         findings: Findings,
+        bakes: SceneBakes | None,
     ) -> None:
+        self.bakes, self.baked = bakes, set[str]()  # BSDFs that are to be baked for each object
         self.data, self.target, self.slot = data, target, slot
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
@@ -171,7 +181,7 @@ class _Walk:
                 own = not instance.is_instance or instance.parent == item.original.evaluated_get(self.depsgraph)
                 # an object that only collection instances show is fitted in all of them
                 own |= item.original.name_full not in self.rendered
-                self._add_mesh(item, matrix, own and item.original == self.target)
+                self._add_mesh(instance, matrix, own and item.original == self.target)
             elif item.type not in (*MESH_TYPES, *SILENT_TYPES):
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
         if self.target_pieces:
@@ -191,7 +201,10 @@ class _Walk:
             return False
         return not item.is_instancer or item.show_instancer_for_render
 
-    def _add_mesh(self, item: bpy.types.Object, matrix: NDArray[np.float64], is_target: bool) -> None:
+    def _add_mesh(
+        self, instance: bpy.types.DepsgraphObjectInstance, matrix: NDArray[np.float64], is_target: bool
+    ) -> None:
+        item = instance.object
         key = (item.name_full, item.data.as_pointer())
         if key not in self.meshes:
             self.meshes[key] = read_mesh(item, self.depsgraph)
@@ -222,7 +235,11 @@ class _Walk:
                 self.target_pieces.append((piece, mesh.is_closed))
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
-            self.data.shapes.append(Shape(name, piece, bsdf, mesh.is_closed, Terminator(*shadow_terminator(item))))
+            shape = Shape(name, piece, bsdf, mesh.is_closed, Terminator(*shadow_terminator(item)))
+            if self.bakes is not None and bsdf in self.baked:
+                surface = Surface(instance, slot, mesh, slots == slot, matrix)
+                shape = self.bakes.ask_surface(self.data, shape, surface, self.findings)
+            self.data.shapes.append(shape)
 
     def note_coincident_faces(self) -> None:
         """Report objects whose faces lie in the same place."""
@@ -238,6 +255,13 @@ class _Walk:
         if key not in self.bsdfs:
             self.bsdfs[key] = f"material_{len(self.bsdfs):04d}"
             original = None if material is None else material.original
+            if needs_bake(original):
+                assert original is not None
+                self.findings.note(f"Material '{original.name}' of '{item.name}' is baked into textures by Cycles.")
+                self.baked.add(self.bsdfs[key])
+                if self.bakes is None:
+                    self.data.materials[self.bsdfs[key]] = grey(original.name)
+                return self.bsdfs[key]
             self.data.materials[self.bsdfs[key]] = read_context(original, item.name, self.findings)
         return self.bsdfs[key]
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -26,11 +27,19 @@ from .shader_graph import (
 )
 from .world_model import World, resample
 
+if TYPE_CHECKING:
+    from .scene_bakes import SceneBakes
+
 BLACK = World(np.zeros(3))
+UNKNOWN = World(np.ones(3))  # stands in for a world that nobody has rendered yet
 
 
-def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> World:
-    """Return the world's radiance times `exposure`; black, with an error in `findings`, if it cannot be exported."""
+def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bakes: SceneBakes | None = None) -> World:
+    """Return the world's radiance times `exposure`.
+
+    One of other nodes than a colour or an Environment Texture is asked of `bakes`, which put it into the scene when
+    they are finished; without them something stands in for it.
+    """
     world = scene.world
     if world is None:
         return BLACK
@@ -45,15 +54,15 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings) -> W
     node = surface_of(tree)
     if node is None:
         return BLACK
+    visibility = getattr(world, "cycles_visibility", None)
+    camera = visibility is None or visibility.camera
     try:
-        visibility = getattr(world, "cycles_visibility", None)
-        return replace(_background(node, exposure), camera=visibility is None or visibility.camera)
+        return replace(_background(node, exposure), camera=camera)
     except UnsupportedNodeError as problem:
-        findings.error(
-            f"World '{world.name}' uses {problem}, which cannot be exported: link one Background with a colour or an "
-            "Environment Texture."
-        )
-        return BLACK
+        findings.note(f"World '{world.name}' uses {problem}: Cycles renders it into a panorama for the fit.")
+        if bakes is not None:
+            bakes.ask_world(world)
+        return replace(UNKNOWN, camera=camera)
 
 
 def _background(node: bpy.types.Node, exposure: float) -> World:

@@ -19,7 +19,7 @@ from .material_model import Texture
 from .mesh_arrays import turned
 from .ply_file import TriangleMesh, write_ply
 from .scene_data import TARGET_BSDF, SceneData, Shape
-from .world_model import world_element, world_irradiance
+from .world_model import camera_world_element, world_element, world_irradiance
 from .xml_scene import Element, add, boolean, integer, plugin, reference, scalar, scene_text, string
 
 # the back of an open emitter lies this part of the scene's radius behind its front
@@ -88,6 +88,9 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
         emitters.append((light_element(light, f"light_{index + 1:04d}"), irradiance_at(light, middle)))
     _weigh(emitters)
     children += [element for element, _ in emitters]
+    camera_world = None if scene.settings.film_transparent else camera_world_element(scene.world, files.picture)
+    if camera_world is not None:
+        children.append(camera_world)
     for identifier, material in scene.materials.items():
         is_target = identifier == TARGET_BSDF
         children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))

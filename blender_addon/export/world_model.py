@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .xml_scene import Element, add, plugin, rgb, scalar, string, transform
+from .xml_scene import Element, add, bitmap, plugin, rgb, scalar, string, transform
 
 # Mitsuba's envmap looks up local (x, y, z), Y up; Blender's equirectangular image has +X in its middle and Z up
 AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -22,13 +22,15 @@ EXACT_HEIGHT = 1024
 class World:
     """Radiance of the surroundings: `color` alone, or times `pixels`, an equirectangular picture (height, width, 3).
 
-    `lookup` is the linear part of what moves a world direction before the look-up.
+    `lookup` is the linear part of what moves a world direction before the look-up. `camera_pixels` is what the camera
+    sees instead, radiance laid out alike, where that differs.
     """
 
     color: NDArray[np.float64]
     pixels: NDArray[np.float32] | None = None
     lookup: NDArray[np.float64] | None = None
     camera: bool = True  # whether the camera sees it
+    camera_pixels: NDArray[np.float32] | None = None
 
     @property
     def is_lit(self) -> bool:
@@ -52,6 +54,15 @@ def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> E
         scalar("scale", 1.0),
         transform("to_world", matrix),
     )
+
+
+def camera_world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> Element | None:
+    """Return the `<texture>` that camera rays see behind everything, as `camera_world` of the backend reads it."""
+    if world.camera_pixels is None or not world.camera:
+        return None
+    element = bitmap("camera_world", save(world.camera_pixels))
+    element.set("id", element.attrib.pop("name"))  # nothing of Mitsuba's own refers to it
+    return element
 
 
 def world_irradiance(world: World) -> float:

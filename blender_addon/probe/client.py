@@ -80,13 +80,21 @@ class Probe:
         ProbeError
             With the sentence of the second Blender, or the end of its log where it died.
         """
-        if not self._ready:
-            self._checked(self._next())
-            self._ready = True
+        self.send(command, **words)
+        return self.receive()
+
+    def send(self, command: str, **words: Any) -> None:
+        """Send a request without waiting; answers come in the order of the requests."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError):  # a process that is gone is told by what it does not answer
             self._process.stdin.write(json.dumps({"command": command, **words}) + "\n")
             self._process.stdin.flush()
+
+    def receive(self) -> dict[str, Any]:
+        """The answer to the oldest request that has none yet; errors are those of `ask`."""
+        if not self._ready:
+            self._checked(self._next())
+            self._ready = True
         return self._checked(self._next())
 
     def close(self) -> None:

@@ -23,8 +23,13 @@ from typing import Any, TextIO
 
 Command = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
-# a command is the function `answer(request)` of a module in this folder; it leaves the open file as it found it
-COMMANDS = {"sockets": "socket_pictures"}
+# a command is a function of a request in a module beside this folder; it leaves the open file as it found it
+COMMANDS = {
+    "sockets": ("probe.socket_pictures", "answer"),
+    "world": ("bake.requests", "world"),
+    "surfaces": ("bake.requests", "surfaces"),
+    "paint": ("bake.requests", "paint"),
+}
 LOOK_SECONDS = 1.0  # between two looks whether the parent is still there
 
 
@@ -66,7 +71,8 @@ def _answer(line: str) -> Mapping[str, Any]:
         name = request["command"]
         if name not in COMMANDS:
             return {"status": "failed", "sentence": f"There is no command {name!r}."}
-        command: Command = importlib.import_module(f"{__package__ or 'blender_addon.probe'}.{COMMANDS[name]}").answer
+        module, function = COMMANDS[name]
+        command: Command = getattr(importlib.import_module(f"blender_addon.{module}"), function)
         return {"status": "ok", **command(request)}
     except ProbeRequestError as error:
         return {"status": "bad_input", "sentence": str(error)}

@@ -32,12 +32,16 @@ TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | m
 
 
 class CyclesPath(RBIntegrator):
-    """`max_depth`, `hide_emitters` as `prb`, further the numbers of `LightPaths` by name."""
+    """`max_depth`, `hide_emitters` as `prb`, further the numbers of `LightPaths` by name.
+
+    A nested texture `camera_world` is what rays straight from the camera see behind everything (`camera_world`).
+    """
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.filter_glossy = float(props.get("filter_glossy", 0.0))
         self.clamp_indirect = float(props.get("clamp_indirect", 0.0))
+        self.camera_world = props.get("camera_world", None)
         self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
 
     @dr.syntax
@@ -98,10 +102,14 @@ class CyclesPath(RBIntegrator):
             beyond = active & (left < self.max_depth) if known else active
             seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
-            shown = throughput * ds.emitter.eval(si, seen) * share(delta, density, light_density)
+            emission = ds.emitter.eval(si, seen)
+            straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
+            if dr.hint(self.camera_world is not None, mode="scalar"):
+                behind_all = straight & seen & ~si.is_valid()
+                emission = dr.select(behind_all, seen_world(self.camera_world, ray.d, behind_all), emission)
+            shown = throughput * emission * share(delta, density, light_density)
             shown *= clamp_factor(self.clamp_indirect, first * shown, bounce >= 2)
             if dr.hint(lamps, mode="scalar"):
-                straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
                 likely = dr.select(delta, CERTAIN, density)
                 shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight)
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
@@ -156,6 +164,17 @@ class CyclesPath(RBIntegrator):
                 met = scene.ray_intersect_preliminary(ray, active=active)
 
         return radiance if primal else change, valid, [], radiance
+
+
+def seen_world(texture: Any, direction: Any, active: Any = True) -> Any:
+    """Radiance of an equirectangular picture along world directions, +X in its middle, +Z at its top.
+
+    The layout is that of Blender's Environment Texture (Cycles' `direction_to_equirectangular`).
+    """
+    flat = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
+    polar = dr.safe_acos(direction.z)
+    flat.uv = mi.Point2f(0.5 - dr.atan2(direction.y, direction.x) / (2 * dr.pi), polar / dr.pi)
+    return mi.Color3f(texture.eval(flat, active))
 
 
 def share(alone: Any, density: Any, other: Any) -> Any:

@@ -27,6 +27,7 @@ from .variant import load_variant
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from .pixel_pictures import PixelPictures
 
+CAMERA_WORLD = "camera_world"  # id in the scene file, property of the integrator
 _MASK_RAYS = 4  # rays per pixel and axis that look for the target
 
 
@@ -257,6 +258,11 @@ def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, fl
     for name, value in properties.items():
         kind = "integer" if isinstance(value, int) else "float"
         ElementTree.SubElement(integrator, kind, name=name, value=repr(value))
+    camera_world = next((t for t in document.findall("texture") if t.get("id") == CAMERA_WORLD), None)
+    if camera_world is not None:  # what camera rays see behind everything
+        document.remove(camera_world)
+        camera_world.set("name", CAMERA_WORLD)
+        integrator.append(camera_world)
     for bsdf in document.iter("bsdf"):
         if bsdf.get("type") == "blender_principled":
             ElementTree.SubElement(bsdf, "boolean", name="filtered", value="true")

@@ -59,9 +59,14 @@ def recorded_background(
         sampler = fresh_sampler(seed, dr.width(index))
         add(index, traced_radiance(scene, sampler, rays.ray(index), light_paths, depth, hide=hide_emitters))
     index = dr.compress(rest)
-    environment = None if hide_emitters else scene.environment()
-    if dr.width(index) > 0 and environment is not None:
+    if dr.width(index) > 0 and not hide_emitters:
+        from .cycles_path import seen_world  # can be imported when a variant is set
+
+        environment, camera_world = scene.environment(), getattr(scene.integrator(), "camera_world", None)
         beyond = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
         beyond.wi = -rays.ray(index).d
-        add(index, environment.eval(beyond))
+        if camera_world is not None:
+            add(index, seen_world(camera_world, -beyond.wi))
+        elif environment is not None:
+            add(index, environment.eval(beyond))
     return image.reshape(height, width, 3)

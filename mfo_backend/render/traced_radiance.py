@@ -35,5 +35,8 @@ def traced_radiance(
 
     register()
     properties: dict[str, Any] = {"type": PLUGIN_NAME, "max_depth": depth, "hide_emitters": hide}
+    camera_world = getattr(scene.integrator(), "camera_world", None)
+    if camera_world is not None and before is None:
+        properties["camera_world"] = camera_world
     integrator = mi.load_dict(properties | light_path_properties(light_paths or LightPaths()))
     return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, before=before, met=met)[0]

@@ -145,7 +145,7 @@ def test_normal_map_is_noted(scene: Any, export: Any) -> None:
     assert report.request["materials"]["target_bsdf"]["sockets"]["Normal"]["linked"] is True
 
 
-def test_unknown_node_on_context_is_noted_on_target_refused(scene: Any) -> None:
+def test_unknown_node_on_context_is_baked_on_target_refused(scene: Any) -> None:
     world_color(scene, 1.0)
     target, other = new_material("Target"), new_material("Other", Roughness=0.7)
     floor, quad = add_quad("Floor", 3.0, -1.0, other), add_quad("Target", 1.0, 0.0, target)
@@ -161,13 +161,12 @@ def test_unknown_node_on_context_is_noted_on_target_refused(scene: Any) -> None:
     principled(target).inputs["Roughness"].links[0].is_muted = True
     errors, notes = check_export(bpy.context, quad)
     assert errors == []
-    assert len(notes) == 1
-    assert notes[0].startswith("Roughness of material 'Other' is linked to the node 'Noise Texture'")
+    assert notes == ["Material 'Other' of 'Floor' is baked into textures by Cycles."]
     assert floor.material_slots[0].material == other
 
 
 def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
-    """Diffuse and emission are exact, an unknown shader is grey with a note, nothing linked is black."""
+    """Diffuse and emission are exact, another shader is its nearest model with a note, nothing linked is black."""
     world_color(scene, 0.5)
     materials = [diffuse_material("d", (0.2, 0.5, 0.8)), emission_material("e", (0.3, 0.2, 0.1)), new_material("black")]
     toon = diffuse_material("toon", (1, 1, 1))
@@ -183,8 +182,8 @@ def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycle
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(target)
     assert [note for note in report.notes if "toon" in note] == [
-        "Material 'toon' of 'Quad 3' starts with the node 'Toon BSDF' (Toon BSDF), which is not exported; it is shown "
-        "as grey."
+        "Material 'toon' of 'Quad 3' is baked into textures by Cycles.",
+        "Material 'toon': Toon BSDF is approximated by its nearest model.",
     ]
     expected, found = render_cycles(), render_mitsuba(report, 256)
     for index in range(3):

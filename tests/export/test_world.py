@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 from typing import Any
+from xml.etree import ElementTree
 
 import bpy
 import numpy as np
 import pytest
 from mathutils import Vector
+
+from mfo_backend.scene.image_file import read_image
 
 from .scenes import add_camera, add_quad, new_material
 
@@ -121,11 +124,64 @@ def test_world_behind_a_transparent_film_is_black(scene: Any, export: Any, rende
     assert pixels[16, 16].min() > 0.5
 
 
-def test_unsupported_world_is_refused(scene: Any, export: Any) -> None:
+def test_world_of_other_nodes_is_rendered_into_panoramas(scene: Any, export: Any) -> None:
+    tree, background = world_nodes(scene)
+    # the colour is the direction itself, half of it for the camera, so that each pixel is known
+    coordinate, paths = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeLightPath")
+    half = tree.nodes.new("ShaderNodeVectorMath")
+    half.operation = "MULTIPLY_ADD"
+    half.inputs[1].default_value = half.inputs[2].default_value = (0.5, 0.5, 0.5)
+    strength = tree.nodes.new("ShaderNodeMath")
+    strength.operation, strength.inputs[0].default_value = "DIVIDE", 1.0
+    shifted = tree.nodes.new("ShaderNodeMath")
+    shifted.inputs[1].default_value = 1.0
+    tree.links.new(coordinate.outputs["Generated"], half.inputs[0])
+    tree.links.new(half.outputs[0], background.inputs["Color"])
+    tree.links.new(paths.outputs["Is Camera Ray"], shifted.inputs[0])
+    tree.links.new(shifted.outputs[0], strength.inputs[1])
+    tree.links.new(strength.outputs[0], background.inputs["Strength"])
+    add_camera("ORTHO", ortho_scale=2.0)
+    before = sorted(block.name for kind in (bpy.data.scenes, bpy.data.worlds, bpy.data.cameras) for block in kind)
+    report = export(add_quad("Target", 1.0, 0.0, new_material("Target")))
+    assert before == sorted(b.name for kind in (bpy.data.scenes, bpy.data.worlds, bpy.data.cameras) for b in kind)
+    assert any("Cycles renders it into a panorama" in note for note in report.notes)
+    pictures = {path.name: np.asarray(read_image(path).pixels) for path in (report.folder / "textures").iterdir()}
+    camera, light = sorted(pictures.values(), key=lambda p: p.mean())
+    polar, azimuth = np.meshgrid(
+        (np.arange(512) + 0.5) / 512 * np.pi, (0.5 - (np.arange(1024) + 0.5) / 1024) * 2.0 * np.pi, indexing="ij"
+    )
+    towards = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+    np.testing.assert_allclose(camera, 0.25 * towards + 0.25, atol=0.002)
+    np.testing.assert_allclose(light[1::2], 0.5 * towards + 0.5, atol=0.004)
+
+
+def test_sun_of_a_sky_becomes_a_lamp(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
+    from .test_light_levels import floor, tiles
+
+    tree, background = world_nodes(scene)
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_rotation = 0.7, 2.0
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+    background.inputs["Strength"].default_value = 0.1
+    target = floor()
+    report = export(target)
+    lamp = next(ElementTree.parse(report.folder / "scene.xml").iterfind("emitter[@type='blender_sun']"))
+    assert float(lamp.find("float[@name='angle']").get("value")) == pytest.approx(np.degrees(sky.sun_size), rel=1e-4)
+    expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 256))
+    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
+
+
+def test_world_that_cannot_be_rendered_is_an_error(scene: Any, export: Any, monkeypatch: Any, tmp_path: Any) -> None:
     from blender_addon.export.job import ExportError
+    from blender_addon.probe import client
 
     tree, background = world_nodes(scene)
     tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
     add_camera("ORTHO", ortho_scale=2.0)
-    with pytest.raises(ExportError, match=r"World 'World' uses the node 'Sky Texture'.*Environment Texture"):
-        export(add_quad("Target", 1.0, 0.0, new_material("Target")))
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    monkeypatch.setattr(client.tempfile, "tempdir", str(tmp_path))
+    for words, said in ((["false"], "has ended"), (["/no/such/program"], "could not be started")):
+        monkeypatch.setattr(client, "own_blender", lambda *_arguments, words=words: words)
+        with pytest.raises(ExportError, match=f"World 'World' could not be rendered by Cycles: .*{said}"):
+            export(target)
+        assert not list(tmp_path.iterdir())

@@ -1,0 +1,366 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A material on an object as textures, baked by the Blender this runs in.
+
+Every number that its closures hang on is baked as emission onto a UV map of its own, and normals as those of that map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix  # pyright: ignore[reportMissingImports]
+from numpy.typing import NDArray
+
+from ..export.read_mesh import material_of_slot, slot_count
+from ..versions import active_output, can_denoise
+from .closure_tree import ClosureTree, Leaf, Value
+from .light_path import SCATTERED, answer_light_paths, light_path_outputs
+from .unwrap import unwrapped
+
+Pixels = NDArray[np.float32]
+
+UV_MAP, TANGENT = "material_fit", "material_fit_tangent"
+MARGIN = 8  # texels around islands that take the colour beside them
+SAMPLES = 4  # a texel, so that fine patterns are averaged
+MOST_UV_MAPS = 8  # of a mesh
+FLAT = 2e-3  # largest slope of a normal map that counts as none
+NORMALS = ("Normal", "Coat Normal")
+SKIPPED = ("Weight", "Tangent", *NORMALS)
+# what these nodes tell depends on where a surface is looked at from
+OF_VIEW = {
+    "ShaderNodeFresnel": ("Fac", "Factor"),
+    "ShaderNodeLayerWeight": ("Fresnel", "Facing"),
+    "ShaderNodeCameraData": ("View Vector", "View Z Depth", "View Distance"),
+    "ShaderNodeNewGeometry": ("Incoming",),
+    "ShaderNodeTexCoord": ("Camera", "Window", "Reflection"),
+}
+
+
+def baked_surface(
+    scene: bpy.types.Scene, instance: Any, depsgraph: bpy.types.Depsgraph, slot: int, folder: Path, size: int
+) -> dict[str, Any]:
+    """Bake the material in `slot` of a depsgraph's instance into `folder`, `size` texels along each side.
+
+    Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``, each
+    with ``kind``, ``name``, ``weight``, ``sockets`` and what of the node's settings counts; ``emission`` and for leaves
+    ``normal``, where there are any; ``view`` and ``paths``: what of the view and of light paths the nodes ask for.
+    A value is a number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working
+    space. Normals are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
+    """
+    original = instance.object.original
+    material = material_of_slot(instance.object, slot).original.copy()
+    groups: list[bpy.types.NodeTree] = []
+    try:
+        tree = material.node_tree
+        paths = light_path_outputs(tree)
+        groups += answer_light_paths(tree, SCATTERED)
+        view = _asks_for_view(tree)
+        emits = _emits(tree)
+        with _stage(scene, instance, original, depsgraph, slot, material) as stage:
+            bake = _Bake(stage, material, folder, size, bool(view))
+            answer: dict[str, Any] = {"view": view, "paths": sorted(paths)}
+            if emits:
+                answer["emission"] = bake.file(bake.closure())
+            closures = ClosureTree(tree)
+            groups += closures.groups
+            answer["leaves"] = _leaves(closures, bake)
+            np.save(folder / "corners.npy", stage.corners)
+            answer["corners"] = "corners.npy"
+            return answer
+    finally:
+        bpy.data.materials.remove(material)
+        for group in groups:
+            bpy.data.node_groups.remove(group)
+
+
+def _leaves(closures: ClosureTree, bake: _Bake) -> list[dict[str, Any]]:
+    asked: list[tuple[dict[str, Any], str, Value]] = []
+    leaves = []
+    for leaf in closures.leaves:
+        found: dict[str, Any] = {"kind": leaf.node.bl_idname, "label": leaf.node.bl_label, "sockets": {}}
+        for name in ("distribution", "subsurface_method", "fresnel_type"):
+            if hasattr(leaf.node, name):
+                found[name] = getattr(leaf.node, name)
+        asked.append((found, "weight", leaf.weight))
+        for socket in leaf.node.inputs:
+            if socket.name not in SKIPPED and socket.type != "SHADER" and socket.enabled:
+                asked.append((found["sockets"], socket.name, closures.value(leaf.path, socket)))
+        leaves.append(found)
+    bake.values(asked)
+    for found, leaf in zip(leaves, closures.leaves, strict=True):
+        normal = _normal(closures, leaf)
+        if normal is not None:
+            local = bake.local_normal(normal)
+            if np.abs(local[..., :2]).max() > FLAT:
+                found["normal"] = bake.file(local)
+    return leaves
+
+
+def _normal(closures: ClosureTree, leaf: Leaf) -> Value | None:
+    socket = leaf.node.inputs.get("Normal")
+    if socket is None or not socket.is_linked:
+        return None
+    value = closures.value(leaf.path, socket)
+    return value if hasattr(value, "is_output") else None
+
+
+class _Stage:
+    """The object to bake: alone in a scene of its own."""
+
+    def __init__(self, scene: bpy.types.Scene, item: bpy.types.Object, corners: NDArray[np.float32]) -> None:
+        self.scene, self.item, self.corners = scene, item, corners
+
+
+@contextmanager
+def _stage(
+    scene: bpy.types.Scene,
+    instance: Any,
+    original: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    slot: int,
+    material: bpy.types.Material,
+) -> Iterator[_Stage]:
+    """A scene with a copy of the evaluated object, whose coordinates are those of the original."""
+    stage = bpy.data.scenes.new("material_fit_bake")
+    matrix, last = instance.matrix_world.copy(), max(slot_count(instance.object) - 1, 0)
+    layers = original.type == "MESH"
+    mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
+    item = bpy.data.objects.new("material_fit_bake", mesh)
+    blank = bpy.data.materials.new("material_fit_blank")
+    window = bpy.context.window
+    before, view_layer, name = window.scene, window.view_layer, original.name
+    try:
+        item.matrix_world = matrix
+        _copy_what_nodes_ask_for(original, item, mesh)
+        stage.collection.objects.link(item)
+        stage.camera = scene.camera
+        stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        _set_up(stage, scene)
+        window.scene = stage
+        faces = np.empty(len(mesh.polygons), dtype=np.int32)
+        mesh.polygons.foreach_get("material_index", faces)
+        uv = unwrapped(mesh, np.clip(faces, 0, last) == slot, stage)
+        while len(mesh.uv_layers) >= MOST_UV_MAPS:
+            mesh.uv_layers.remove(next(layer for layer in reversed(mesh.uv_layers) if not layer.active_render))
+        layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
+        layer.uv.foreach_set("vector", uv.reshape(-1))
+        mesh.uv_layers.active = layer
+        corners = _add_tangents(mesh, uv, matrix)
+        mesh.materials.clear()
+        for number in range(last + 1):
+            mesh.materials.append(material if number == slot else blank)
+        yield _Stage(stage, item, corners)
+    finally:
+        window.scene, window.view_layer = before, view_layer
+        bpy.data.objects.remove(item)
+        original.name = name
+        bpy.data.meshes.remove(mesh)
+        bpy.data.materials.remove(blank)
+        bpy.data.scenes.remove(stage)
+
+
+def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
+    """Generated coordinates, Object Info and attributes of the object."""
+    if hasattr(original.data, "texspace_location"):
+        mesh.use_auto_texspace = False
+        mesh.texspace_location = original.data.texspace_location
+        mesh.texspace_size = original.data.texspace_size
+    item.pass_index, item.color = original.pass_index, original.color
+    for key in original.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
+        if not hasattr(original[key], "as_pointer"):
+            item[key] = original[key]
+    name = original.name  # Object Info's Random is made of it
+    original.name = "material_fit_original"
+    item.name = name
+
+
+def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+    stage.render.engine = "CYCLES"
+    stage.cycles.device = "CPU"
+    stage.cycles.samples = SAMPLES
+    stage.cycles.use_adaptive_sampling = False
+    if can_denoise():
+        stage.cycles.use_denoising = False
+    stage.render.resolution_x, stage.render.resolution_y = scene.render.resolution_x, scene.render.resolution_y
+    bake = stage.render.bake
+    bake.target, bake.margin, bake.margin_type = "IMAGE_TEXTURES", MARGIN, "EXTEND"
+    bake.use_clear, bake.use_selected_to_active = True, False
+
+
+def _add_tangents(mesh: bpy.types.Mesh, uv: NDArray[np.float32], matrix: Matrix) -> NDArray[np.float32]:
+    """Give `mesh` dp/du of the map `uv` as an attribute in world space; returns uv by triangle (triangles, 3, 2)."""
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    loops, vertices = np.empty(count * 3, dtype=np.int32), np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    linear = np.array(matrix.to_3x3(), dtype=np.float64)
+    corners = uv[loops].reshape(-1, 3, 2)
+    points = places.reshape(-1, 3)[vertices[loops]].reshape(-1, 3, 3) @ linear.T
+    along, across = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+    (u1, v1), (u2, v2) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    sign = np.sign(u1 * v2 - u2 * v1)[:, None]
+    tangent = sign * (v2[:, None] * along - v1[:, None] * across)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-20)
+    at_corner = np.zeros((len(mesh.loops), 3), dtype=np.float32)
+    at_corner[loops] = np.repeat(tangent, 3, axis=0)
+    attribute = mesh.attributes.new(TANGENT, "FLOAT_VECTOR", "CORNER")
+    attribute.data.foreach_set("vector", at_corner.reshape(-1))
+    return corners
+
+
+class _Bake:
+    """Bakes of one material, kept in a folder."""
+
+    def __init__(self, stage: _Stage, material: bpy.types.Material, folder: Path, size: int, of_view: bool) -> None:
+        self._stage, self._folder, self._size = stage, folder, size
+        self._material, self._tree = material, material.node_tree
+        self._output: Any = active_output(self._tree) or self._tree.nodes.new("ShaderNodeOutputMaterial")
+        self._count = 0
+        self._covered: NDArray[np.bool_] | None = None
+        self._frame: tuple[Pixels, Pixels] | None = None
+        stage.scene.render.bake.view_from = "ACTIVE_CAMERA" if of_view and stage.scene.camera else "ABOVE_SURFACE"
+
+    def file(self, pixels: Pixels) -> str:
+        """Keep a picture and return its name."""
+        self._count += 1
+        name = f"{self._count:03d}.npy"
+        np.save(self._folder / name, pixels)
+        return name
+
+    def closure(self) -> Pixels:
+        """The emission of the material as it is."""
+        image = bpy.data.images.new("material_fit", self._size, self._size, float_buffer=True, is_data=True)
+        blank = bpy.data.images.new("material_fit_blank", 4, 4, float_buffer=True, is_data=True)
+        made = []
+        try:
+            for slot in self._stage.item.material_slots:
+                tree = slot.material.node_tree
+                if tree is None:
+                    slot.material.use_nodes = True
+                    tree = slot.material.node_tree
+                node = tree.nodes.new("ShaderNodeTexImage")
+                made.append((tree, node))
+                node.image = image if slot.material == self._material else blank
+                tree.nodes.active = node
+            with bpy.context.temp_override(
+                scene=self._stage.scene,
+                view_layer=self._stage.scene.view_layers[0],
+                active_object=self._stage.item,
+                object=self._stage.item,
+                selected_objects=[self._stage.item],
+                selected_editable_objects=[self._stage.item],
+            ):
+                bpy.ops.object.bake(type="EMIT")
+            pixels = np.empty(self._size * self._size * 4, dtype=np.float32)
+            image.pixels.foreach_get(pixels)
+            return np.ascontiguousarray(pixels.reshape(self._size, self._size, 4)[::-1, :, :3])
+        finally:
+            for tree, node in made:
+                tree.nodes.remove(node)
+            bpy.data.images.remove(image)
+            bpy.data.images.remove(blank)
+
+    def values(self, asked: list[tuple[dict[str, Any], str, Value]]) -> None:
+        """Put each value, or the name of its picture, where it is asked for; three numbers share a bake."""
+        numbers = []
+        for place, name, value in asked:
+            if not hasattr(value, "is_output"):
+                place[name] = value
+            elif value.type in ("RGBA", "VECTOR"):
+                place[name] = self._put(self._of_socket(value))
+            else:
+                numbers.append((place, name, value))
+        for first in range(0, len(numbers), 3):
+            three = numbers[first : first + 3]
+            joined = self._tree.nodes.new("ShaderNodeCombineColor")
+            for (_, _, value), socket in zip(three, joined.inputs, strict=False):
+                self._tree.links.new(value, socket)
+            pixels = self._of_socket(joined.outputs[0])
+            for channel, (place, name, _) in enumerate(three):
+                place[name] = self._put(pixels[:, :, channel : channel + 1])
+
+    def local_normal(self, socket: bpy.types.NodeSocket) -> Pixels:
+        """A normal in the frame of the map."""
+        if self._frame is None:
+            geometry = self._tree.nodes.new("ShaderNodeNewGeometry")
+            attribute = self._tree.nodes.new("ShaderNodeAttribute")
+            attribute.attribute_name = TANGENT
+            self._frame = self._vector(geometry.outputs["Normal"]), self._vector(attribute.outputs["Vector"])
+        smooth, along = self._frame
+        normal = self._vector(socket)
+        side = along - smooth * (along * smooth).sum(axis=2, keepdims=True)
+        side /= np.maximum(np.linalg.norm(side, axis=2, keepdims=True), 1e-12)
+        third = np.cross(smooth, side)
+        local = np.stack([(axis * normal).sum(axis=2) for axis in (side, third, smooth)], axis=2)
+        lengths = np.linalg.norm(local, axis=2, keepdims=True)
+        return np.where(lengths > 0.5, local / np.maximum(lengths, 1e-12), (0.0, 0.0, 1.0)).astype(np.float32)
+
+    def _vector(self, socket: bpy.types.NodeSocket) -> Pixels:
+        """Unit vectors; emission has no negative colours."""
+        node = self._tree.nodes.new("ShaderNodeVectorMath")
+        node.operation = "MULTIPLY_ADD"
+        self._tree.links.new(socket, node.inputs[0])
+        node.inputs[1].default_value = node.inputs[2].default_value = (0.5, 0.5, 0.5)
+        found = 2.0 * self._of_socket(node.outputs[0]) - 1.0
+        return found / np.maximum(np.linalg.norm(found, axis=2, keepdims=True), 1e-12)
+
+    @property
+    def _where(self) -> NDArray[np.bool_]:
+        """Texels that are baked or lie beside those; Blender leaves all others black."""
+        if self._covered is None:
+            self._covered = self._of_socket(None)[:, :, 0] > 0.5
+        return self._covered
+
+    def _of_socket(self, socket: bpy.types.NodeSocket | None) -> Pixels:
+        """What feeds from `socket`; white without one."""
+        emission = self._tree.nodes.new("ShaderNodeEmission")
+        emission.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+        if socket is not None:
+            self._tree.links.new(socket, emission.inputs["Color"])
+        self._tree.links.new(emission.outputs[0], self._output.inputs["Surface"])
+        try:
+            return self.closure()
+        finally:
+            self._tree.nodes.remove(emission)
+
+    def _put(self, pixels: Pixels) -> Any:
+        """The name of a picture, or its value where it is the same everywhere."""
+        covered = pixels[self._where]
+        if not len(covered):
+            return 0.0 if pixels.shape[2] == 1 else [0.0, 0.0, 0.0]
+        low, high = covered.min(axis=0), covered.max(axis=0)
+        if np.all(high - low <= 1e-4 * np.maximum(np.abs(high), 1e-3)):
+            return float(high[0]) if len(high) == 1 else [float(number) for number in high]
+        pixels[~self._where] = covered.mean(axis=0)  # filtering may look at texels beside the islands
+        return self.file(pixels)
+
+
+def _emits(tree: bpy.types.NodeTree) -> bool:
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeEmission":
+            return True
+        strength = node.inputs.get("Emission Strength")
+        if strength is not None and (strength.is_linked or strength.default_value > 0.0):
+            return True
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and _emits(node.node_tree):
+            return True
+    return False
+
+
+def _asks_for_view(tree: bpy.types.NodeTree) -> list[str]:
+    """Labels of nodes whose linked outputs depend on the view."""
+    found = []
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            found += _asks_for_view(node.node_tree)
+        elif any(node.outputs[name].is_linked for name in OF_VIEW.get(node.bl_idname, ()) if name in node.outputs):
+            found.append(node.bl_label)
+    return sorted(set(found))
