@@ -12,6 +12,7 @@ from pathlib import Path
 
 import bpy
 
+from .animated_sockets import DRIVER, REPLACE, animation_of
 from .export.findings import ExportError, Findings, Fix
 from .export.image_pixels import UnreadableImageError, is_data, read_pixels, without_pixels
 from .export.read_camera import has_camera, note_picture_settings, picture_size
@@ -30,6 +31,7 @@ from .export.reference_view import SCENE, mixed_by, needs_table, output_view
 from .export.render_state import instanced_objects, rendered_objects
 from .export.shader_graph import source_of
 from .export.turned_picture import turn_notes
+from .local_copy import unwritable
 from .picture_header import read_header
 from .properties import SOCKET_ITEMS, crossed_limits
 from .versions import overrides_of
@@ -81,11 +83,40 @@ def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fin
     found = list(from_export(findings))
     if material is None or principled_node(material) is None:
         return found
-    if not material.is_editable:
-        sentence = f"Material '{material.name}' comes from a library: a fit runs, but its values cannot be applied."
-        found.append(Finding(IGNORED, sentence, (Fix("make_local"),)))
+    if unwritable(material):
+        found.append(Finding(STOPS, unwritable(material), (Fix("make_local"),)))
+    found += _animation(scene, material)
+    others = _others_with(material, target, scene)
+    if others:
+        listed = ", ".join(others[:2]) + (f" and {len(others) - 2} more" if len(others) > 2 else "")
+        sentence = f"Material '{material.name}' is also on {listed}: applied values change it there too."
+        found.append(Finding(IGNORED, sentence, (Fix("single_user"),)))
     found += _free_values(scene, material, "".join(findings.errors))
     return found
+
+
+def _animation(scene: bpy.types.Scene, material: bpy.types.Material) -> list[Finding]:
+    node = principled_node(material)
+    assert node is not None
+    found = []
+    for name, what in animation_of(node).items():
+        if name not in _FITTED:
+            continue
+        if scene.mfo.animated == REPLACE:
+            done = "the driver" if what == DRIVER else "the value at this frame"
+            found.append(Finding(FINE, f"{name} has {what}: an apply replaces {done}."))
+            continue
+        fix = Fix("remove_driver", name) if what == DRIVER else Fix("replace_animation")
+        sentence = f"{name} has {what}: it is fitted as it is at this frame, and an apply leaves it out."
+        found.append(Finding(IGNORED, sentence, (fix,)))
+    return found
+
+
+def _others_with(material: bpy.types.Material, target: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
+    """Names of other objects of the scene that have the material."""
+    if material.users <= 1 and target.data.users <= 1:
+        return []
+    return [o.name for o in scene.objects if o != target and any(s.material == material for s in o.material_slots)]
 
 
 def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str) -> list[Finding]:

@@ -53,6 +53,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     """Write the job folder of an object's active material."""
     bpy = _open(chosen.file)
     from .export.job import ExportError, export_job
+    from .local_copy import unwritable
 
     obj = bpy.context.scene.objects.get(chosen.object)
     if obj is None:
@@ -66,6 +67,11 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
         raise HeadlessError(f"--fit is not JSON ({error}).") from error
     if not isinstance(fit, dict):
         raise HeadlessError("--fit is not a JSON object.")
+    material, notes = obj.active_material, []
+    if material is not None and unwritable(material) and not chosen.make_local:
+        if chosen.will_apply:
+            raise HeadlessError(unwritable(material))
+        notes = [unwritable(material).replace(": make it", ", so its values cannot be applied: to apply them make it")]
     try:
         report = export_job(
             bpy.context,
@@ -78,7 +84,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
         )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
-    return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
+    return {"job": str(report.folder), "material": obj.active_material.name, "notes": [*notes, *report.notes]}
 
 
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:
@@ -107,17 +113,23 @@ def _refuse_mismatch(chosen: argparse.Namespace) -> None:
 def _put_values(bpy: Any, chosen: argparse.Namespace) -> tuple[Any, Any, dict[str, Any], list[str]]:
     """Apply a job's result; returns the material, the result, its values by socket and what was skipped."""
     from .job_result import JobResultError, read_job_result
+    from .local_copy import LocalCopyError, make_local, unwritable
     from .write_back import WriteBackError, apply_values, result_to_sockets
 
     try:
         result = read_job_result(Path(chosen.job).absolute())
         name = chosen.material or result.material_name
-        material = bpy.data.materials.get(name)
+        obj = bpy.context.scene.objects.get(result.object_name)
+        if obj is not None and chosen.make_local and unwritable(obj.active_material):
+            make_local(obj)
+        # the object's own comes first: a library may have a material of the same name
+        fitted = [slot.material for slot in obj.material_slots if slot.material is not None] if obj is not None else []
+        material = next((m for m in fitted if m.name == name), bpy.data.materials.get(name))
         if material is None:
             raise HeadlessError(f"{chosen.file} has no material {name!r}: give the one to change with --material.")
         values = result_to_sockets(result)
-        return material, result, values, apply_values(material, values, result.folder)
-    except (JobResultError, WriteBackError) as error:
+        return material, result, values, apply_values(material, values, result.folder, animated=chosen.animated)
+    except (JobResultError, WriteBackError, LocalCopyError) as error:
         raise HeadlessError(str(error)) from error
 
 
@@ -189,8 +201,12 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--fit", default="{}", help="the `fit` object of request.json")
     command.add_argument("--reference-view", default="scene", help="scene or standard: how a display picture was made")
     command.add_argument("--upright", action="store_true", help="turn the picture as its EXIF data say")
+    command.add_argument("--will-apply", action="store_true", help="refuse a material that cannot be changed")
+    command.add_argument("--make-local", action="store_true", help="its object will be made local by apply")
     command = add("apply", apply)
     command.add_argument("--job", required=True, type=Path)
+    command.add_argument("--animated", default="leave", help="leave or replace: sockets with keyframes or a driver")
+    command.add_argument("--make-local", action="store_true", help="make object, mesh and material parts of the file")
     command.add_argument("--save-as", required=True, type=Path)
     command.add_argument("--material", default="")
     command.add_argument("--force", action="store_true", help="also a result that does not match its reference")
@@ -202,6 +218,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--parent", type=int, default=0, help="end when this process is not the parent any more")
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--material", default="")
+    command.set_defaults(animated="replace", make_local=True)  # of a copy that is thrown away
     command = add("demo-scene", demo_scene)
     command.add_argument("--scene-seed", type=int, default=0)
     command.add_argument("--size", type=int, default=256)

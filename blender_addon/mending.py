@@ -11,11 +11,13 @@ import bpy
 import numpy as np
 from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 
+from .animated_sockets import REPLACE, remove_driver
 from .export.image_pixels import UnreadableImageError, read_pixels
 from .export.png_file import write_png
 from .export.read_material import principled_node
 from .export.shader_graph import surface_of
 from .export.turned_picture import turned
+from .local_copy import LocalCopyError, make_local
 from .picture_header import read_header
 from .preferences import new_job_folder
 from .versions import PRINCIPLED, active_output, node_tree_of, nodes_enabled
@@ -180,12 +182,31 @@ def _unlink(context: bpy.types.Context, name: str) -> None:
 
 
 def _make_local(context: bpy.types.Context, _argument: str) -> None:
-    material = _material(context)
-    name = material.name
-    material.make_local()
-    # the slot of a mesh that is linked too keeps the library's material
-    if not _material(context).is_editable:
-        raise MendingError(f"Material '{name}' cannot be made local: make its object and its mesh local first.")
+    target = _target(context)
+    try:
+        make_local(target)
+    except LocalCopyError as error:
+        raise MendingError(str(error)) from error
+
+
+def _single_user(context: bpy.types.Context, _argument: str) -> None:
+    """Give the target a copy of the material, and of the mesh where others have it, so that only it changes."""
+    target, material = _target(context), _material(context)
+    slot = target.material_slots[target.active_material_index]
+    if slot.link == "DATA" and target.data.users > 1:
+        target.data = target.data.copy()
+    target.active_material = material.copy()
+
+
+def _remove_driver(context: bpy.types.Context, name: str) -> None:
+    node = principled_node(_material(context))
+    if node is None or name not in node.inputs:
+        raise MendingError(f"There is no socket {name} any more: check again.")
+    remove_driver(node.inputs[name])
+
+
+def _replace_animation(context: bpy.types.Context, _argument: str) -> None:
+    context.scene.mfo.animated = REPLACE
 
 
 def _all_parameters(context: bpy.types.Context, _argument: str) -> None:
@@ -213,6 +234,9 @@ KINDS = {
     "new_material": Kind("Add Material", "Put a new material with a Principled BSDF into the slot", _new_material),
     "principled": Kind("Use Principled", "Link a Principled BSDF to the output; the other nodes stay", _principled),
     "unlink": Kind("Unlink {}", "Remove the link of this socket, so that its value can be fitted", _unlink),
-    "make_local": Kind("Make Local", "Make the material a part of this file", _make_local),
+    "make_local": Kind("Make Local", "Make object, mesh and material parts of this file", _make_local),
+    "single_user": Kind("Make Single User", "Give this object a material of its own", _single_user),
+    "remove_driver": Kind("Remove Driver of {}", "Remove the driver, so that an applied value stays", _remove_driver),
+    "replace_animation": Kind("Key on Apply", "Put a key at the current frame on apply", _replace_animation),
     "all_parameters": Kind("Fit All", "Fit every value the picture can show", _all_parameters),
 }

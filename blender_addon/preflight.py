@@ -106,6 +106,7 @@ def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
         (
             scene.display_settings.display_device,
             settings.reference_view,
+            settings.animated,
             settings.parameter_set,
             settings.model,
             frozenset(settings.sockets),

@@ -156,6 +156,14 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
             ),
         ),
     )
+    animated: EnumProperty(
+        name="Animated",
+        description="What an apply does with sockets that have keyframes or a driver",
+        items=(
+            ("leave", "Leave", "They stay as they are, because the next frame would take an applied value away"),
+            ("replace", "Replace", "Put a key at the current frame, and remove drivers"),
+        ),
+    )
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of one stage", default=300, min=1, soft_max=1000, max=100_000
     )

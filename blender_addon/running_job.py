@@ -21,6 +21,7 @@ from . import fit_queue, history, previews, shown_result
 from .fit_queue import PreparedFit
 from .job_process import Event, JobProcess, Outcome
 from .job_result import JobResult, JobResultError, read_job_result
+from .local_copy import unwritable
 from .preflight import redraw
 from .shown_result import add_message
 from .versions import is_modal_operator_running
@@ -139,7 +140,7 @@ def record_results() -> int:
     materials = {material.session_uid: material for material in bpy.data.materials}
     for result, uid in unrecorded:
         material = materials.get(uid)
-        if material is not None and material.is_editable:
+        if material is not None and not unwritable(material):
             history.record(material, result)
             count += 1
     unrecorded.clear()

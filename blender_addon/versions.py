@@ -109,6 +109,28 @@ def default_surface_is_principled() -> bool:
     return getattr(bpy.types.Material.bl_rna.properties.get("use_nodes"), "is_deprecated", False)
 
 
+def curves_of(owner: Any) -> list[bpy.types.FCurve]:
+    """Return the F-curves that animate an ID: those of its action and of its NLA strips.
+
+    Actions have layers with a bag of curves for each slot from Blender 4.4 on, and nothing else from 5.0 on.
+    """
+    data = owner.animation_data
+    if data is None:
+        return []
+    strips = [strip for track in data.nla_tracks for strip in track.strips]
+    found = []
+    for user in (data, *strips):
+        action, slot = user.action, getattr(user, "action_slot", None)
+        if action is None:
+            continue
+        if not hasattr(action, "layers"):
+            found += list(action.fcurves)
+            continue
+        bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+        found += [curve for bag in bags if slot is not None and bag.slot_handle == slot.handle for curve in bag.fcurves]
+    return found
+
+
 def has_compositor(scene: bpy.types.Scene) -> bool:
     """Whether rendered pictures pass through compositing nodes (a node group from Blender 5.0 on)."""
     if not scene.render.use_compositing:

@@ -10,9 +10,11 @@ from typing import Any
 import bpy
 import numpy as np
 
+from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_of, key_here, left_note, remove_driver
 from .export.principled_mapping import mitsuba_to_sockets
 from .export.shader_graph import surface_of
 from .job_result import JobResult, Value
+from .local_copy import unwritable
 from .versions import PRINCIPLED, node_tree_of, working_space_to_rec709
 
 
@@ -62,27 +64,32 @@ def socket_to_parameter(socket_name: str) -> str:
     return socket_name.lower().replace(" ", "_")
 
 
-def apply_values(material: bpy.types.Material, values: Mapping[str, Value], folder: Path) -> list[str]:
+def apply_values(
+    material: bpy.types.Material, values: Mapping[str, Value], folder: Path, *, animated: str = LEAVE
+) -> list[str]:
     """Set the unlinked sockets in `values` (linear Rec.709), keep what they were, return what was skipped and why.
 
     Nothing is set before all of it is known to fit. A second call keeps the originals of the first one, so that
-    `revert_values` always leads to the user's own material.
+    `revert_values` always leads to the user's own material. Sockets with keyframes or a driver stay as they are, or
+    with `REPLACE` get a key at the current frame and lose the driver, which `revert_values` does not bring back.
 
     Raises
     ------
     WriteBackError
         If the material is read-only, has no Principled node, or a value is none that its socket can hold.
     """
-    if not material.is_editable:
-        raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
+    if unwritable(material):
+        raise WriteBackError(unwritable(material))
     node, kept = principled_node(material), material.mfo
-    notes, changes = [], []
+    notes, changes, moved = [], [], animation_of(node)
     for name, value in values.items():
         socket = node.inputs.get(name)
         if socket is None:
             notes.append(f"{name} does not exist in this Blender version and was skipped.")
         elif socket.is_linked:
             notes.append(f"{name} has a link and was left as it is.")
+        elif name in moved and animated != REPLACE:
+            notes.append(left_note(name, moved[name]))
         else:
             changes.append((socket, _fitting(socket, value)))
     if kept.shows_original:
@@ -90,7 +97,12 @@ def apply_values(material: bpy.types.Material, values: Mapping[str, Value], fold
     for socket, value in changes:
         if socket.name not in kept.originals:
             keep_value(kept.originals, socket.name, socket.default_value)
-        socket.default_value = value
+        if moved.get(socket.name) == DRIVER:
+            remove_driver(socket)
+            notes.append(f"The driver of {socket.name} was removed.")
+        _set(socket, value, moved)
+        if moved.get(socket.name) == KEYFRAMES:
+            notes.append(f"{socket.name} got a key at the current frame; its other keys stay.")
         keep_value(kept.applied, socket.name, socket.default_value)
     kept.job_folder = str(folder)
     return notes
@@ -136,7 +148,7 @@ def kept_value(entry: bpy.types.PropertyGroup) -> Value:
 
 
 def _restore(node: bpy.types.ShaderNode, values: bpy.types.bpy_prop_collection) -> list[str]:
-    notes = []
+    notes, moved = [], animation_of(node)
     for entry in values:
         socket = node.inputs.get(entry.name)
         if socket is None:
@@ -144,8 +156,15 @@ def _restore(node: bpy.types.ShaderNode, values: bpy.types.bpy_prop_collection) 
         elif entry.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
             notes.append(f"{entry.name} was kept as {entry.size} numbers and could not be set.")
         else:
-            socket.default_value = kept_value(entry)
+            _set(socket, kept_value(entry), moved)
     return notes
+
+
+def _set(socket: bpy.types.NodeSocket, value: Value, animation: Mapping[str, str]) -> None:
+    """Set a socket's value and, where it has keyframes, put a key, without which the next frame takes it away."""
+    socket.default_value = value
+    if animation.get(socket.name) == KEYFRAMES and not key_here(socket):
+        raise WriteBackError(f"No key can be put for {socket.name}: its action cannot be changed, make it local first.")
 
 
 def _numbers(socket: bpy.types.NodeSocket) -> tuple[float, ...]:

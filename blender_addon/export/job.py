@@ -12,9 +12,11 @@ from typing import Any
 import bpy
 import tomllib
 
+from ..animated_sockets import animation_notes
 from .findings import ExportError, Findings
 from .job_folder import GENERATOR, new_job_folder
 from .material_model import Material
+from .read_material import principled_node
 from .read_scene import read_scene
 from .reference import Reference, read_reference
 from .reference_view import SCENE, output_view
@@ -63,6 +65,8 @@ def export_job(
         data = read_scene(context, obj, findings, bakes)
     findings.raise_first()
     assert data is not None
+    for said in animation_notes(principled_node(obj.active_material), context.scene.frame_current):
+        findings.note(said)
     tell(0.4)
     size = (data.camera.width, data.camera.height)
     picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)

@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import running_job, shown_result
 from ..job_result import JobResult, JobResultError, must_ask, read_job_result
+from ..local_copy import unwritable
 from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values, toggle_values
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
@@ -42,6 +43,10 @@ class MFO_OT_apply(bpy.types.Operator):
     )
     force: BoolProperty(name="Force", description="Also a result that does not match its reference", options=_SCRIPT)
 
+    animated: StringProperty(
+        name="Animated", description='"leave" or "replace"; empty: the scene\'s setting', options=_SCRIPT
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with a result; a script may always try with a job folder."""
@@ -52,8 +57,8 @@ class MFO_OT_apply(bpy.types.Operator):
             cls.poll_message_set("There is no result yet; run a fit")
             return False
         fitted = shown_result.material()
-        if fitted is not None and not fitted.is_editable:
-            cls.poll_message_set("The material comes from a library; make it local first")
+        if fitted is not None and unwritable(fitted):
+            cls.poll_message_set(unwritable(fitted))
             return False
         return True
 
@@ -67,14 +72,19 @@ class MFO_OT_apply(bpy.types.Operator):
             self.force = True
         return self.execute(context)
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> set[str]:
         """Find result and material, set the sockets, report what was skipped."""
         try:
             result = self._result()
             if must_ask(result.verdict) and not self.force:
                 raise WriteBackError(f"{result.sentence} Nothing was applied; force=True applies it anyway.")
             material = self._material(result)
-            notes = apply_values(material, result_to_sockets(result), result.folder)
+            notes = apply_values(
+                material,
+                result_to_sockets(result),
+                result.folder,
+                animated=self.animated or context.scene.mfo.animated,
+            )
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -151,8 +161,8 @@ def applied_material(context: bpy.types.Context, name: str) -> bpy.types.Materia
         raise WriteBackError("There is no material to revert: select its object or give its name.")
     if not material.mfo.originals:
         raise WriteBackError(f"Nothing was applied to material {material.name!r}, so nothing can be reverted.")
-    if not material.is_editable:
-        raise WriteBackError(f"Material {material.name!r} comes from a library: make it local first.")
+    if unwritable(material):
+        raise WriteBackError(unwritable(material))
     principled_node(material)
     return material
 

@@ -17,6 +17,7 @@ from ..export.job import ExportError, export_job
 from ..export.read_material import principled_node as find_principled
 from ..export.reference_view import REFERENCE_VIEWS
 from ..fit_queue import PreparedFit
+from ..local_copy import unwritable
 from ..preferences import chosen_python, new_job_folder
 from ..properties import chosen_of, crossed_limits
 from ..write_back import WriteBackError, principled_node
@@ -75,6 +76,8 @@ class FitOptions:
         """Export the job folder of the object's active material; raises `FitError` where it cannot be."""
         settings = context.scene.mfo
         material = _active_material(obj)
+        if unwritable(material):  # before the fit, since its values could not be applied
+            raise FitError(unwritable(material))
         reference = _reference(settings, self.reference)
         made = self.reference_view or settings.reference_view
         if made not in REFERENCE_VIEWS:

@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import history, preflight, running_job, shown_result
 from ..job_result import JobResultError, must_ask, read_job_result
+from ..local_copy import unwritable
 from ..write_back import WriteBackError, apply_values
 from .apply import PRESS_AGAIN, was_asked
 
@@ -71,7 +72,9 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
             self.report({"ERROR"}, f"{_MISMATCH} Nothing was applied; force=True applies it anyway.")
             return {"CANCELLED"}
         try:
-            notes = apply_values(material, history.values_of(entry), Path(entry.job_folder))
+            notes = apply_values(
+                material, history.values_of(entry), Path(entry.job_folder), animated=context.scene.mfo.animated
+            )
         except WriteBackError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -156,7 +159,7 @@ class MFO_OT_open_job(bpy.types.Operator):
             found = read_job_result(folder)
             material = bpy.data.materials.get(self.material or found.material_name)
             _show(folder, material.session_uid if material else 0)
-            if material is not None and material.is_editable:
+            if material is not None and not unwritable(material):
                 history.record(material, found)
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, str(error))

@@ -6,6 +6,8 @@ from __future__ import annotations
 import bpy
 
 from .. import previews, shown_result
+from ..animated_sockets import animation_of
+from ..export.read_material import principled_node
 from ..job_result import must_ask
 from .layout import draw_sentence
 
@@ -44,6 +46,11 @@ class Result:
         applied = material is not None and bool(material.mfo.originals)
         shows_own = material is not None and applied and material.mfo.shows_original
         text = ("A: own values" if shows_own else "B: recovered values") if applied else "A/B"
+        node = principled_node(material) if material is not None else None
+        if node is not None and animation_of(node):
+            row = layout.row()
+            row.label(text="Animated", icon="ANIM")
+            row.prop(context.scene.mfo, "animated", expand=True)
         column.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         if runtime.has_result:
             draw_table(layout, runtime.values, "Value")

@@ -65,6 +65,18 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("--apply", action="store_true", help="put the recovered values on the material and save")
     parser.add_argument("--force", action="store_true", help="with --apply: also where the result does not match")
     parser.add_argument("--save-as", type=Path, metavar="BLEND", help="with --apply: save here, not over FILE")
+    parser.add_argument(
+        "--animated",
+        choices=("leave", "replace"),
+        default="leave",
+        help="with --apply: sockets with keyframes or a driver stay as they are (default), or get a key at the current "
+        "frame and lose the driver",
+    )
+    parser.add_argument(
+        "--make-local",
+        action="store_true",
+        help="with --apply: make object, mesh and material of a library parts of the file that is saved",
+    )
     parser.add_argument("--blender", metavar="PROGRAM", help="a Blender program (default: MFO_BLENDER, bpy, PATH)")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     parser.set_defaults(func=run)
@@ -72,6 +84,8 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
 
 def run(arguments: argparse.Namespace) -> int:
     """Export, fit and apply; the exit code is that of the fit."""
+    if (arguments.make_local or arguments.animated != "leave") and not arguments.apply:
+        raise BadInputError("--make-local and --animated need --apply: without it no .blend file is written.")
     if arguments.save_as and not arguments.apply:
         raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
     options = fit_from_options(arguments)
@@ -88,11 +102,21 @@ def run(arguments: argparse.Namespace) -> int:
         options,
         reference_view=arguments.reference_view,
         upright=arguments.upright,
+        will_apply=arguments.apply,
+        make_local=arguments.make_local,
     )
     saved, notes = None, tuple(fit.result["notes"])
     if arguments.apply and may_apply(fit.result, forced=arguments.force):
         saved = arguments.save_as or arguments.file
-        notes += apply_result(host, arguments.file, fit.job, saved, force=arguments.force)
+        notes += apply_result(
+            host,
+            arguments.file,
+            fit.job,
+            saved,
+            force=arguments.force,
+            animated=arguments.animated,
+            make_local=arguments.make_local,
+        )
     elif arguments.apply:
         notes += (NOT_APPLIED,)
     if stream is not None:
@@ -120,11 +144,13 @@ def fit_blend(
     *,
     reference_view: str = "scene",
     upright: bool = False,
+    will_apply: bool = False,
+    make_local: bool = False,
 ) -> BlendFit:
     """Export a job from a .blend file and run it with a progress bar on stderr.
 
     `reference_view` says how a display picture was made: one of `REFERENCE_VIEWS`; `upright` turns it as its EXIF data
-    say.
+    say. With `will_apply` a material that cannot be changed is refused before the fit, unless it is to be made local.
 
     Raises
     ------
@@ -141,6 +167,8 @@ def fit_blend(
         f"--fit={json.dumps(fit)}",
         f"--reference-view={reference_view}",
         *(["--upright"] if upright else []),
+        *(["--will-apply"] if will_apply else []),
+        *(["--make-local"] if make_local else []),
     )
     done = run_folder(job, fit_scene, is_new=is_new)
     if done.result is None:
@@ -148,8 +176,23 @@ def fit_blend(
     return BlendFit(job, done.result)
 
 
-def apply_result(host: BlenderHost, blend: Path, job: Path, save_as: Path, *, force: bool = False) -> tuple[str, ...]:
-    """Save `blend` with the recovered values on its material; returns what was skipped, in sentences."""
-    forced = ["--force"] if force else []
-    applied = host.call("apply", blend, f"--job={job}", f"--save-as={save_as}", *forced)
+def apply_result(
+    host: BlenderHost,
+    blend: Path,
+    job: Path,
+    save_as: Path,
+    *,
+    force: bool = False,
+    animated: str = "leave",
+    make_local: bool = False,
+) -> tuple[str, ...]:
+    """Save `blend` with the recovered values on its material; returns what was skipped, in sentences.
+
+    With `force` also those of a result that does not match. Sockets with keyframes or a driver are left as they are, or
+    with `animated` "replace" get a key at the current frame and lose the driver. With `make_local` object, mesh and
+    material of a library become parts of the file.
+    """
+    words = [f"--job={job}", f"--save-as={save_as}", f"--animated={animated}"]
+    words += [word for word, wanted in (("--force", force), ("--make-local", make_local)) if wanted]
+    applied = host.call("apply", blend, *words)
     return tuple(applied.get("notes", ()))

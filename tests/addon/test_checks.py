@@ -189,8 +189,11 @@ def test_a_material_of_a_library_is_made_local_by_its_button(scene: SimpleNamesp
     target = scene.bpy.data.objects["Väse"]
     target.active_material = linked
     found = next(f for f in check(scene) if {fix.kind for fix in f.fixes} == {"make_local"})
-    assert found.level == "ignored"
+    assert found.level == "stops"
     assert not target.active_material.is_editable
+    with pytest.raises(RuntimeError, match="comes from a library: make it local first"):
+        scene.bpy.ops.mfo.fit(reference=scene.reference, job_folder=scene.job)
+    assert not Path(scene.job).exists()
     assert scene.bpy.ops.mfo.mend(kind="make_local") == {"FINISHED"}
     assert target.active_material.is_editable
     assert target.active_material.library is None
@@ -198,13 +201,72 @@ def test_a_material_of_a_library_is_made_local_by_its_button(scene: SimpleNamesp
     assert stopping(scene) == {}
 
 
-def test_a_material_that_stays_in_its_library_is_said_to(scene: SimpleNamespace, tmp_path: Path) -> None:
+def test_an_object_of_a_library_becomes_local_with_mesh_and_material(scene: SimpleNamespace, tmp_path: Path) -> None:
     linked = from_library(scene, tmp_path, "objects", "Väse")
     scene.bpy.context.scene.collection.objects.link(linked)
     scene.bpy.context.view_layer.objects.active = linked
     assert {"make_local"} in [{fix.kind for fix in f.fixes} for f in check(scene)]
-    with pytest.raises(RuntimeError, match="cannot be made local: make its object and its mesh local first"):
-        scene.bpy.ops.mfo.mend(kind="make_local")
+    assert scene.bpy.ops.mfo.mend(kind="make_local") == {"FINISHED"}
+    target = scene.bpy.context.view_layer.objects.active
+    assert [item.library for item in (target, target.data, target.active_material)] == [None] * 3
+    assert stopping(scene) == {}
+
+
+def test_an_override_is_made_local(scene: SimpleNamespace, tmp_path: Path) -> None:
+    linked = from_library(scene, tmp_path, "objects", "Väse")
+    scene.bpy.context.scene.collection.objects.link(linked)
+    target = linked.override_create(remap_local_usages=True)
+    mesh = target.data.override_create(remap_local_usages=True)
+    mesh.materials[0].override_create(remap_local_usages=True)
+    scene.bpy.context.view_layer.objects.active = target
+    assert target.active_material.is_editable  # which alone would have let the fit run
+    (found,) = (f for f in check(scene) if {fix.kind for fix in f.fixes} == {"make_local"})
+    assert "library override, in which Blender keeps no values of nodes" in found.sentence
+    assert scene.bpy.ops.mfo.mend(kind="make_local") == {"FINISHED"}
+    target = scene.bpy.context.view_layer.objects.active
+    items = (target, target.data, target.active_material)
+    assert [(item.library, item.override_library) for item in items] == [(None, None)] * 3
+    assert stopping(scene) == {}
+
+
+def test_what_a_linked_collection_holds_stays_there_and_it_is_said(scene: SimpleNamespace, tmp_path: Path) -> None:
+    bpy = scene.bpy
+    collection = from_library(scene, tmp_path, "collections", "Collection")
+    bpy.context.scene.collection.children.link(collection)
+    target = next(o for o in collection.all_objects if o.name == "Väse")
+    bpy.context.view_layer.objects.active = target
+    with pytest.raises(RuntimeError, match="The object 'Väse' stays in its library, because only a linked collection"):
+        bpy.ops.mfo.mend(kind="make_local")
+
+
+def test_animated_values_are_found_and_mended(scene: SimpleNamespace) -> None:
+    from blender_addon.animated_sockets import animation_of
+
+    inputs = principled(scene).inputs
+    inputs["Roughness"].keyframe_insert("default_value")
+    inputs["Metallic"].driver_add("default_value")
+    assert animation_of(principled(scene)) == {"Metallic": "a driver", "Roughness": "keyframes"}
+    said = {f.sentence: f for f in check(scene) if "an apply leaves it out" in f.sentence}
+    kinds = [(fix.kind, fix.argument) for f in said.values() for fix in f.fixes]
+    assert kinds == [("remove_driver", "Metallic"), ("replace_animation", "")]
+    for kind, argument in kinds:
+        scene.bpy.ops.mfo.mend(kind=kind, argument=argument)
+    assert animation_of(principled(scene)) == {"Roughness": "keyframes"}
+    assert not said.keys() & {f.sentence for f in check(scene)}
+    assert stopping(scene) == {}
+
+
+def test_a_shared_material_gets_a_single_user(scene: SimpleNamespace) -> None:
+    bpy = scene.bpy
+    target = bpy.data.objects["Väse"]
+    twin = bpy.data.objects.new("Twin", target.data)
+    bpy.context.scene.collection.objects.link(twin)
+    (found,) = (f for f in check(scene) if "single_user" in {fix.kind for fix in f.fixes})
+    assert found.sentence == "Material 'Glaze' is also on Twin: applied values change it there too."
+    bpy.ops.mfo.mend(kind="single_user")
+    assert twin.active_material.name == "Glaze"
+    assert target.active_material != twin.active_material
+    assert not [f for f in check(scene) if "single_user" in {fix.kind for fix in f.fixes}]
 
 
 def test_the_question_how_the_reference_was_made(scene: SimpleNamespace) -> None:

@@ -112,3 +112,46 @@ def test_another_working_space_gets_the_same_color(
     write_back.apply_values(glaze(scene), {"Base Color": (0.5, 0.25, 0.125)}, JOB)
     found = to_rec709 @ np.array(inputs["Base Color"].default_value[:3])
     np.testing.assert_allclose(found, (0.5, 0.25, 0.125), atol=FLOAT32)
+
+
+@pytest.mark.parametrize("what", ["keyframes", "a driver"])
+def test_an_animated_socket_is_left_or_replaced_for_good(scene: SimpleNamespace, inputs, what: str) -> None:
+    """The value after a change of the frame is what Blender renders."""
+    from blender_addon.write_back import apply_values
+
+    current, socket = scene.bpy.context.scene, inputs["Roughness"]
+    if what == "keyframes":
+        socket.default_value = 0.75
+        socket.keyframe_insert("default_value", frame=1)
+        socket.default_value = 0.25
+        socket.keyframe_insert("default_value", frame=11)
+    else:
+        socket.driver_add("default_value").driver.type = "SUM"  # of nothing, which is 0
+    current.frame_set(1)
+    before = socket.default_value
+    (note,) = apply_values(glaze(scene), {"Roughness": 0.5, "Metallic": 1.0}, JOB)
+    assert note.startswith(f"Roughness has {what} and was left as it is")
+    assert (socket.default_value, inputs["Metallic"].default_value) == (before, 1.0)
+    assert "Roughness" not in glaze(scene).mfo.originals
+    (note,) = apply_values(glaze(scene), {"Roughness": 0.5}, JOB, animated="replace")
+    assert ("got a key" if what == "keyframes" else "The driver of Roughness was removed") in note
+    current.frame_set(11)
+    current.frame_set(1)
+    assert socket.default_value == 0.5
+    if what == "keyframes":
+        current.frame_set(11)
+        assert socket.default_value == 0.25
+
+
+def test_keys_of_a_strip_are_found(scene: SimpleNamespace, inputs) -> None:
+    from blender_addon.animated_sockets import animation_of
+
+    inputs["Roughness"].keyframe_insert("default_value")
+    data = glaze(scene).node_tree.animation_data
+    action, slot = data.action, getattr(data, "action_slot", None)
+    data.action = None
+    assert animation_of(inputs["Roughness"].node) == {}
+    strip = data.nla_tracks.new().strips.new("Strip", 1, action)
+    if slot is not None:
+        strip.action_slot = slot
+    assert animation_of(inputs["Roughness"].node) == {"Roughness": "keyframes"}
