@@ -13,6 +13,7 @@ Blender prints other lines around it. Exit codes: 0 for the status "ok", 2 for b
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import shutil
@@ -58,8 +59,11 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     obj = bpy.context.scene.objects.get(chosen.object)
     if obj is None:
         names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
+        elsewhere = [scene.name for scene in bpy.data.scenes if chosen.object in scene.objects]
+        where = f"it is in the scene {elsewhere[0]!r}, which is not the active one" if elsewhere else ""
         raise HeadlessError(
-            f"{chosen.file} has no object {chosen.object!r} in its scene; its mesh objects are: {names}."
+            f"{chosen.file} has no object {chosen.object!r} in its scene {bpy.context.scene.name!r}: "
+            f"{where or f'its mesh objects are: {names}'}."
         )
     try:
         fit = json.loads(chosen.fit)
@@ -168,11 +172,20 @@ def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
     if hasattr(settings, "media_type"):  # Blender 5.0
         settings.media_type = "IMAGE"
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
-    scene.render.filepath = str(chosen.out.absolute())
+    settings.color_management = "OVERRIDE"
+    with contextlib.suppress(TypeError):  # a configuration of the user's own that has it not
+        settings.linear_colorspace_settings.name = "Linear Rec.709"
+    # not the given name itself, in which Blender would replace # by the frame and {} by a variable
+    rendered = Path(bpy.app.tempdir) / "render.exr"
+    scene.render.filepath = str(rendered)
     scene.render.use_file_extension = False
     bpy.ops.render.render(write_still=True)
-    if not chosen.out.is_file():
-        raise HeadlessError(f"Blender could not write {chosen.out}: choose another folder or free some space.")
+    try:
+        shutil.move(rendered, chosen.out.absolute())
+    except OSError as error:
+        raise HeadlessError(
+            f"{chosen.out} cannot be written ({error.strerror or error}): choose another folder or free some space."
+        ) from error
     return {"picture": str(chosen.out)}
 
 

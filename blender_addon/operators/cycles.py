@@ -73,7 +73,7 @@ class MFO_OT_render_reference(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start it; wait for it in background mode."""
         try:
-            cycles_check.render_reference(new_job_folder(context, "reference") / f"{context.scene.name}.exr")
+            cycles_check.render_reference(new_job_folder(context, "reference") / "reference.exr")
         except OSError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

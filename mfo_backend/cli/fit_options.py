@@ -17,7 +17,11 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("how to fit")
     group.add_argument("--preset", help="fast, balanced, best or paper (default: balanced)")
     group.add_argument("--model", help="blender_principled or mitsuba_principled (default: what the scene holds)")
-    group.add_argument("--parameters", metavar="LIST", help="all, reduced, or names with commas between (default: all)")
+    group.add_argument(
+        "--parameters",
+        metavar="LIST",
+        help='all, reduced, or names with commas between, as "Base Color,Roughness" or base_color (default: all)',
+    )
     group.add_argument(
         "--losses",
         metavar="LIST",
@@ -55,7 +59,8 @@ def fit_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
         fit["losses"] = [arguments.lf or PAPER_LOSSES[0], arguments.hf or PAPER_LOSSES[1]]
     if arguments.parameters is not None:
         names = _names(arguments.parameters)
-        fit["parameters"] = names[0] if names in (["all"], ["reduced"]) else names
+        is_set = len(names) == 1 and names[0].lower() in ("all", "reduced")
+        fit["parameters"] = names[0].lower() if is_set else names
     return fit
 
 

@@ -11,6 +11,7 @@ from ..metrics.loss_names import SQUARED_KINDS, check_loss_name, is_squared, los
 from ..solve.stopping import StoppingRules
 from ..types.errors import BadInputError
 from ..types.image import Encoding
+from ..types.parameter import parameter_name
 from ..types.parameter_bounds import checked_bounds
 
 _CHOICES: dict[str, tuple[str, ...]] = {
@@ -130,6 +131,8 @@ class FitSettings:
         for name in ("parameters", "losses"):
             if values.get(name) is not None and not isinstance(values[name], str):
                 values[name] = _names(name, values[name])
+        if isinstance(values.get("parameters"), tuple):
+            values["parameters"] = tuple(map(parameter_name, values["parameters"]))
         if isinstance(values.get("losses"), str):
             values["losses"] = (values["losses"],)
         if values.get("losses") is not None:

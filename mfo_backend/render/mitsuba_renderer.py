@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.scene_xml import Element, find_target, prepare_for_fit, read_scene, to_text
+from ..scene.scene_xml import Element, find_target, prepare_for_fit, read_scene, to_mitsuba_text
 from ..types.errors import BadInputError
 from ..types.image import Pixels
 from ..types.light_paths import LightPaths
@@ -242,7 +242,7 @@ def load_mitsuba_renderer(
     with two_threads():
         try:
             # merging equal objects would take away the ids of shapes and materials; plugins in Python want this thread
-            scene = mi.load_string(to_text(document), optimize=False, parallel=False)
+            scene = mi.load_string(to_mitsuba_text(document), optimize=False, parallel=False)
         except (RuntimeError, UnicodeDecodeError) as error:  # a message may hold bytes of a damaged file
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():

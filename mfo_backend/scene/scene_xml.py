@@ -181,8 +181,13 @@ def prepare_for_fit(scene: Element) -> None:
 
 
 def to_text(scene: Element) -> str:
-    """The scene as XML text for `mi.load_string`."""
+    """The scene as XML text."""
     return ElementTree.tostring(scene, encoding="unicode")
+
+
+def to_mitsuba_text(scene: Element) -> str:
+    """The scene as XML text for `mi.load_string`, which takes a bare dollar sign, as in a path, for a parameter."""
+    return to_text(scene).replace("$", "\\$")
 
 
 def _rewrite_sensor(sensor: Element) -> None:

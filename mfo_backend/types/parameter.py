@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,11 @@ from numpy.typing import NDArray
 from .errors import BadInputError
 
 Value = float | tuple[float, ...]
+
+
+def parameter_name(text: str) -> str:
+    """The name of a parameter as a user writes it: ``Base Color``, the socket in Blender, is ``base_color``."""
+    return "_".join(text.lower().replace("_", " ").split())
 
 
 @dataclass(frozen=True)
@@ -100,8 +106,10 @@ class ParameterTable(Sequence[Parameter]):
         wanted = list(names)
         unknown = [n for n in wanted if n not in self._by_name]
         if unknown:
+            near = [close for name in unknown for close in get_close_matches(parameter_name(name), self.names, n=1)]
+            guess = f" (the nearest is {', '.join(near)})" if near else ""
             raise BadInputError(
-                f"Unknown parameter {', '.join(map(repr, unknown))}: this material has {', '.join(self.names)}."
+                f"Unknown parameter {', '.join(map(repr, unknown))}{guess}: this material has {', '.join(self.names)}."
             )
         if not wanted:
             raise BadInputError(f"No parameter is selected: choose at least one of {', '.join(self.names)}.")

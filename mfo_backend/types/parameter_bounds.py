@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from .errors import BadInputError
-from .parameter import ParameterTable
+from .parameter import ParameterTable, parameter_name
 
 _NARROWEST = 1e-4  # share of a parameter's range; a solver needs some room, and a value to hold is not to be fitted
 
@@ -34,7 +34,7 @@ def checked_bounds(data: Any) -> dict[str, tuple[float, float]]:
             raise BadInputError(
                 f"The bounds of {name!r} are [{lower:g}, {upper:g}]: the lower must be below the upper."
             )
-        bounds[str(name)] = (lower, upper)
+        bounds[parameter_name(str(name))] = (lower, upper)
     return bounds
 
 

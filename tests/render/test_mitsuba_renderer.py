@@ -225,6 +225,18 @@ def test_refuses_scenes_that_cannot_be_rendered(tmp_path: Path, change: dict, se
     assert "\n" not in str(caught.value)
 
 
+def test_dollar_signs_in_names_are_no_parameters(tmp_path: Path) -> None:
+    from mfo_backend.scene.image_file import write_png
+
+    folder = tmp_path / "do$lar"
+    folder.mkdir()
+    write_png(folder / "t$x.png", np.full((4, 4, 3), 0.5))
+    feed = '<texture type="bitmap" name="base_color"><string name="filename" value="t$x.png"/></texture>'
+    bsdf = f'<bsdf type="principled" id="glaze">{feed}<float name="roughness" value="0.4"/></bsdf>'
+    renderer = load(folder, bsdf=bsdf)
+    assert renderer.image(renderer.start, seed=0, spp=1).max() > 0
+
+
 def test_an_exr_world_loads_on_a_single_thread(tmp_path: Path) -> None:
     import OpenEXR
 
