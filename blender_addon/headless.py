@@ -71,11 +71,8 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
         raise HeadlessError(f"--fit is not JSON ({error}).") from error
     if not isinstance(fit, dict):
         raise HeadlessError("--fit is not a JSON object.")
-    material, notes = obj.active_material, []
-    if material is not None and unwritable(material) and not chosen.make_local:
-        if chosen.will_apply:
-            raise HeadlessError(unwritable(material))
-        notes = [unwritable(material).replace(": make it", ", so its values cannot be applied: to apply them make it")]
+    if chosen.will_apply and not chosen.make_local and unwritable(obj.active_material):
+        raise HeadlessError(unwritable(obj.active_material))
     try:
         report = export_job(
             bpy.context,
@@ -88,7 +85,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
         )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
-    return {"job": str(report.folder), "material": obj.active_material.name, "notes": [*notes, *report.notes]}
+    return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
 
 
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:

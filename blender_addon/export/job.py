@@ -13,6 +13,7 @@ import bpy
 import tomllib
 
 from ..animated_sockets import animation_notes
+from ..local_copy import unwritable
 from .findings import ExportError, Findings
 from .job_folder import GENERATOR, new_job_folder
 from .material_model import Material
@@ -65,6 +66,8 @@ def export_job(
         data = read_scene(context, obj, findings, bakes)
     findings.raise_first()
     assert data is not None
+    if unwritable(obj.active_material):
+        findings.note(f"The values cannot be applied as it is. {unwritable(obj.active_material)}")
     for said in animation_notes(principled_node(obj.active_material), context.scene.frame_current):
         findings.note(said)
     tell(0.4)
