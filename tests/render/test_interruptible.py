@@ -9,8 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from mfo_backend.fit.paper.adam_stage import run_stage
-from mfo_backend.fit.paper.schedule import SCHEDULES
+from mfo_backend.fit.paper.adam_stage import SCHEDULES, run_stage
 from mfo_backend.render.interruptible import InterruptibleRenderer, NativeThread
 from mfo_backend.render.renderer import Interrupted
 from mfo_backend.solve.adam import Adam

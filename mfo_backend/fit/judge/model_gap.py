@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from ...metrics.block_means import block_sums
 from ...metrics.colour import linear_from_srgb
+from ...metrics.neighbours import sums_around
 from ...metrics.tone_mapping import View
 from ...types.image import Encoding, Image, Pixels
 from ...types.model_gap import ModelGap
-from .neighbours import sums_around
 from .region import blocks_around
 
 BLOCK = 4  # pixels along each side of what is compared

@@ -15,7 +15,6 @@ from ...solve.adam import Adam
 from ...solve.stopping import Stopping, StoppingRules
 from ...types.image import Pixels
 from ...types.status import Status
-from .schedule import Schedule
 
 _STRIKES = 3  # steps in a row without a finite loss and gradient after which a stage gives up
 
@@ -120,3 +119,18 @@ def _expected_iterations(stopping: Stopping, levels_left: int) -> float:
     patience = stopping.rules.patience
     guess = 0.5 * stopping.iterations + max(patience - stopping.stalled, 0) + 2.0 * patience * levels_left
     return min(guess, stopping.rules.max_iterations - stopping.iterations)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Rates a stage goes through: `levels` of them, each `factor` of the one before."""
+
+    levels: int = 1
+    factor: float = 1.0 / 3.0
+
+    def rate(self, first: NDArray[np.float64], level: int) -> NDArray[np.float64]:
+        """The rate at `level`, counted from 0."""
+        return first * self.factor**level
+
+
+SCHEDULES = {"constant": Schedule(levels=1), "decay": Schedule(levels=4)}

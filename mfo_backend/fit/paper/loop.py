@@ -19,8 +19,7 @@ from ...types.status import Status
 from ..result.best_so_far import BestSoFar
 from ..result.outcome import Candidate
 from ..settings import FitSettings
-from .adam_stage import StageOutcome, Step, run_stage
-from .schedule import SCHEDULES
+from .adam_stage import SCHEDULES, StageOutcome, Step, run_stage
 
 _PREVIEW_SECONDS = 1.0  # no more than one preview in this time
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,6 @@ from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verificatio
 from ..plans import RecordedPlan
 from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds
-from ..squares.problem import Problem
 from ..squares.residuals import (
     CensoredResidual,
     DisplayedResidual,
@@ -31,13 +30,20 @@ from ..squares.residuals import (
     log_residual,
 )
 from ..squares.stage_residuals import finishing_residuals
-from .keep_user_values import keep_values
+from .keep_user_values import Kept, keep_values
 from .perceptual_stages import perceptual_ends
-from .stages import RecordedFit
+from .recording import Setting, Vector
+from .refine import OnRecording, refine_exact, refine_sampled
+from .start import start_from_nothing
 
 STAGES = ("scan", "start", "refine")
 # Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
 AT_NOISE = 1.5
+NOTHING_SEEN = "What is left of the picture ({:.1g} %) nobody sees: perceptual stages were left out."
+NOTHING_BUT_NOISE = (
+    "The fit has reached the noise of the picture and of its own rays ({:.2g} % a pixel): "
+    "perceptual stages would fit that noise and were left out."
+)
 
 
 class RecordedRoute:
@@ -85,42 +91,30 @@ class RecordedRoute:
         UnrecordableError
             If no start gives finite numbers on the recorded paths.
         """
-        task, scene, renderer, plan = self._task, self._scene, self._renderer, self._plan
+        task, scene, renderer = self._task, self._scene, self._renderer
         course = Course(renderer, self.stages, task.listener, task.should_stop, task.began)
-        fit = RecordedFit(scene, task.light, task.mask, plan, task.settings.seed, course, task.clipped)
-        basins = fit.start_from_nothing(_censored(log_residual, task))
+        setting = Setting.of(scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped)
+        started = start_from_nothing(setting, _censored(log_residual, task))
+        first, *others = started.basins
         if task.should_stop():
-            end = End("start", basins[0].x)
             choose = self._choose_by(self._judge(blurred=False).value)
-            return RouteEnds((end,), 1, choose, tuple(course.reports), tuple(scene.needs.notes))
+            return RouteEnds((End("start", first),), 1, choose, tuple(course.reports), tuple(scene.needs.notes))
 
-        make = RelativeResidual if scene.needs.sampled else log_residual
-        first, *others = (basin.x for basin in basins)
-        refined = fit.refine(first, _censored(make, task), _weighted(task), others)
-        weighted = scene.needs.sampled and not isinstance(task.view, BakedView)
-        kept = keep_values(fit, refined, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
-        fit.box = box_holding(fit.table, renderer.start, kept.held)
-        notes = [*scene.needs.notes, *kept.notes]
-        later: list[End] = []
-        judge: PictureJudge | None = None
-        left = np.inf  # under lights with extent residuals are in deviations of the noise
-        if not scene.needs.sampled:
-            left = float(np.sqrt(2.0 * refined.all.equations(kept.x).cost))
-        enough = self._nothing_left(fit, kept.x, left)
-        if enough:
-            notes.append(enough)
-        elif self._finishing:
-            noise = fit.noise.level if fit.noise else 0.0
-            may_blur = task.linear and task.settings.losses is None
-            judge = self._judge(blurred=may_blur and (scene.needs.sampled or noise > NOISY))
-            tried = others if task.settings.preset == "best" else []
-            later = perceptual_ends(fit, refined.all, kept.x, tried, self._finishing, judge, task.settings, notes)
-        if fit.fireflies:
-            notes.append(f"{fit.fireflies} fireflies in the reference were left out of the search for a start.")
-        if scene.needs.sampled and fit.recordings > 1:
-            notes.append(f"The light was recorded {fit.recordings} times: the solution had moved away from the first.")
-        counts = judge.value if judge else _misfit(fit, refined.all, _censored(log_residual, task))
-        weak = tuple(weak_combinations(kept.spread, fit.table, kept.certainty, kept.held))
+        if setting.sampled:
+            end = refine_sampled(setting, started.basins, _censored(RelativeResidual, task), _weighted(task))
+        else:
+            end = refine_exact(setting, started, _censored(log_residual, task))
+        del started  # and with it the first recording
+        weighted = setting.sampled and not isinstance(task.view, BakedView)
+        kept = keep_values(end, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
+        later, notes, counts = self._perceptual(end, kept, others)
+        notes = [*scene.needs.notes, *kept.notes, *notes]
+        if setting.fireflies:
+            notes.append(f"{setting.fireflies} fireflies in the reference were left out of the search for a start.")
+        if setting.sampled and end.recording.number > 1:
+            times = end.recording.number
+            notes.append(f"The light was recorded {times} times: the solution had moved away from the first.")
+        weak = tuple(weak_combinations(kept.spread, setting.table, kept.certainty, kept.held))
         ends = [End("refine", kept.x), *later]
         return RouteEnds(
             ends=tuple(replace(end, certainty=kept.certainty, weak_combinations=weak) for end in ends),
@@ -130,20 +124,34 @@ class RecordedRoute:
             notes=tuple(notes),
         )
 
-    def _nothing_left(self, fit: RecordedFit, x: np.ndarray, left: float) -> str:
-        """Why perceptual stages have nothing to do, one sentence; empty where they have, or are the user's choice."""
-        optional = self._finishing and self._task.settings.losses is None and self._task.linear
-        if not optional:
-            return ""
-        if left < self._plan.seen_rms:
-            return f"What is left of the picture ({100 * left:.1g} %) nobody sees: perceptual stages were left out."
-        if fit.misfit(x) >= AT_NOISE:
-            return ""
-        noise = fit.noise.level if fit.noise else 0.0
-        return (
-            f"The fit has reached the noise of the picture and of its own rays ({100 * noise:.2g} % a pixel): "
-            "perceptual stages would fit that noise and were left out."
+    def _perceptual(
+        self, end: OnRecording, kept: Kept, others: Sequence[Vector]
+    ) -> tuple[list[End], list[str], Callable[[Pixels], float]]:
+        """The ends of the perceptual stages where these have something to do, sentences, and what a picture counts."""
+        task, plan, settings = self._task, self._plan, self._task.settings
+        setting, problem, noise = end.recording.setting, end.refined.all, end.noise
+
+        def misfit() -> Callable[[Pixels], float]:
+            return _misfit(end, _censored(log_residual, task))
+
+        if not self._finishing:
+            return [], [], misfit()
+        if settings.losses is None and task.linear:
+            # under lights with extent residuals are in deviations of the noise
+            left = np.inf if setting.sampled else float(np.sqrt(2.0 * problem.equations(kept.x).cost))
+            if left < plan.seen_rms:
+                return [], [NOTHING_SEEN.format(100 * left)], misfit()
+            deviations, noise = end.recording.whole.misfit(kept.x)
+            if deviations < AT_NOISE:
+                return [], [NOTHING_BUT_NOISE.format(100 * noise.level)], misfit()
+        may_blur = task.linear and settings.losses is None
+        judge = self._judge(blurred=may_blur and (setting.sampled or (noise is not None and noise.level > NOISY)))
+        box = box_holding(setting.table, setting.user, kept.held)
+        basins = others if settings.preset == "best" else []
+        later, notes = perceptual_ends(
+            end.recording.whole, problem, kept.x, basins, box, self._finishing, judge, settings
         )
+        return later, notes, judge.value
 
     def _judge(self, *, blurred: bool) -> PictureJudge:
         task = self._task
@@ -174,10 +182,11 @@ def _weighted(task: FitTask) -> MakeWeighted | None:
     return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), task)(target)
 
 
-def _misfit(fit: RecordedFit, problem: Problem, compressed: MakeResidual) -> Callable[[Pixels], float]:
+def _misfit(end: OnRecording, compressed: MakeResidual) -> Callable[[Pixels], float]:
     """The least-squares measure of a path-traced picture: of the last problem where it knows the noise, else in log."""
+    setting, problem = end.recording.setting, end.refined.all
     residual, groups = problem.residual, problem.groups
-    if not fit.scene.needs.sampled:
-        groups = fit.paths.tile_groups()
-        residual = compressed(groups.average(fit.reference))
+    if not setting.sampled:
+        groups = end.recording.paths.tile_groups()
+        residual = compressed(groups.average(setting.reference))
     return lambda image: float(np.sqrt(np.mean(residual(groups.average(image))[0] ** 2)))

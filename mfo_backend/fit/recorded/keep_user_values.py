@@ -14,7 +14,7 @@ from ...solve.bounded_least_squares import step_in_box
 from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
-from ..alike.rival_notes import rival_notes
+from ..alike.compare import rival_notes
 from ..alike.unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
 from ..certainty.covariance import MODEL_ERROR, certainties, covariance, standard_deviations, with_rivals
 from ..judge.picture_judge import VISIBLE
@@ -22,7 +22,9 @@ from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
 from ..squares.recording_noise import rows_of_samples
 from ..squares.residuals import RelativeResidual
-from .stages import RecordedFit, Vector
+from .recording import Recording, Setting, Vector
+from .refine import OnRecording
+from .solve import solve_within
 
 # Values the picture does not determine go back to the user's if that costs no more than this share of the residual
 KEEP_TOLERANCE = 1.01
@@ -46,17 +48,16 @@ class Kept:
     notes: tuple[str, ...]
 
 
-def keep_values(
-    fit: RecordedFit, refined: Refined, *, weighted: bool, seen: Callable[[Pixels], float] | None = None
-) -> Kept:
+def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], float] | None = None) -> Kept:
     """The refined vector with unneeded lobes switched off again and undetermined values given back.
 
     `weighted` says that the problem's residuals are in standard deviations of the noise. Others have a floor, below
     which a change may be seen all the same: `seen`, the mean error of a picture to the eye, must not grow either.
     """
-    table, user = fit.table, fit.scene.renderer.start
+    setting, refined = end.recording.setting, end.refined
+    table, user = setting.table, setting.user
     found, problem = refined.x, refined.all
-    judged, unseen_change = _Judged(fit, refined, weighted), _UnseenChange(fit, refined, seen)
+    judged, unseen_change = _Judged(setting, refined, weighted), _UnseenChange(end.recording, refined, seen)
     cost, certainty, spread = judged(found)
     off = list(refined.off)
     if not off:
@@ -65,7 +66,7 @@ def keep_values(
     moved = moved_to_user(off, found, user, table)
     if moved:
         allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
-        simpler = _solve_holding(fit, refined, found, off)
+        simpler = _solve_holding(setting, refined, found, off)
         if simpler is not None and (again := judged(simpler))[0] <= allowed + 1e-12 and unseen_change(simpler):
             found, (cost, certainty, spread) = simpler, again
         else:
@@ -76,7 +77,7 @@ def keep_values(
     if unseen and len(unseen) < len(table):
         for back in _sets_to_return(unseen, off, problem, found, user, table):
             held = [*back, *(name for name in off if name not in back)]
-            kept = _solve_holding(fit, refined, found, held)
+            kept = _solve_holding(setting, refined, found, held)
             if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
                 found, off = kept, held
                 notes.append(kept_note(back))
@@ -111,14 +112,14 @@ def _sets_to_return(
 class _Judged:
     """Mean square residual, certainty and covariance at a vector."""
 
-    def __init__(self, fit: RecordedFit, refined: Refined, weighted: bool) -> None:
-        self._fit, self._problem, self._weighted, self._rivals = fit, refined.all, weighted, refined.rivals
+    def __init__(self, setting: Setting, refined: Refined, weighted: bool) -> None:
+        self._setting, self._problem, self._weighted, self._rivals = setting, refined.all, weighted, refined.rivals
 
     def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
-        problem, table = self._problem, self._fit.table
+        problem, table = self._problem, self._setting.table
         residual = problem.residual
         if not self._weighted:
-            residual = RelativeResidual(problem.groups.average(self._fit.reference))
+            residual = RelativeResidual(problem.groups.average(self._setting.reference))
         rows, own = rows_of_samples(problem.evaluate.samples(x), residual)
         spread = covariance(rows, own, table, model_error=0.0 if self._weighted else MODEL_ERROR)
         spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
@@ -132,22 +133,22 @@ class _Judged:
 class _UnseenChange:
     """Whether the recorded picture of a vector is no worse to the eye than that of the solution."""
 
-    def __init__(self, fit: RecordedFit, refined: Refined, seen: Callable[[Pixels], float] | None) -> None:
-        self._fit, self._found, self._evaluate, self._seen = fit, refined.x, refined.all.evaluate, seen
+    def __init__(self, recording: Recording, refined: Refined, seen: Callable[[Pixels], float] | None) -> None:
+        self._recording, self._found, self._evaluate, self._seen = recording, refined.x, refined.all.evaluate, seen
 
     def __call__(self, x: Vector) -> bool:
         if self._seen is None:
             return True
         # of the problem's pixels, evenly spread and the brightest: those that see nothing of the target do not change
         before, after = (self._evaluate(vector)[:, :, 0] for vector in (self._found, x))
-        if relative_change(before, after) * self._fit.mask.mean() <= UNSEEN_CHANGE:
+        if relative_change(before, after) * self._recording.setting.mask.mean() <= UNSEEN_CHANGE:
             return True
-        return self._seen(self._fit.picture(x)) <= self._error + VISIBLE
+        return self._seen(self._recording.whole.picture(x)) <= self._error + VISIBLE
 
     @cached_property
     def _error(self) -> float:
         assert self._seen is not None
-        return self._seen(self._fit.picture(self._found))
+        return self._seen(self._recording.whole.picture(self._found))
 
 
 def relative_change(before: NDArray[np.floating], after: NDArray[np.floating]) -> float:
@@ -156,12 +157,12 @@ def relative_change(before: NDArray[np.floating], after: NDArray[np.floating]) -
     return float(np.mean(np.abs(after - before) / (np.abs(before) + dim)))
 
 
-def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: list[str]) -> Vector | None:
+def _solve_holding(setting: Setting, refined: Refined, found: Vector, names: list[str]) -> Vector | None:
     """The best vector with these names at the user's values; None where it is hopeless by some of the groups alone.
 
     The quadratic around `found` mostly tells where it is: what goes back hardly shows.
     """
-    lower, upper = box_holding(fit.table, fit.scene.renderer.start, names)
+    lower, upper = box_holding(setting.table, setting.user, names)
     start = np.clip(found, lower, upper)
     if np.all(lower >= upper):
         return start
@@ -176,7 +177,7 @@ def _solve_holding(fit: RecordedFit, refined: Refined, found: Vector, names: lis
             start = guess
         else:
             nearer, hopeless = min(start, guess, key=lambda x: cost(x).cost), HOPELESS * before
-            start = fit.solve_within(refined.few, nearer, lower, upper, wanted=hopeless)
+            start = solve_within(setting, refined.few, nearer, (lower, upper), wanted=hopeless)
             if cost(start).cost > hopeless:
                 return None
-    return fit.solve_within(refined.all, start, lower, upper)
+    return solve_within(setting, refined.all, start, (lower, upper))

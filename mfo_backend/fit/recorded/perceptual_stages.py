@@ -4,70 +4,86 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...types.image import Pixels
+from ..alike.unneeded_lobes import Box
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
 from ..result.outcome import End
 from ..settings import FitSettings
 from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual
-from .stages import RecordedFit, Vector
+from .recording import Recording, Vector
+from .solve import solve, solve_within
 
 BASIN = 0.1  # of the box: solutions nearer than this in every value are one
 FLIP_STARTS = 2
 FINALISTS = 2  # ends that are path-traced besides the start and the end of the least squares
+EVALUATIONS = 25  # of a stage, from each start
 
 
 def perceptual_ends(
-    fit: RecordedFit,
+    recording: Recording,
     problem: Problem,
     start: Vector,
     basins: Sequence[Vector],
+    box: Box,
     residuals: Mapping[str, MakeResidual],
     judge: PictureJudge,
     settings: FitSettings,
-    notes: list[str],
-) -> list[End]:
-    """The best ends of the perceptual stages from `start` and other `basins`, by the judge on recorded pictures.
+) -> tuple[list[End], list[str]]:
+    """The best ends of the perceptual stages from `start` and other `basins`, by the judge on recorded pictures, and
+    sentences on what was left out.
 
     Losses that the settings name are a ladder, each from the end of the one before; a preset's own are alternatives.
+    `recording` holds all pixels; `problem` are the residuals of the stage before; `box` holds what the user keeps.
     """
-    flip = settings.preset == "best"
-    fit.record_whole(start)
-    starts = [start]
-    for basin in basins:
-        starts.append(fit.solve_within(problem, np.clip(basin, *fit.box), *fit.box))
+    setting, flip, notes = recording.setting, settings.preset == "best", []
+    starts = [start, *(solve_within(setting, problem, np.clip(basin, *box), box) for basin in basins)]
     ends = [End("refine", x) for x in starts[1:]]
     for name, make in residuals.items():
-        polished = fit.polish(name, problem, make, starts)
-        if polished is None:
+        polished = _lower_squares(recording, name, problem, make, starts, box)
+        if not polished:
             notes.append(f"The stage {name!r} met numbers that are not finite and was left out.")
         else:
             ends += [End(name, x) for x in polished]
             starts = starts if settings.losses is None else polished
-    if not fit.complete:
+    if not recording.complete:
         if flip:
             notes.append("The picture is too large to be recorded whole: the stage 'flip' was left out.")
-        return ends
-    if flip and not fit.course.should_stop():
+        return ends, notes
+    if flip and not setting.course.should_stop():
         nearest: list[Vector] = []
-        width = fit.table.upper - fit.table.lower
-        for x in sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(fit.picture(x))):
+        width = setting.table.upper - setting.table.lower
+        for x in sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(recording.picture(x))):
             if all(np.max(np.abs(x - other) / width) > BASIN for other in nearest):
                 nearest.append(x)
-        ends += [End("flip", x) for x in _lower_flip(fit, judge, nearest[:FLIP_STARTS])]
+        ends += [End("flip", x) for x in _lower_flip(recording, judge, nearest[:FLIP_STARTS], box)]
     if len(ends) <= FINALISTS:
-        return ends
-    return sorted(ends, key=lambda end: judge.value(fit.picture(end.x)))[:FINALISTS]
+        return ends, notes
+    return sorted(ends, key=lambda end: judge.value(recording.picture(end.x)))[:FINALISTS], notes
 
 
-def _lower_flip(fit: RecordedFit, judge: PictureJudge, starts: list[Vector]) -> list[Vector]:
+def _lower_squares(
+    recording: Recording, name: str, problem: Problem, make: MakeResidual, starts: list[Vector], box: Box
+) -> list[Vector]:
+    """A stage with another residual of the groups of `problem`, from each start; its ends that are finite."""
+    setting = recording.setting
+    with setting.course.stage(name) as stage:
+        stage.picture = recording.picture
+        problem = replace(problem, residual=make(problem.groups.average(setting.reference)), near=starts[0])
+        found = [solve(setting, problem, start, EVALUATIONS, stage=stage, box=box) for start in starts]
+        stage.vector = min(found, key=lambda solution: solution.equations.cost).x
+    return [solution.x for solution in found if np.isfinite(solution.equations.cost)]
+
+
+def _lower_flip(recording: Recording, judge: PictureJudge, starts: list[Vector], box: Box) -> list[Vector]:
     """Stage `flip`: the mean error of the recorded picture itself, from each start."""
-    paths, course = fit.paths, fit.course
-    evaluate = fit.scene.evaluator(paths, paths.pixel_groups())
+    paths, course = recording.paths, recording.setting.course
+    evaluate = recording.setting.scene.evaluator(paths, paths.pixel_groups())
 
     def picture(x: Vector) -> tuple[Pixels, Callable[[Pixels], Vector]]:
         table = evaluate(x)
@@ -76,10 +92,11 @@ def _lower_flip(fit: RecordedFit, judge: PictureJudge, starts: list[Vector]) -> 
             rows = gradient.reshape(-1, 3)[paths.pixel].astype(np.float64)
             return np.einsum("gck,gc->k", table[:, :, 1:], rows, optimize=True)
 
-        return fit.shown(table[:, :, 0]), pullback
+        return recording.shown(table[:, :, 0]), pullback
 
     with course.stage("flip") as stage:
+        stage.picture = recording.picture
         told, stop = course.values(stage), course.should_stop
-        ends = [minimise_flip(judge, picture, x, *fit.box, on_value=told, should_stop=stop) for x in starts]
+        ends = [minimise_flip(judge, picture, x, *box, on_value=told, should_stop=stop) for x in starts]
         stage.vector = min(ends, key=lambda end: end[1])[0]
     return [x for x, _ in ends]

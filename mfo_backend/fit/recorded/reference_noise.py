@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.block_means import block_sums
+from ...metrics.neighbours import next_to, sums_around
 from ...render.primary_rays import TILE
 from ...render.recorded_paths import LaneGroups, RecordedPaths
 from ...types.image import Pixels
-from ..judge.neighbours import next_to, sums_around
 
 REACH = 8  # pixels to each side of a tile that its variance is taken from
 PRIOR_PAIRS = 8  # pairs of pixels that the variance of the whole picture counts for

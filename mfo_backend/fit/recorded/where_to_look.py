@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +13,7 @@ from ...metrics.colour import luminance
 from ...render.recorded_paths import LaneGroups, RecordedPaths
 from ...render.widened_mask import widened
 from ...types.image import Pixels
+from ..plans import RecordedPlan
 
 # A pixel with background in it depends on the exact positions of its samples, which the reference does not share
 MINIMUM_INTERIOR_SHARE = 0.3
@@ -146,3 +148,43 @@ def _finer(grid: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _rays(grid: NDArray[np.int64], mask: NDArray[np.bool_]) -> int:
     return int(np.square(grid)[mask].sum())
+
+
+def finer_grid(grid: int, noise: float, share: float, plan: RecordedPlan, finest: Callable[[float], int]) -> int:
+    """The grid, squared the camera rays of a pixel, with which a recording's own noise is low enough.
+
+    With the present `grid` it is `noise` of a tile's radiance and `share` of the mean square residual, both at least 0
+    and `share` at most 1. `finest` is the grid that so many lanes allow. The answer is never coarser than `grid`.
+    """
+    finer = grid
+    if noise >= plan.too_noisy:
+        finer = min(math.ceil(grid * noise / plan.low_noise), plan.grid_finest, finest(math.inf))
+    if share > plan.most_own:
+        # more rays leave the rest of the residual as it is
+        odds, wanted = share / max(1.0 - share, 1e-6), plan.low_own / (1.0 - plan.low_own)
+        clean = math.ceil(grid * math.sqrt(odds / wanted))
+        finer = max(finer, min(clean, plan.grid_finest, finest(plan.clean_lanes)))
+    return max(finer, grid)
+
+
+FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
+_AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
+
+
+def without_fireflies(image: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, int]:
+    """The linear image (height, width, 3) with fireflies inside `mask` set to the mean around them, and their number.
+
+    Only for finding a start: the mean of the picture loses what they carry.
+    """
+    height, width = mask.shape
+    level = luminance(image)
+    padded = np.pad(level, 1, mode="edge")
+    near = np.zeros_like(level)
+    for dy, dx in _AROUND:
+        np.maximum(near, padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width], out=near)
+    floor = 0.1 * float(level[mask].mean()) if mask.any() else 0.0
+    row, column = np.nonzero(mask & (level > FIREFLY * np.maximum(near, floor)))
+    around = [image[np.clip(row + dy, 0, height - 1), np.clip(column + dx, 0, width - 1)] for dy, dx in _AROUND]
+    calm = image.astype(np.float32)
+    calm[row, column] = np.mean(around, axis=0)
+    return calm, len(row)

@@ -49,10 +49,14 @@ class Stage:
     loss_start: float = np.nan
     loss_best: float = np.inf
     best: Vector | None = None  # of the lowest loss, until it has been shown
+    picture: Callable[[Vector], Pixels] | None = field(default=None, repr=False)  # of a vector, for previews
 
 
 class Course:
-    """Runs the named stages one after another and tells the listener."""
+    """Runs the named stages one after another and tells the listener.
+
+    `picture` makes the previews of stages that have none of their own.
+    """
 
     def __init__(
         self,
@@ -61,6 +65,7 @@ class Course:
         listener: Listener,
         should_stop: Callable[[], bool],
         began: float,
+        picture: Callable[[Vector], Pixels] | None = None,
     ) -> None:
         self.names = stages
         self.should_stop = should_stop
@@ -68,13 +73,13 @@ class Course:
         self._renderer, self._listener, self._began = renderer, listener, began
         self._told = self._shown = -np.inf
         self._best = BestSoFar(renderer, listener, began)
-        self.picture: Callable[[Vector], Pixels] | None = None  # of a vector, for previews
+        self._picture = picture
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Stage]:
         """Open a stage; its end event and report follow when the block is left."""
         entered = time.monotonic()
-        stage = Stage(name)
+        stage = Stage(name, picture=self._picture)
         yield stage
         if self.should_stop():
             stage.status = Status.CANCELLED
@@ -129,10 +134,10 @@ class Course:
         """Tell a preview of the stage's best, where that is new."""
         if self._shown == -np.inf:
             self._shown = self._began
-        if self.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
+        if stage.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
             return
         passes = self._renderer.passes
-        self._listener(Preview(self.picture(stage.best)))
+        self._listener(Preview(stage.picture(stage.best)))
         self._renderer.passes = passes  # how many previews there are depends on the clock, and the fit needs none
         stage.best, self._shown = None, time.monotonic()
 

@@ -77,8 +77,14 @@ class TracedRoute:
         """Run the stages."""
         task, renderer, paths = self._task, self._renderer, self._paths
         seed, should_stop = task.settings.seed, task.should_stop
-        course = Course(renderer, self.stages, task.listener, should_stop, task.began)
-        course.picture = lambda x: _preview(paths, x, task.mask.shape, seed ^ VERIFY_STREAM)
+        course = Course(
+            renderer,
+            self.stages,
+            task.listener,
+            should_stop,
+            task.began,
+            picture=lambda x: _preview(paths, x, task.mask.shape, seed ^ VERIFY_STREAM),
+        )
         fit = TransmissionFit(paths, renderer.start, task.light, task.mask, self._plan, seed, course, task.clipped)
 
         ends: list[Polished] = []

@@ -16,11 +16,10 @@ from ...types.image import Pixels
 from ..alike.unneeded_lobes import values_off
 from ..plans import TransmissionPlan
 from ..result.course import Course, Stage
-from .pictures import GEOMETRIC, SECANT_BELOW, TracedTiles
+from .pictures import GEOMETRIC, SECANT_BELOW, TracedTiles, is_unsure, two_half_equations
 from .polished import AMOUNTS, CORE, Polished, without_lobe
 from .sample_count import MOST_COUNT
 from .sample_pools import TilePools
-from .two_halves import is_unsure, two_half_equations
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ...render.traced_paths import TracedPaths

@@ -120,11 +120,11 @@ def test_perceptual_stages_do_not_fit_noise(tmp_path):
 
 def test_perceptual_stages_do_not_begin_where_nothing_is_left_to_see(tmp_path, monkeypatch):
     renderer = load(tmp_path, POINT, size=32)
-    from mfo_backend.fit.recorded.stages import RecordedFit
+    from mfo_backend.fit.recorded.recording import Recording
 
     reference = renderer.image(renderer.table.pack(TRUTHS[1]), seed=5, spp=1024)
-    asked, misfit = [], RecordedFit.misfit
-    monkeypatch.setattr(RecordedFit, "misfit", lambda self, x: asked.append(x) or misfit(self, x))
+    asked, misfit = [], Recording.misfit
+    monkeypatch.setattr(Recording, "misfit", lambda self, x: asked.append(x) or misfit(self, x))
     outcome, events = fit(renderer, reference, preset="best")
     assert [e.stage for e in events if isinstance(e, StageEnd)] == ["scan", "start", "refine"]
     assert any("nobody sees" in note for note in outcome.result.notes)
@@ -153,8 +153,8 @@ def test_previews_come_at_most_once_a_second_and_show_the_fit(tmp_path):
     renderer = load(tmp_path, POINT, size=16)
     events = []
     course = Course(renderer, ("scan", "start", "refine"), events.append, lambda: False, -1e9)
-    course.picture = lambda x: np.full((2, 2, 3), x[0], np.float32)
     with course.stage("start") as stage:
+        stage.picture = lambda x: np.full((2, 2, 3), x[0], np.float32)
         told = course.values(stage)
         for step in range(50):
             told(np.array([float(step)]), 1.0 / (step + 1))

@@ -54,10 +54,11 @@ def test_undetermined_values_go_back_where_nothing_is_seen_of_it(tmp_path, monke
 
 
 class Pictures:
-    """A fit that shows grey pictures, one for each first value of a vector, and counts how often it is asked."""
+    """A recording that shows grey pictures, one for each first value of a vector, and counts how often it is asked."""
 
     def __init__(self, greys):
-        self.greys, self.mask, self.shown = greys, np.ones((2, 2), bool), 0
+        self.greys, self.shown, self.whole = greys, 0, self
+        self.setting = SimpleNamespace(mask=np.ones((2, 2), bool))
 
     def picture(self, x):
         self.shown += 1
@@ -156,14 +157,16 @@ def test_another_material_that_is_as_likely_is_named_and_makes_values_unsure(tmp
     )
     table = renderer.table
     truth = table.pack({name: TRUTH[name] for name in NAMES[:2]})
-    fit, refined = refine(renderer, renderer.image(truth, seed=5, spp=64), truth, RecordedPlan(), 1)
-    alone = kept_values.keep_values(fit, refined, weighted=True)
+    end = refine(renderer, renderer.image(truth, seed=5, spp=64), truth, RecordedPlan(), 1)
+    refined = end.refined
+    alone = kept_values.keep_values(end, weighted=True)
     assert alone.notes == ()
     assert alone.certainty["roughness"].level is Level.DETERMINED
 
     other = refined.x.copy()
     other[table.slice_of("roughness")] += 0.2
-    doubted = kept_values.keep_values(fit, replace(refined, rivals=(Rival(other, 0.25),)), weighted=True)
+    rivals = replace(refined, rivals=(Rival(other, 0.25),))
+    doubted = kept_values.keep_values(replace(end, refined=rivals), weighted=True)
     here = float(refined.x[table.slice_of("roughness")][0])
     assert doubted.notes == (
         f"With a probability of 25 % it is another material: roughness {here + 0.2:.2g} (not {here:.2g}).",

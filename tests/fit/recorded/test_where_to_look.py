@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
+
 from __future__ import annotations
+
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded.where_to_look import (
     BRIGHTEST,
     FINEST,
@@ -13,8 +18,10 @@ from mfo_backend.fit.recorded.where_to_look import (
     all_groups,
     detail_grid,
     edges_of_light,
+    finer_grid,
     solution_grid,
     thinned_grid,
+    without_fireflies,
 )
 
 
@@ -149,3 +156,54 @@ def test_a_target_whose_solution_is_recorded_more_finely_is_not_thinned():
     grid = np.full(mask.shape, GRID_PLAIN)
     assert solution_grid(image, mask, lambda: image) is not None
     np.testing.assert_array_equal(thinned_grid(grid, image, mask, 1000), grid)
+
+
+PLAN = RecordedPlan(
+    too_noisy=0.07, low_noise=0.06, grid_finest=16, most_own=0.3, low_own=0.2, clean_lanes=1_000_000
+)  # fmt: skip
+
+
+def lanes_allow(pixels):
+    return lambda lanes: int(math.sqrt(min(lanes, 6_000_000) / (4 * pixels)))
+
+
+@pytest.mark.parametrize(
+    ("noise", "share", "pixels", "expected"),
+    [
+        (0.05, 0.2, 4000, 4),  # quiet
+        (0.09, 0.2, 4000, 6),  # 4 x 0.09 / 0.06
+        (0.5, 0.2, 4000, 16),
+        (0.5, 0.2, 20_000, 8),  # 6 million lanes
+        (0.05, 0.4, 4000, 7),  # odds of 2 / 3 to 1 / 4: 2.7 times the rays
+        (0.05, 1.0, 4000, 7),  # a million lanes
+        (0.05, 1.0, 100, 16),
+        (0.05, 1.0, 100_000, 4),  # never fewer
+        (0.09, 1.0, 20_000, 6),  # what radiance asks for is not held back
+    ],
+)
+def test_rays_for_the_noise(noise, share, pixels, expected):
+    assert finer_grid(4, noise, share, PLAN, lanes_allow(pixels)) == expected
+
+
+@pytest.mark.parametrize("share", [0.35, 0.5, 0.8])
+def test_the_share_becomes_the_low_one(share):
+    grid = finer_grid(4, 0.0, share, replace(PLAN, clean_lanes=10**9, grid_finest=100), lambda lanes: 1000)
+    own = share * (4 / grid) ** 2
+    after = own / (own + 1.0 - share)
+    assert after <= PLAN.low_own
+    coarser = share * (4 / (grid - 1)) ** 2
+    assert coarser / (coarser + 1.0 - share) > PLAN.low_own
+
+
+def test_a_plan_may_leave_the_share_alone():
+    assert finer_grid(3, 0.0, 1.0, replace(PLAN, most_own=1.0), lanes_allow(100)) == 3
+
+
+def test_a_single_bright_pixel_is_replaced_by_those_around_it():
+    image = np.full((9, 9, 3), 0.5, np.float32)
+    image[4, 4] = 40.0
+    image[0, :] = 40.0  # a bright edge is none
+    clean, count = without_fireflies(image, np.ones((9, 9), bool))
+    assert count == 1
+    np.testing.assert_allclose(clean[4, 4], 0.5)
+    np.testing.assert_array_equal(clean[0], image[0])

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mfo_backend.fit.plans import RecordedPlan
+from mfo_backend.fit.squares.problem import Refined
 from mfo_backend.render.renderer import load_renderer
 from tests.fit.recorded.one_refine import refine
 from tests.render.scenes import AREA, SKY, write_scene
@@ -25,17 +28,17 @@ def refined(tmp_path, monkeypatch):
     renderer = load_renderer(
         write_scene(tmp_path, AREA + SKY, size=40), "target", model="mitsuba_principled", parameters=NAMES
     )
-    from mfo_backend.fit.recorded import stages as recorded_stages
+    from mfo_backend.fit.recorded import refine as refine_module
 
     table, mask = renderer.table, renderer.target_mask()
     reference, true = (renderer.image(table.pack(TRUTH), seed=seed, spp=256) for seed in (5, 9))
 
     def run(plan=PLAN, seed=1, **guards):
         for name, value in guards.items():
-            monkeypatch.setattr(recorded_stages, name, value)
-        fit, refined = refine(renderer, reference, table.pack(FAR), plan, seed)
-        found = renderer.image(refined.x, seed=9, spp=256)
-        return float(np.sqrt(np.mean((found - true)[mask] ** 2) / np.mean(true[mask] ** 2))), fit.recordings
+            monkeypatch.setattr(refine_module, name, value)
+        end = refine(renderer, reference, table.pack(FAR), plan, seed)
+        found = renderer.image(end.refined.x, seed=9, spp=256)
+        return float(np.sqrt(np.mean((found - true)[mask] ** 2) / np.mean(true[mask] ** 2))), end.recording.number
 
     return run
 
@@ -78,10 +81,10 @@ COATED = dict(zip(PAINT, ((0.3, 0.2, 0.1), 0.5, 0.05, 0.8, 0.25), strict=True))
 
 @pytest.mark.parametrize("looked_at", [False, True])
 def test_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp_path, monkeypatch, looked_at):
-    from mfo_backend.fit.recorded import stages as recorded_stages
+    from mfo_backend.fit.recorded import refine as refine_module
 
     if not looked_at:
-        monkeypatch.setattr(recorded_stages.OtherEnds, "simplest", lambda self, found: found)
+        monkeypatch.setattr(refine_module.OtherEnds, "simplest", lambda self, found: found)
     renderer = load_renderer(
         write_scene(tmp_path, AREA + SKY, size=40),
         "target",
@@ -93,7 +96,7 @@ def test_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp_path, monkey
     renderer.start = table.pack({**GLOSSY, "base_color": (0.5, 0.5, 0.5), "roughness": 0.6})
     reference = renderer.image(table.pack(GLOSSY), seed=5, spp=64)
     for seed in range(3):
-        _, refined = refine(renderer, reference, table.pack(COATED), PLAN, seed)
+        refined = refine(renderer, reference, table.pack(COATED), PLAN, seed).refined
         found = table.unpack(refined.x)
         if not looked_at:  # the picture is explained as well
             assert found["coat_weight"] > 0.8
@@ -104,3 +107,39 @@ def test_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp_path, monkey
         assert found["roughness"] == pytest.approx(GLOSSY["roughness"], abs=0.03)
         assert found["specular_ior_level"] == pytest.approx(GLOSSY["specular_ior_level"], abs=0.08)
         assert 0.0 < sum(rival.share for rival in refined.rivals) < 0.05
+
+
+@pytest.mark.parametrize(("cost_there", "kept"), [(0.4, "rival"), (0.6, "found")])
+def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_there, kept):
+    """On a recording made for another material its own noise may pass for a lower cost."""
+    from mfo_backend.fit.recorded import refine as refine_module
+
+    found, rival = np.array([0.0]), np.array([1.0])
+    recorded = []
+
+    def record(x, grid, number):
+        recorded.append((x, grid, number))
+        return SimpleNamespace(number=number, picture=None, setting=setting)
+
+    def recorded_near(setting, stage, start, make, weigh, number):
+        grid = 9 if start is rival else 7
+        return record(start, grid, number + 1), start, grid
+
+    def problems(recording, x, make, weigh, *, solve_all=False):
+        few = SimpleNamespace(equations=lambda at: SimpleNamespace(cost=cost_there if at is rival else 0.5))
+        return refine_module.OnRecording(Refined(x, few, few), recording)
+
+    setting = SimpleNamespace(
+        course=SimpleNamespace(stage=lambda name: nullcontext(SimpleNamespace(vector=None))),
+        scene=SimpleNamespace(model=SimpleNamespace(limited_width=False)),
+        record=record,
+        table=None,
+    )
+    monkeypatch.setattr(refine_module, "_recorded_near", recorded_near)
+    monkeypatch.setattr(refine_module, "_problems", problems)
+    monkeypatch.setattr(refine_module, "better_basin", lambda setting, problem, x, others: rival)
+    monkeypatch.setattr(refine_module, "solve", lambda setting, problem, x, n, *, stage: SimpleNamespace(x=x))
+    end = refine_module.refine_sampled(setting, [found, rival], None, None)
+    assert end.refined.x is (rival if kept == "rival" else found)
+    assert recorded[-1] == ((rival, 9, 2) if kept == "rival" else (found, 7, 3))
+    assert end.recording.number == recorded[-1][2]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.traced.two_halves import BRIGHT, is_unsure, two_half_equations
+from mfo_backend.fit.traced.pictures import BRIGHT, is_unsure, two_half_equations
 
 COUNT = 30_000
 

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The light paths of one recording, and what follows from them: groups, evaluators, pictures, noise, problems."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...render.primary_rays import TILE
+from ...render.recorded_image import RECALLED, RecordedImage
+from ...render.recorded_paths import LaneGroups, RecordedPaths
+from ...render.recorded_scene import RecordedScene
+from ...types.image import Pixels
+from ...types.parameter import ParameterTable
+from ..plans import RecordedPlan
+from ..result.course import Course
+from ..squares.problem import Problem
+from ..squares.residuals import MakeResidual, MakeWeighted, OneSidedResidual, WeightedResidual
+from .reference_noise import TileNoise, tile_noise
+from .where_to_look import all_groups, detail_grid, without_fireflies
+
+Vector = NDArray[np.float64]
+
+# Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
+LEAST_NOISE = 0.002
+SAMPLES = 2  # of the light in a recording at the solution: their difference shows the recording's own noise
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What all stages of a recorded fit stand on.
+
+    Attributes
+    ----------
+    reference
+        The picture as scene-linear radiance, float32 (height, width, 3).
+    calm, fireflies
+        The same without fireflies, and how many there were. A start is found and noise is measured on it; under lights
+        of no extent it is the reference, for there a highlight may well be a pixel wide.
+    mask
+        Pixels that see the target, True (height, width).
+    clipped
+        1 where the radiance is only known to be the reference's or more, else 0; None where it is known everywhere.
+    """
+
+    scene: RecordedScene
+    reference: Pixels = field(repr=False)
+    calm: Pixels = field(repr=False)
+    fireflies: int
+    mask: NDArray[np.bool_] = field(repr=False)
+    clipped: NDArray[np.float32] | None = field(repr=False)
+    plan: RecordedPlan
+    seed: int
+    course: Course
+
+    @classmethod
+    def of(
+        cls,
+        scene: RecordedScene,
+        reference: Pixels,
+        mask: NDArray[np.bool_],
+        plan: RecordedPlan,
+        seed: int,
+        course: Course,
+        clipped: NDArray[np.float32] | None = None,
+    ) -> Setting:
+        """The setting with its fireflies counted."""
+        calm, fireflies = without_fireflies(reference, mask) if scene.needs.sampled else (reference, 0)
+        return cls(scene, reference, calm, fireflies, mask, clipped, plan, seed, course)
+
+    @property
+    def table(self) -> ParameterTable:
+        """The parameters that are fitted."""
+        return self.scene.renderer.table
+
+    @property
+    def user(self) -> Vector:
+        """The values in the user's scene."""
+        return self.scene.renderer.start
+
+    @property
+    def sampled(self) -> bool:
+        """Whether light is sampled, so that a recording has noise of its own."""
+        return self.scene.needs.sampled
+
+    def record(
+        self,
+        x: Vector,
+        grid: int | NDArray[np.int64],
+        number: int,
+        *,
+        near: bool = True,
+        samples: int = SAMPLES,
+        thinned: bool = False,
+        **more: float,
+    ) -> Recording:
+        """Record the light at the material `x`; see `RecordedScene.record`.
+
+        A recording takes most of the memory of a fit: let the one before go first.
+        """
+        paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=near, samples=samples, **more)
+        return Recording(self, paths, number, thinned)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Light paths, the `number` of recordings before this one, and whether some of the target's pixels were left out.
+
+    What is computed from the paths is kept, so that the same numbers are not computed twice.
+    """
+
+    setting: Setting
+    paths: RecordedPaths
+    number: int
+    thinned: bool = False
+    _tiles: dict[int, LaneGroups] = field(default_factory=dict, init=False, repr=False)
+    _evaluators: dict[LaneGroups, RecordedImage] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the recording holds the pixels that see the target and not only some of its tiles."""
+        return len(self.paths.pixel) > 0.9 * int(self.setting.mask.sum())  # the mask has other rays at the silhouette
+
+    @cached_property
+    def whole(self) -> Recording:
+        """A recording of all pixels: this one unless it leaves some out.
+
+        Only recordings under exact lights do, and those are alike for all materials.
+        """
+        if not self.thinned:
+            return self
+        setting = self.setting
+        grid = detail_grid(setting.reference, setting.mask)  # few groups look at it closely
+        return setting.record(setting.user, grid, self.number + 1, near=False)
+
+    def tiles(self, side: int) -> LaneGroups:
+        """All tiles of this side; their evaluations are remembered between problems."""
+        if side not in self._tiles:
+            groups = self._tiles[side] = all_groups(self.paths, side)
+            self._evaluators[groups] = self.setting.scene.evaluator(self.paths, groups, RECALLED)
+        return self._tiles[side]
+
+    def problem(
+        self, groups: LaneGroups, make: MakeResidual, *, calm: bool = False, near: Vector | None = None
+    ) -> Problem:
+        """The residuals of these groups, to the reference or to it without fireflies."""
+        setting = self.setting
+        residual = make(groups.average(setting.calm if calm else setting.reference))
+        if setting.clipped is not None:
+            residual = OneSidedResidual(residual, groups.average(setting.clipped) > 0)
+        return Problem(self._evaluator(groups), residual, groups, near)
+
+    def _evaluator(self, groups: LaneGroups) -> RecordedImage:
+        if groups in self._evaluators:
+            return self._evaluators[groups]
+        return self.setting.scene.evaluator(self.paths, groups, RECALLED)
+
+    def picture(self, x: Vector) -> Pixels:
+        """The recorded picture of a vector, linear; the reference where nothing is recorded."""
+        return self.shown(self.pixels(x))
+
+    def shown(self, pixels: NDArray[np.float32]) -> Pixels:
+        """The picture that these covered pixels are part of, which is the reference elsewhere."""
+        image = self.setting.reference.astype(np.float32).copy()
+        image.reshape(-1, 3)[self.paths.pixel] = pixels
+        return image
+
+    def pixels(self, x: Vector) -> NDArray[np.float32]:
+        """Radiance of the covered pixels, (p, 3)."""
+        return self._pictures(x)[:, :, 0]
+
+    def pixels_and_tiles(self, x: Vector, groups: LaneGroups) -> NDArray[np.float32]:
+        """The same by an evaluation with derivatives, which those of the tiles `groups` are made of."""
+        pixels = self.setting.scene.evaluator(self.paths, self.paths.pixel_groups()).samples(x)
+        self._evaluators[groups].note(x, pixels.averaged(groups.mean_of_pixels))
+        return pixels.mean[:, :, 0]
+
+    @cached_property
+    def _pictures(self) -> RecordedImage:
+        return self.setting.scene.pictures(self.paths, self.paths.pixel_groups())
+
+    def noise(self, pixels: NDArray[np.float32], side: int) -> TileNoise:
+        """Noise of the reference in all tiles of this side, given a model's `pixels`."""
+        paths = self.paths
+        return tile_noise(self.setting.calm, pixels, paths, self.tiles(side), paths.interior, side)
+
+    def weighing(self, noise: TileNoise, side: int, weigh: MakeWeighted = WeightedResidual) -> MakeResidual:
+        """Residuals of tiles of this side, or of some of them, in standard deviations of their `noise`."""
+        least = LEAST_NOISE * float(self.tiles(side).average(self.setting.reference).mean())
+        weight = (1.0 / np.hypot(noise.deviation, max(least, 1e-12))).astype(np.float32)
+        return lambda target: weigh(target, weight)
+
+    def misfit(self, x: Vector) -> tuple[float, TileNoise]:
+        """Root mean square difference of the tiles from the reference, in standard deviations of the noise, and that
+        noise."""
+        groups, pixels = self.tiles(TILE), self.pixels(x)
+        noise = self.noise(pixels, TILE)
+        problem = self.problem(groups, self.weighing(noise, TILE))
+        values = problem.residual(groups.mean_of_pixels(pixels))[0]
+        # as far as a few outliers go, it is their number that counts and not their size
+        return float(np.sqrt(np.mean(np.minimum(np.abs(values), WeightedResidual.LIMIT) ** 2))), noise

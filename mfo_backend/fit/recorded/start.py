@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stages `scan` and `start`: solutions from nothing, on a first recording that is good for any material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...render.primary_rays import TILE
+from ...render.recorded_paths import LaneGroups
+from ...render.recorded_scene import MOST_LANES
+from ...solve.bounded_least_squares import Solution
+from ...types.errors import UnrecordableError
+from ..result.course import Stage
+from ..search.global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
+from ..search.race_starts import race
+from ..squares.problem import Problem
+from ..squares.residuals import MakeResidual
+from .recording import Recording, Setting, Vector
+from .solve import solve
+from .where_to_look import all_groups, detail_grid, edges_of_light, fewer_groups, thinned_grid
+
+SPARE = 1.5  # times the lanes a start is found on are recorded for it: its tiles are chosen by what they show
+
+
+@dataclass(frozen=True, eq=False)
+class Started:
+    """Where the search from nothing has ended.
+
+    Attributes
+    ----------
+    recording
+        The first recording where every light is exact; None where light is sampled, for there each solution gets one.
+    basins
+        The best solution first, then different ones that cost little more.
+    edges
+        Pixels where a sliver may be all that is lit, True (height, width); None where nothing is looked at there.
+    """
+
+    recording: Recording | None
+    basins: tuple[Vector, ...]
+    edges: NDArray[np.bool_] | None
+
+
+def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
+    """Solutions from the scan's nodes, the scene's material and a random one.
+
+    Raises
+    ------
+    UnrecordableError
+        If no start gives finite numbers.
+    """
+    plan, course = setting.plan, setting.course
+    with course.stage("scan") as stage:
+        recording, edges = _first_recording(setting)
+        groups = _groups(recording)
+        stage.picture = None if recording.thinned else recording.picture
+        lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
+        few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
+        starts = _starts(setting, few, stage)
+        stage.vector = starts[0] if starts else None
+    with course.stage("start") as stage:
+        stage.picture = None if recording.thinned else recording.picture
+        lanes = plan.start_lanes if setting.sampled else plan.exact_start_lanes
+        more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
+        basins = _race(setting, more, [*starts, setting.user, random_start(setting.table, setting.seed)], stage)
+        if not np.isfinite(basins[0].equations.cost):
+            raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
+        stage.vector = basins[0].x
+    return Started(None if setting.sampled else recording, tuple(basin.x for basin in basins), edges)
+
+
+def _first_recording(setting: Setting) -> tuple[Recording, NDArray[np.bool_] | None]:
+    """The recording for any material, and the edges of light that it was made for."""
+    plan, reference, mask, user = setting.plan, setting.reference, setting.mask, setting.user
+    if setting.sampled:
+        enough = SPARE * plan.start_lanes
+        return setting.record(user, plan.grid_first, 0, near=False, samples=1, enough=enough), None
+    # only the pixel's footprint is sampled
+    grid = detail_grid(reference, mask)
+    some = thinned_grid(grid, reference, mask, plan.refine_lanes)
+    thinned = not (some[mask] > 0).all()
+    recording = setting.record(user, some, 0, near=False, samples=1, thinned=thinned, enough=MOST_LANES)
+    edges = None if thinned else edges_of_light(recording.paths, _groups(recording))
+    if edges is None:
+        return recording, None
+    del recording
+    return setting.record(user, detail_grid(reference, mask, edges), 1, near=False), edges
+
+
+def _groups(recording: Recording) -> LaneGroups:
+    if recording.setting.sampled:
+        return all_groups(recording.paths, TILE)
+    return all_groups(recording.paths, 1, recording.setting.reference)
+
+
+def _starts(setting: Setting, problem: Problem, stage: Stage) -> list[Vector]:
+    """Where two opposite starts agree, their ends; else the best nodes of the scan."""
+    plan, table, scanned = setting.plan, setting.table, setting.scene.model.scanned
+    starts: list[Vector] = []
+    if plan.same_cost:
+        evaluations = plan.agreement_evaluations if setting.sampled else plan.exact_agreement_evaluations
+        exact = {} if setting.sampled else {"metal_width": ROUGHER_WIDTH, "most": 0.5 * plan.seen_rms**2}
+        starts = agreeing_ends(
+            lambda start: solve(setting, problem, start, evaluations, stage=stage),
+            table, scanned, plan.same_cost, **exact,
+        )  # fmt: skip
+    if not starts and plan.scan:
+        nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
+        starts = best_starts(nodes, plan.starts)
+    return starts
+
+
+def _race(setting: Setting, problem: Problem, starts: Sequence[Vector], stage: Stage) -> list[Solution]:
+    def attempt(start: Vector, evaluations: int, known: float) -> Solution:
+        return solve(setting, problem, start, evaluations, stage=stage, known=known)
+
+    table = setting.table
+    return race(attempt, starts, table.upper - table.lower, setting.plan, setting.course.should_stop)
