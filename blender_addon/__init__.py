@@ -13,7 +13,7 @@ from . import (
     cycles_check,
     handlers,
     panel,
-    preferences,
+    preferences_page,
     preflight,
     previews,
     properties,
@@ -24,7 +24,7 @@ from .operators import CLASSES as OPERATORS
 from .panel import menu
 from .versions import is_module
 
-CLASSES = (*properties.CLASSES, *preferences.CLASSES, *OPERATORS, *panel.CLASSES)
+CLASSES = (*properties.CLASSES, *preferences_page.CLASSES, *OPERATORS, *panel.CLASSES)
 
 
 def register() -> None:

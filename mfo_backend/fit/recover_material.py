@@ -169,12 +169,11 @@ def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:
     seed, spp = task.settings.seed ^ GAP_STREAM, max(task.settings.verify_spp // 2, 1)
     if task.should_stop():
         return None
-    passes = task.renderer.passes
     try:
-        first, second = (task.renderer.image(end.vector, seed=seed ^ k, spp=spp) for k in (0, 1))
+        with task.renderer.counter.uncounted():  # the result is known without them
+            first, second = (task.renderer.image(end.vector, seed=seed ^ k, spp=spp) for k in (0, 1))
     except Interrupted:
         return None
-    task.renderer.passes = passes  # the result is known without them
     return first, second
 
 

@@ -75,14 +75,15 @@ class InterruptibleRenderer:
     """The `Renderer` protocol with every call on a `NativeThread`."""
 
     def __init__(self, renderer: Renderer, thread: NativeThread) -> None:
-        self.model, self.table, self.start, self.passes = (
-            renderer.model,
-            renderer.table,
-            renderer.start,
-            renderer.passes,
-        )
+        self.model, self.table, self.start = renderer.model, renderer.table, renderer.start
+        self.counter = renderer.counter
         self._renderer = renderer
         self._thread = thread
+
+    @property
+    def passes(self) -> float:
+        """See `Renderer.passes`."""
+        return self.counter.count
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`."""
@@ -98,6 +99,4 @@ class InterruptibleRenderer:
         return self._call(self._renderer.target_mask)
 
     def _call(self, function: Callable[[], T]) -> T:
-        value = self._thread.call(function)
-        self.passes = self._renderer.passes
-        return value
+        return self._thread.call(function)

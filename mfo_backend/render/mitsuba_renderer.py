@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from ..scene.scene_xml import Element, find_target, prepare_for_fit, read_scene, to_mitsuba_text
 from ..types.errors import BadInputError
-from ..types.image import Pixels
+from ..types.image import Pixels, Pullback
 from ..types.light_paths import LightPaths
+from ..types.parameter import Vector
 from .material_model import material_model
+from .pass_counter import PassCounter
 from .plugins import check_plugins
 from .prepared_material import Materials, PreparedMaterial
-from .renderer import Pullback, Vector
 from .variant import load_variant
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -45,7 +46,7 @@ class MitsubaRenderer:
         self.light_paths = light_paths
         self.table = material.table
         self.start = material.start
-        self.passes = 0.0
+        self.counter = PassCounter()
         self._shape_id = material.target.shape_id
         self._scene = scene
         self._integrator = scene.integrator()
@@ -57,13 +58,18 @@ class MitsubaRenderer:
         self._mask: NDArray[np.bool_] | None = None
         self._of_pixels: PixelPictures | None = None
 
+    @property
+    def passes(self) -> float:
+        """See `Renderer.passes`."""
+        return self.counter.count
+
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`. A pixel that Mitsuba leaves non-finite is black."""
         from .ordered_picture import parts_of, render_part
 
         width, height = (int(n) for n in self._sensor.film().crop_size())
         self._update(vector, differentiable=False)
-        self.passes += 1.0
+        self.counter.add(1.0)
         pixels = np.zeros((height, width, 3), np.float32)
         for part in parts_of(width * height, seed, spp):
             pixels += np.float32(part.share) * render_part(self._of_pictures, self._scene, self._sensor, part)
@@ -90,7 +96,7 @@ class MitsubaRenderer:
 
         first, *others = pieces_of(pixels, seed, spp)
         begun = start(first)
-        self.passes += len(pixels) / float(np.prod(self._sensor.film().crop_size()))
+        self.counter.add(len(pixels) / float(np.prod(self._sensor.film().crop_size())))
 
         def wait() -> NDArray[np.float32]:
             found, running = [], begun
@@ -142,7 +148,7 @@ class MitsubaRenderer:
                     self._scene, self._params, gradient, self._sensor, opaque(part.seed), part.spp
                 )
                 total += np.array(dr.grad(theta), dtype=np.float64)
-            self.passes += 2.0
+            self.counter.add(2.0)
             return total
 
         return image, pullback

@@ -151,7 +151,7 @@ class RecordedScene:
             highlights=highlights,
             samples=samples,
         )
-        self.renderer.passes += 1.0
+        self.renderer.counter.add(1.0)
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
     def finest_grid(self, samples: int, lanes: float) -> int:
@@ -210,7 +210,7 @@ class RecordedScene:
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
-            self.renderer.passes += cost
+            self.renderer.counter.add(cost)
             return TwoSamples.of(self._image(vector, lanes, groups), constant)
 
         return RecordedImage(at, 2)
@@ -229,7 +229,7 @@ class RecordedScene:
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             samples = self.jacobian(vector, lanes(), groups)
-            self.renderer.passes += cost
+            self.renderer.counter.add(cost)
             return TwoSamples.of(samples, constant)
 
         return RecordedImage(at, recalled)

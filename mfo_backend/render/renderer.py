@@ -3,19 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types.image import Pixels
+from ..types.image import Pixels, Pullback
 from ..types.light_paths import LightPaths
-from ..types.parameter import ParameterTable
-
-Vector = NDArray[np.float64]
-Pullback = Callable[[Pixels], Vector]
+from ..types.parameter import ParameterTable, Vector
+from .pass_counter import PassCounter
 
 
 class Interrupted(Exception):  # noqa: N818  # a request, not an error
@@ -28,7 +26,12 @@ class Renderer(Protocol):
     model: str  # name of the material model
     table: ParameterTable  # the parameters being fitted
     start: Vector  # their values in the scene, moved into the bounds
-    passes: float  # renders of one full picture so far; an image with its pull-back counts 3
+    counter: PassCounter
+
+    @property
+    def passes(self) -> float:
+        """Renders of one full picture so far; an image with its pull-back counts 3."""
+        ...
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """The picture, scene-linear Rec.709, float32 (height, width, 3), every pixel finite."""

@@ -147,7 +147,7 @@ class TracedPaths:
                 result[group, some] = self._launch(vectors[group], pixels[some], begin, seed, samples, jacobian)
         film = self.renderer.scene.sensors()[0].film().crop_size()
         share = len(pixels) * samples * len(vectors) / float(film[0] * film[1])
-        self.renderer.passes += share / 16.0 * (1.0 + (0.2 * self.table.length if jacobian else 0.0))
+        self.renderer.counter.add(share / 16.0 * (1.0 + (0.2 * self.table.length if jacobian else 0.0)))
         return self._tangents.expand(result) if jacobian else result
 
     def _launch(self, vectors, pixels, begin, seed, samples, jacobian) -> NDArray[np.float32]:

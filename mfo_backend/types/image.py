@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Pixels = NDArray[np.float32]
+Pullback = Callable[[Pixels], NDArray[np.float64]]  # from dLoss/dPixels to dLoss/dVector
 
 
 class Encoding(Enum):

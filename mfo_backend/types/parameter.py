@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .errors import BadInputError
 
 Value = float | tuple[float, ...]
+Vector = NDArray[np.float64]  # the values of a table, one after another
 
 
 def parameter_name(text: str) -> str:

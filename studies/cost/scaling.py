@@ -23,6 +23,7 @@ import numpy as np
 from mfo_backend.bench.report.figure import COLOURS, legend_above, log_axis, new_figure, svg
 from mfo_backend.bench.report.table import Table, number
 from mfo_backend.bench.scenes.scene import materials_of
+from mfo_backend.render.pass_counter import PassCounter
 from studies.recovery.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -208,7 +209,7 @@ def _fits(scenario: str, size: int) -> Point:
             renderer, settings = open_bench_scene(scene, "balanced")
             reference = reference_of(scene, renderer, REFERENCE_STREAM + scene_number, most_spp=MOST_SAMPLES)
             for _ in range(1 if seconds else 2):  # the first compiles
-                renderer.passes, began = 0.0, time.process_time()
+                renderer.counter, began = PassCounter(), time.process_time()
                 result = fit_to(renderer, reference, settings)
             seconds.append(time.process_time() - began)
             passes.append(result.passes)

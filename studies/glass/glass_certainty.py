@@ -33,6 +33,7 @@ WRONG_BY = 0.02
 
 def measure(scene: Any, number: int, arguments: argparse.Namespace) -> dict[str, Any]:
     """Fit a scene to its reference of this number."""
+    from mfo_backend.render.pass_counter import PassCounter
     from mfo_backend.types.certainty import Level
 
     renderer, settings = open_bench_scene(scene, arguments.preset, all_values=arguments.all_values)
@@ -40,7 +41,7 @@ def measure(scene: Any, number: int, arguments: argparse.Namespace) -> dict[str,
     if arguments.truth:
         table.select(name for name, _ in arguments.truth)  # refuses what the fit holds: it would change nothing
     reference = reference_of(scene, renderer, REFERENCE_STREAM + 1000 * number + scene.number)
-    renderer.passes, began = 0.0, time.process_time()
+    renderer.counter, began = PassCounter(), time.process_time()
     result = fit_to(renderer, reference, settings)
     seconds = time.process_time() - began
     error = np.abs(table.pack(result.recovered) - truth)

@@ -62,12 +62,13 @@ def measure(renderer: Any, number: int, arguments: argparse.Namespace) -> dict[s
     """Fit scene `number` and judge the result."""
     from mfo_backend.fit.recover_material import recover_material
     from mfo_backend.fit.settings import FitSettings
+    from mfo_backend.render.pass_counter import PassCounter
     from mfo_backend.types.image import Encoding, Image
 
     table = renderer.table
     truth = table.clip(table.pack(random_glass(number)))
     reference = renderer.image(truth, seed=0x0BEF0000 + number, spp=arguments.reference_spp)
-    renderer.passes = 0.0
+    renderer.counter = PassCounter()
     began, cpu = time.monotonic(), time.process_time()
     result = recover_material(
         renderer,

@@ -27,6 +27,7 @@ from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.compare import compare_images
 from mfo_backend.metrics.loss import Loss, make_loss
 from mfo_backend.metrics.loss_names import loss_in_range
+from mfo_backend.render.pass_counter import PassCounter
 from mfo_backend.types.image import Encoding, Image, Pixels
 
 Vector = NDArray[np.float64]
@@ -76,7 +77,7 @@ class RecordedRenderer:
     def __init__(self, scene: Any, background: Pixels, *, grid: int, seed: int, at: Vector, near: bool) -> None:
         renderer = scene.renderer
         self.model, self.table, self.start = renderer.model, renderer.table, renderer.start
-        self.passes = 0.0
+        self.counter = PassCounter()
         paths = scene.record(at, grid=grid, seed=seed, near=near)
         groups = paths.pixel_groups()
         self._evaluate: Callable[[Vector], NDArray[np.float32]] = scene.evaluator(paths, groups)
@@ -84,18 +85,23 @@ class RecordedRenderer:
         self._background = background
         self._mask = renderer.target_mask()
 
+    @property
+    def passes(self) -> float:
+        """See `Renderer`."""
+        return self.counter.count
+
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer`."""
         return self._mask
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer`; seed and samples are those of the recording."""
-        self.passes += 1.0
+        self.counter.add(1.0)
         return self._image(self._evaluate(vector))
 
     def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Callable[[Pixels], Vector]]:
         """See `Renderer`; counts the three passes such a step takes with `prb`."""
-        self.passes += 3.0
+        self.counter.add(3.0)
         table = self._evaluate(vector)
         slopes = table[:, :, 1:].reshape(-1, table.shape[2] - 1).astype(np.float64)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mfo_backend.render.pass_counter import PassCounter
 from mfo_backend.types.image import Encoding, Image, Pixels
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
@@ -30,7 +31,7 @@ class SphereRenderer:
 
     def __init__(self, start: NDArray[np.float64], noise: float = 0.0) -> None:
         self.start = start
-        self.passes = 0.0
+        self.counter = PassCounter()
         self.noise = noise
         self.calls: list[tuple[int, int]] = []  # seed, spp
         y, x = np.mgrid[0:SIZE, 0:SIZE]
@@ -43,6 +44,10 @@ class SphereRenderer:
         self._cos_light = np.maximum(normal @ light, 0.0) * self._inside
         self._cos_half_sq = (normal @ half) ** 2
 
+    @property
+    def passes(self) -> float:
+        return self.counter.count
+
     def shade(self, vector: NDArray) -> NDArray:
         alpha_sq = vector[3] ** 4
         lobe = alpha_sq / (np.pi * (self._cos_half_sq * (alpha_sq - 1.0) + 1.0) ** 2)
@@ -50,7 +55,7 @@ class SphereRenderer:
         return 3.0 * shaded * self._cos_light[..., None]
 
     def image(self, vector: NDArray[np.float64], *, seed: int, spp: int) -> Pixels:
-        self.passes += 1.0
+        self.counter.add(1.0)
         self.calls.append((seed, spp))
         noise = self.noise / np.sqrt(spp) * np.random.default_rng(seed).normal(size=(SIZE, SIZE, 3))
         return (self.shade(vector) + noise * self._inside[..., None]).astype(np.float32)
@@ -59,7 +64,7 @@ class SphereRenderer:
         self, vector: NDArray[np.float64], *, seed: int, spp: int
     ) -> tuple[Pixels, Callable[[Pixels], NDArray[np.float64]]]:
         def pullback(gradient: Pixels) -> NDArray[np.float64]:
-            self.passes += 2.0
+            self.counter.add(2.0)
             tangents = 1e-20j * np.eye(len(vector))  # complex steps: derivatives to float64 rounding
             return np.array([np.sum(gradient * self.shade(vector + t).imag * 1e20) for t in tangents])
 

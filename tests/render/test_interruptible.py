@@ -11,6 +11,7 @@ import pytest
 
 from mfo_backend.fit.paper.adam_stage import SCHEDULES, run_stage
 from mfo_backend.render.interruptible import InterruptibleRenderer, NativeThread
+from mfo_backend.render.pass_counter import PassCounter
 from mfo_backend.render.renderer import Interrupted
 from mfo_backend.solve.adam import Adam
 from mfo_backend.solve.stopping import StoppingRules
@@ -28,14 +29,18 @@ class Grey:
     start = np.array([0.9])
 
     def __init__(self, slow: int, where: str = "image") -> None:
-        self.passes, self.calls, self.slow, self.where = 0.0, 0, slow, where
+        self.counter, self.calls, self.slow, self.where = PassCounter(), 0, slow, where
         self.threads: set[int] = set()
         self.asked = threading.Event()
+
+    @property
+    def passes(self):
+        return self.counter.count
 
     def image(self, vector, *, seed, spp):
         self.threads.add(threading.get_ident())
         self.calls += 1
-        self.passes += 1.0
+        self.counter.add(1.0)
         self.wait("image")
         return np.full((1, 1, 3), vector[0], np.float32)
 

@@ -16,25 +16,20 @@ class WrappedRenderer:
     def __init__(self, renderer: Renderer) -> None:
         self._renderer = renderer
         self.model, self.table, self.start = renderer.model, renderer.table, renderer.start
-        self.passes = renderer.passes
+        self.counter = renderer.counter
+
+    @property
+    def passes(self) -> float:
+        """See `Renderer.passes`."""
+        return self.counter.count
 
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`."""
-        image = self._renderer.image(vector, seed=seed, spp=spp)
-        self.passes = self._renderer.passes
-        return image
+        return self._renderer.image(vector, seed=seed, spp=spp)
 
     def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Pullback]:
         """See `Renderer.image_and_pullback`."""
-        image, pullback = self._renderer.image_and_pullback(vector, seed=seed, spp=spp)
-        self.passes = self._renderer.passes
-
-        def counted(pixel_gradient: Pixels) -> Vector:
-            gradient = pullback(pixel_gradient)
-            self.passes = self._renderer.passes
-            return gradient
-
-        return image, counted
+        return self._renderer.image_and_pullback(vector, seed=seed, spp=spp)
 
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer.target_mask`."""

@@ -251,11 +251,12 @@ class Verification:
 
         Numbers belong to places in the launch, so the first part has the same whatever follows.
         """
-        passes = self._renderer.passes
         pixels = np.concatenate([part for part in parts for _ in (0, 1)])
         seed = ((self._seed if seed is None else seed) + after * _NEXT_SAMPLE) % 2**32
-        later = self._renderer.pixels_later(vector, pixels, seed=seed, spp=samples)
-        self._renderer.passes = passes + len(pixels) / (2 * self._mask.size) * samples / self._most
+        counter = self._renderer.counter
+        with counter.uncounted():  # it counts any number of samples as one pass
+            later = self._renderer.pixels_later(vector, pixels, seed=seed, spp=samples)
+        counter.add(len(pixels) / (2 * self._mask.size) * samples / self._most)
 
         def wait() -> _Halves:
             found = np.split(later(), np.cumsum([len(part) for part in parts for _ in (0, 1)])[:-1])

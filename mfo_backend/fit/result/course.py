@@ -136,9 +136,8 @@ class Course:
             self._shown = self._began
         if stage.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
             return
-        passes = self._renderer.passes
-        self._listener(Preview(stage.picture(stage.best)))
-        self._renderer.passes = passes  # how many previews there are depends on the clock, and the fit needs none
+        with self._renderer.counter.uncounted():  # how many previews there are depends on the clock
+            self._listener(Preview(stage.picture(stage.best)))
         stage.best, self._shown = None, time.monotonic()
 
     def reached(self, stage: Stage, x: Vector, loss: float) -> None:

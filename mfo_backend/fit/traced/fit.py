@@ -170,9 +170,7 @@ def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -
     block = math.ceil(math.sqrt(height * width * _PREVIEW_SPP / _PREVIEW_PATHS))
     rows, columns = (np.arange(min(block // 2, n - 1), n, block) for n in shape)
     pixels = (rows[:, None] * width + columns).ravel()
-    passes = paths.renderer.passes
     seen = paths.images(x[None], pixels, seed=seed, samples=_PREVIEW_SPP, jacobian=False)[0, :, :, 0]
-    paths.renderer.passes = passes  # no part of the fit
     coarse = seen.reshape(len(rows), len(columns), 3)
     filled = np.repeat(np.repeat(coarse, block, axis=0), block, axis=1)
     short = ((0, max(0, height - len(filled))), (0, max(0, width - filled.shape[1])), (0, 0))

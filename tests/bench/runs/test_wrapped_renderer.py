@@ -6,22 +6,28 @@ from __future__ import annotations
 import numpy as np
 
 from mfo_backend.bench.runs.wrapped_renderer import NewSeeds, Watched
+from mfo_backend.render.pass_counter import PassCounter
 
 
 class Counting:
-    model, table, start, passes = "model", None, np.zeros(2), 0.0
+    model, table, start = "model", None, np.zeros(2)
 
     def __init__(self):
+        self.counter = PassCounter()
         self.seeds = []
+
+    @property
+    def passes(self):
+        return self.counter.count
 
     def image(self, vector, *, seed, spp):
         self.seeds.append(seed)
-        self.passes += 1.0
+        self.counter.add(1.0)
         return np.full((2, 2, 3), vector.sum())
 
     def image_and_pullback(self, vector, *, seed, spp):
         def pullback(gradient):
-            self.passes += 2.0
+            self.counter.add(2.0)
             return np.full(2, gradient.sum())
 
         return self.image(vector, seed=seed, spp=spp), pullback

@@ -18,6 +18,7 @@ from mfo_backend.fit.judge.verification import (
     Verification,
 )
 from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.render.pass_counter import PassCounter
 from mfo_backend.render.widened_mask import widened
 from mfo_backend.types.image import Encoding, Image
 
@@ -31,12 +32,16 @@ class Renderer:
     """Grey pictures of the vector's first value with noise that seeds and places in a launch decide."""
 
     def __init__(self, noise: float = NOISE, shape=SHAPE) -> None:
-        self.passes, self.taken, self._noise, self._shape = 0.0, [], noise, shape
+        self.counter, self.taken, self._noise, self._shape = PassCounter(), [], noise, shape
+
+    @property
+    def passes(self):
+        return self.counter.count
 
     def pixels_later(self, vector, pixels, *, seed, spp):
         assert spp == 1 or len(pixels) * spp <= 2 * MOST_WHOLE
         self.taken.append((float(vector[0]), seed, spp, len(pixels)))
-        self.passes += 1.0
+        self.counter.add(1.0)
         noise = np.random.default_rng(seed).normal(size=(len(pixels), 3)) * self._noise / np.sqrt(spp)
         return lambda: (vector[0] + noise).astype(np.float32)
 

@@ -91,7 +91,8 @@ def test_another_fit_of_the_same_kind_compiles_nothing(case, tmp_path):
 
 def test_no_picture_is_rendered_for_a_material_that_recorded_paths_refuse(tmp_path, monkeypatch):
     """The picture of the start is begun early, but not before it is known that the fit goes this way."""
-    from mfo_backend.fit.recover_material import recover_material
+    from mfo_backend.fit.judge.fit_task import check_task
+    from mfo_backend.fit.recorded.fit import RecordedRoute
     from mfo_backend.types.errors import UnrecordableError
 
     sockets = {n: {"value": v, "linked": False} for n, v in GLASS[0].items()}
@@ -105,5 +106,7 @@ def test_no_picture_is_rendered_for_a_material_that_recorded_paths_refuse(tmp_pa
     reference = Image(renderer.image(renderer.start, seed=1, spp=4), Encoding.LINEAR)
     before = renderer.passes
     with pytest.raises(UnrecordableError):
-        recover_material(renderer, reference, FitSettings(), listener=lambda event: None, should_stop=lambda: False)
+        RecordedRoute(
+            check_task(renderer, reference, FitSettings(), None, lambda event: None, lambda: False), renderer, None
+        )
     assert renderer.passes == before
