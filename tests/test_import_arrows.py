@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -63,3 +63,61 @@ def test_addon_imports_nothing_of_the_backend(path: Path) -> None:
 def test_files_stay_small(path: Path) -> None:
     lines = len(path.read_text("utf-8").splitlines())
     assert lines <= 400, f"{short(path)} has {lines} lines; split it by what it holds"
+
+
+# Rooms of fit/ from the ground up; those of one floor do not know each other. A file of fit/ itself is a room, too.
+FIT_FLOORS = [
+    {"settings", "plans", "tolerances", "random_streams"},
+    {"result"},
+    {"squares"},
+    {"search", "certainty"},
+    {"judge"},
+    {"alike"},
+    {"recorded", "traced", "paper"},
+    {"recover_material"},
+]
+FIT = ROOT / "mfo_backend" / "fit"
+# What has rooms; the other layers are flat and each file in them is a topic of its own
+IN_ROOMS = [FIT, ROOT / "mfo_backend" / "bench", ROOT / "studies"]
+MOST_FILES = 14
+
+
+@pytest.mark.parametrize("path", sorted(FIT.rglob("*.py")), ids=short)
+def test_rooms_of_fit_import_what_lies_below_them(path: Path) -> None:
+    floor = {room: number for number, rooms in enumerate(FIT_FLOORS) for room in rooms}
+    parts = path.relative_to(FIT).with_suffix("").parts
+    if parts == ("__init__",):
+        return
+    for name in imports_of(path, ROOT / "mfo_backend"):
+        layer, room = [*name.split("."), "", ""][1:3]
+        if name.startswith("mfo_backend.") and layer == "fit" and room != parts[0]:
+            assert floor[room] < floor[parts[0]], f"{short(path)} imports {name}: an arrow that does not point down"
+
+
+@pytest.mark.parametrize("folder", [d for top in IN_ROOMS for d in (top, *top.rglob("*")) if d.is_dir()], ids=short)
+def test_a_room_can_be_seen_at_one_glance(folder: Path) -> None:
+    files = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
+    assert len(files) <= MOST_FILES, f"{short(folder)} has {len(files)} files; give some of them a room of their own"
+
+
+@pytest.mark.parametrize(
+    ("files", "package"), [(BACKEND_FILES, "mfo_backend"), (ADDON_FILES[1:], "blender_addon")], ids=["backend", "addon"]
+)
+def test_no_files_import_each_other_in_a_circle(files: list[Path], package: str) -> None:
+    """Imports inside of functions count, too: they only hide the circle."""
+    modules = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
+    arrows = {
+        module: {_module(name, modules) for name in imports_of(path, ROOT / package)} - {module, ""}
+        for module, path in modules.items()
+    }
+    clear: set[str] = set()
+    while ready := {module for module in arrows if module not in clear and arrows[module] <= clear}:
+        clear |= ready
+    assert sorted(set(arrows) - clear) == [], "some of these import each other in a circle"
+
+
+def _module(name: str, modules: Collection[str]) -> str:
+    """The file that a dotted name is in, the longest first; empty for those of other packages."""
+    while name and name not in modules:
+        name = name.rpartition(".")[0]
+    return name

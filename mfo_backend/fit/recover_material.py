@@ -16,13 +16,13 @@ from ..types.event import Listener, Preview, Started
 from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
-from .judge.checked_reference import GAP_STREAM
 from .judge.fit_task import FitTask, check_task
 from .judge.model_gap import model_gap
 from .judge.picture_errors import picture_errors
 from .judge.verification import VerifiedEnd, Verifier
 from .paper.fit import PaperRoute
 from .plans import RecordedPlan
+from .random_streams import Stream
 from .recorded.fit import RecordedRoute
 from .result.outcome import Candidate, FitOutcome, RouteEnds, final_result
 from .settings import FitSettings
@@ -166,12 +166,13 @@ def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:
     """
     if isinstance(end, VerifiedEnd):
         return end.halves
-    seed, spp = task.settings.seed ^ GAP_STREAM, max(task.settings.verify_spp // 2, 1)
+    seeds = [Stream.GAP.seed(task.settings.seed, half) for half in (0, 1)]
+    spp = max(task.settings.verify_spp // 2, 1)
     if task.should_stop():
         return None
     try:
         with task.renderer.counter.uncounted():  # the result is known without them
-            first, second = (task.renderer.image(end.vector, seed=seed ^ k, spp=spp) for k in (0, 1))
+            first, second = (task.renderer.image(end.vector, seed=seed, spp=spp) for seed in seeds)
     except Interrupted:
         return None
     return first, second

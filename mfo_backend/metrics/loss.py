@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -22,9 +23,20 @@ from .response import OnDisplay, Response, Scaled, displayed_by, logarithmic_for
 from .squared_loss import SquaredLoss
 from .tone_mapping import DisplayView, View
 
-__all__ = ["DISPLAY_NITS", "LOSS_NAMES", "OPTIONAL_LOSS_NAMES", "Loss", "ResidualLoss", "make_loss"]
+__all__ = ["DISPLAY_NITS", "LOSS_NAMES", "OPTIONAL_LOSS_NAMES", "Loss", "ResidualLoss", "make_loss", "squared_response"]
 
 DISPLAY_NITS = 100.0  # white of a display in cd/m^2 (IEC 61966-2-1 has 80, a usual monitor is set brighter)
+
+# Squared losses by kind. Their response is a function of light in cd/m^2 ...
+ABSOLUTE_RESPONSES: dict[str, Callable[[float], Response]] = {"pu21": Pu21, "itp": Itp}
+# ... or, for scene-linear pixels, of the reference and the pixels that see the object
+HDR_RESPONSES: dict[str, Callable[[Pixels, NDArray[np.bool_] | None], Response]] = {
+    "mse": lambda target, mask: Scaled(),
+    "log": lambda target, mask: logarithmic_for(target),
+    "relative": lambda target, mask: relative_to(target),
+    "pu21": lambda target, mask: Pu21(nits_per_unit(target, mask)),
+    "itp": lambda target, mask: Itp(nits_per_unit(target, mask)),
+}
 
 
 class Loss(Protocol):
@@ -95,7 +107,7 @@ def make_loss(
             return HdrFlipLoss(name, target, lit_exposures(target, mask))
         if name in OPTIONAL_HDR_LOSSES:
             return hdr_perceptual_loss(name, target, nits_per_unit(target, mask))
-        response = _hdr_response(kind, target, mask)
+        response = HDR_RESPONSES[kind](target, mask)
         return SquaredLoss(name, response.apply(target), response)
 
     if reference.encoding is Encoding.SRGB:
@@ -110,19 +122,32 @@ def make_loss(
         return SquaredLoss(name, srgb_from_linear(light), displayed_by(view))
     if name in OPTIONAL_LDR_LOSSES:
         return ldr_perceptual_loss(name, light, view, DISPLAY_NITS)
-    on_light = _absolute_response(kind, DISPLAY_NITS)
+    on_light = ABSOLUTE_RESPONSES[kind](DISPLAY_NITS)
     return SquaredLoss(name, on_light.apply(light), OnDisplay(view, on_light))
 
 
-def _hdr_response(kind: str, target: Pixels, mask: NDArray[np.bool_] | None) -> Response:
-    if kind == "mse":
-        return Scaled()
-    if kind == "log":
-        return logarithmic_for(target)
-    if kind == "relative":
-        return relative_to(target)
-    return _absolute_response(kind, nits_per_unit(target, mask))
+def squared_response(name: str, light: Pixels, mask: NDArray[np.bool_] | None, view: View) -> Response:
+    """What the loss of this name takes the squared differences of, as a function of scene-linear pixels.
 
+    Parameters
+    ----------
+    name
+        A loss that is a sum of squares, as `make_loss` has it.
+    light, mask
+        The reference as scene-linear radiance (height, width, 3), and its pixels that see the object.
+    view
+        What an LDR loss looks through.
 
-def _absolute_response(kind: str, nits: float) -> Response:
-    return Pu21(nits) if kind == "pu21" else Itp(nits)
+    Raises
+    ------
+    BadInputError
+        If the loss is no sum of squares.
+    """
+    kind, dynamic_range = name.split("-")
+    if dynamic_range == "hdr" and kind in HDR_RESPONSES:
+        return HDR_RESPONSES[kind](light, mask)
+    if name == "mse-ldr":
+        return displayed_by(view)
+    if dynamic_range == "ldr" and kind in ABSOLUTE_RESPONSES:
+        return OnDisplay(view, ABSOLUTE_RESPONSES[kind](DISPLAY_NITS))
+    raise BadInputError(f"Loss {name} is no sum of squares: only a stage that minimises it by its gradient can use it.")

@@ -15,9 +15,6 @@ from ...types.image import Image, Pixels
 from ..settings import FitSettings
 from .region import MaskedLoss, fill_outside
 
-VERIFY_STREAM = 0x5EED0000  # far from the seeds users choose, so that no iteration saw these random numbers
-GAP_STREAM = 0x6A500000  # apart from the seeds users choose and from those of the verification
-
 
 def check_reference(reference: Image, mask: NDArray[np.bool_]) -> None:
     """Raise `BadInputError` unless the reference has the size of `mask` and shows something where the target is."""

@@ -19,8 +19,8 @@ from ...render.mitsuba_renderer import MitsubaRenderer
 from ...render.renderer import Vector
 from ...render.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
+from ..random_streams import Stream
 from ..result.outcome import Candidate
-from .checked_reference import VERIFY_STREAM
 from .region import blocks_around
 
 FIRST_SAMPLES = 16  # of a pixel of a comparison: a quarter of the noise (squares) of a reference of 4 samples
@@ -138,7 +138,7 @@ class Verification:
         self._near = blocks_around(mask, self._side)
         self._compared = full_blocks(mask[self._near], self._side)
         self._reference = self._displayed(reference)
-        self._seed = seed ^ VERIFY_STREAM
+        self._seed = Stream.VERIFY.seed(seed)
         close = widened(mask, BLURRED)
         self._looked_at, self._around = np.flatnonzero(close), np.flatnonzero(~close)
         # of one half, as all counts of samples from here on

@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 
 from ...render.renderer import Interrupted, Renderer, Vector
 from ...types.image import Pixels
-from ..judge.checked_reference import VERIFY_STREAM, stage_losses
+from ..judge.checked_reference import stage_losses
 from ..judge.fit_task import FitTask
+from ..random_streams import Stream
 from ..result.outcome import Candidate, Choice, End, RouteEnds
 from .loop import run_stages
 
@@ -36,7 +37,7 @@ class PaperRoute:
         image, mask = self._start.image, task.mask
         self._losses = stage_losses(self.stages, task.reference, image, mask, settings, task.display)
         self.verification = WholePictures(
-            renderer, seed=settings.seed ^ VERIFY_STREAM, spp=settings.verify_spp, should_stop=task.should_stop
+            renderer, seed=Stream.VERIFY.seed(settings.seed), spp=settings.verify_spp, should_stop=task.should_stop
         )
 
     def fit(self) -> RouteEnds:

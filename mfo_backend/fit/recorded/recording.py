@@ -16,6 +16,7 @@ from ...render.recorded_scene import RecordedScene
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..plans import RecordedPlan
+from ..random_streams import Stream
 from ..result.course import Course
 from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual, MakeWeighted, OneSidedResidual, WeightedResidual
@@ -101,7 +102,9 @@ class Setting:
 
         A recording takes most of the memory of a fit: let the one before go first.
         """
-        paths = self.scene.record(x, grid=grid, seed=self.seed + number, near=near, samples=samples, **more)
+        paths = self.scene.record(
+            x, grid=grid, seed=Stream.RECORDINGS.seed(self.seed, number), near=near, samples=samples, **more
+        )
         return Recording(self, paths, number, thinned)
 
 

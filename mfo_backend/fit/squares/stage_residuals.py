@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stages that follow `refine` in a recorded fit: least squares on other residuals of the same recording."""
+"""The stages that follow the least squares of a fit: squares of named losses of the same pixels."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.itp import Itp
-from ...metrics.loss import DISPLAY_NITS
-from ...metrics.pu21 import Pu21
-from ...metrics.response import OnDisplay, Response, Scaled, displayed_by, logarithmic_for, nits_per_unit
+from ...metrics.loss import squared_response
 from ...metrics.tone_mapping import View
 from ...types.image import Encoding, Pixels
 from ..settings import FitSettings
@@ -46,22 +43,7 @@ def finishing_residuals(
 
 
 def _residual(name: str, light: Pixels, mask: NDArray[np.bool_], view: View) -> MakeResidual:
-    if name == "relative-hdr":
+    if name == "relative-hdr":  # relative to each pixel, so its response is none of a group of them
         return RelativeResidual
-    response = _response(name, light, mask, view)
+    response = squared_response(name, light, mask, view)
     return lambda target: ResponseResidual(response, target)
-
-
-def _response(name: str, light: Pixels, mask: NDArray[np.bool_], view: View) -> Response:
-    """What the loss of this name squares the differences of, as `metrics.loss.make_loss` has it."""
-    kind, dynamic_range = name.split("-")
-    if name == "mse-hdr":
-        return Scaled()
-    if name == "log-hdr":
-        return logarithmic_for(light)
-    if name == "mse-ldr":
-        return displayed_by(view)
-    ldr = dynamic_range == "ldr"
-    nits = DISPLAY_NITS if ldr else nits_per_unit(light, mask)
-    response = Pu21(nits) if kind == "pu21" else Itp(nits)
-    return OnDisplay(view, response) if ldr else response

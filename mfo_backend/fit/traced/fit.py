@@ -15,11 +15,11 @@ from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..certainty.covariance import WEAK_BELOW, certainties
-from ..judge.checked_reference import VERIFY_STREAM
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import VISIBLE, PictureJudge
 from ..judge.verification import Verification
 from ..plans import TransmissionPlan
+from ..random_streams import Stream
 from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds, kept_note
 from ..squares.stage_residuals import finishing_residuals
@@ -83,7 +83,7 @@ class TracedRoute:
             task.listener,
             should_stop,
             task.began,
-            picture=lambda x: _preview(paths, x, task.mask.shape, seed ^ VERIFY_STREAM),
+            picture=lambda x: _preview(paths, x, task.mask.shape, Stream.PREVIEW.seed(seed)),
         )
         fit = TransmissionFit(paths, renderer.start, task.light, task.mask, self._plan, seed, course, task.clipped)
 

@@ -12,9 +12,9 @@ from ...metrics.tone_mapping import View
 from ...render.recorded_image import TwoSamples
 from ...types.image import Image, Pixels
 from ..judge.model_gap import model_gap
+from ..random_streams import Stream
 from .pictures import TracedTiles
 
-STREAM = 0x6F000000  # random numbers of no other stage
 WORTH = 0.02  # relative difference of blocks of pixels that noise does not explain; less is hard to see
 MOST_PIXELS = 1 << 16  # whole pictures are needed; of more pixels one takes too long
 # Of a half of a picture. With fewer, noise decides some results (docs/notebook/glass.md); with a quarter, a difference
@@ -74,7 +74,7 @@ class LinearPictures:
         return image
 
     def _traced(self, x: Vector, turn: int) -> tuple[Rows, Rows] | None:
-        seed, pictures = (self._seed ^ STREAM) + turn, self._pictures
+        seed, pictures = Stream.LINEAR_PICTURES.seed(self._seed, turn), self._pictures
         table = pictures.tables(self.tiles.pixels, x[None], seed, self._samples, jacobian=turn > 0)
         if pictures.should_stop():
             return None

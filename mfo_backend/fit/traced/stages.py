@@ -15,10 +15,12 @@ from ...solve.noisy_least_squares import cautious_step
 from ...types.image import Pixels
 from ..alike.unneeded_lobes import values_off
 from ..plans import TransmissionPlan
+from ..random_streams import Stream
 from ..result.course import Course, Stage
+from .choose_end import GUARD_PARTS, choose_end
 from .pictures import GEOMETRIC, SECANT_BELOW, TracedTiles, is_unsure, two_half_equations
 from .polished import AMOUNTS, CORE, Polished, without_lobe
-from .sample_count import MOST_COUNT
+from .sample_count import MOST_COUNT, Recount
 from .sample_pools import TilePools
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -33,7 +35,6 @@ COAT = 0.3  # weight they start from
 SURELY_OFF = 0.05  # of the range: standard deviation of an amount that can be told from none
 TILE_SIZES = (1, 2, 4, 8)
 DIFFERENT = 0.12  # of the range, in any value: points that are worth to be followed both
-GUARD_PARTS = 4
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
 LEAST_STEPS = 4  # two steps alone once looked settled with a value off by a tenth of its range
 MOST_SAMPLES = 16  # of a pixel in a step of the polish
@@ -46,7 +47,6 @@ MOST_COUNTINGS = 3  # of the reference's samples
 COUNTED_STEPS = 3  # between them
 STILL = 0.25  # relative change of a count
 RIVALS = 3  # other ends of a race
-MOST_RETURNS = 2  # of values to the user's
 
 
 @dataclass
@@ -105,7 +105,9 @@ class TransmissionFit:
             equations: list[NormalEquations] = []
             order = np.arange(len(xs))
             for turn in range(plan.scan_steps + 1):
-                rows = self.pictures.halves(tiles, xs, seed=self._seed(1), samples=plan.scan_samples, moving=False)
+                rows = self.pictures.halves(
+                    tiles, xs, seed=Stream.SCAN.seed(self.seed), samples=plan.scan_samples, moving=False
+                )
                 equations = [two_half_equations(*pair) for pair in rows]
                 order = np.argsort([e.cost for e in equations])
                 self._note(stage, xs[order[0]], equations[order[0]].cost)
@@ -128,12 +130,16 @@ class TransmissionFit:
             best, cost = runners[0], np.inf
             for turn in range(plan.race_steps + 1):
                 trials = [r.x if r.equations is None else r.x + self._damped(r) for r in runners]
-                rows = self.pictures.halves(tiles, np.array(trials), seed=self._seed(2), samples=plan.race_samples)
+                rows = self.pictures.halves(
+                    tiles, np.array(trials), seed=Stream.RACE.seed(self.seed), samples=plan.race_samples
+                )
                 if self.course.should_stop():
                     break
                 if few and turn == 0 and is_unsure(*rows[0]):
                     tiles = self.pictures.tiles(4, 2 * plan.race_pixels)
-                    rows = self.pictures.halves(tiles, np.array(trials), seed=self._seed(3), samples=plan.race_samples)
+                    rows = self.pictures.halves(
+                        tiles, np.array(trials), seed=Stream.RACE_MORE_PIXELS.seed(self.seed), samples=plan.race_samples
+                    )
                 for runner, trial, pair in zip(runners, trials, rows, strict=True):
                     self._accept(runner, trial, two_half_equations(*pair))
                 runners.sort(key=lambda r: r.equations.cost if r.equations else np.inf)
@@ -186,18 +192,18 @@ class TransmissionFit:
             x, user, ends = self._counted(stage, start), self.table.clip(self.start), []
             off = useless = np.zeros(self.table.length, bool)
             if self._extras.any():
-                x = self._pool(stage, x, self._extras, stream=50).x
+                x = self._pool(stage, x, self._extras, Stream.POLISH_GLASS).x
                 amounts = self.table.mask_of(AMOUNTS)
                 details = self._extras & ~amounts
                 if amounts.any() and details.any():
                     # how much there is of a lobe before its details: together they may trade places with the glass
                     x = self._coated(stage, x)
-                    ends.append(replace(self._pool(stage, x, details, stream=70), unseen=details))
+                    ends.append(replace(self._pool(stage, x, details, Stream.POLISH_LOBES), unseen=details))
                     off = ends[-1].unneeded(self.table, user, useless, SURELY_OFF)
                     useless = without_lobe(off, self.table, user)
                     x = np.where(off, user, ends[-1].x)
-            ends.append(replace(self._pool(stage, x, off | useless, stream=10), unseen=useless))
-            for turn in range(MOST_RETURNS):
+            ends.append(replace(self._pool(stage, x, off | useless, Stream.POLISH), unseen=useless))
+            for stream in (Stream.POLISH_RETURNED, Stream.POLISH_RETURNED_AGAIN):
                 last = ends[-1]
                 unseen = last.undetermined(self.table, user)
                 unneeded = last.unneeded(self.table, user, unseen)
@@ -205,7 +211,7 @@ class TransmissionFit:
                 kept = last.kept | unseen | unneeded
                 if not np.any(unseen | unneeded) or kept.all() or self.course.should_stop():
                     break
-                end = self._pool(stage, np.where(kept, user, last.x), kept, stream=100 + 50 * turn)
+                end = self._pool(stage, np.where(kept, user, last.x), kept, stream)
                 ends.append(replace(end, unseen=last.unseen | unseen))
             stage.vector = ends[-1].x
         return ends
@@ -226,7 +232,7 @@ class TransmissionFit:
         frozen = self._extras & ~table.mask_of(lobe[:1])
         tiles, best = self.pictures.tiles(4, plan.coat_pixels), x
         for _ in range(plan.scan_steps + 1):
-            rows = self.pictures.halves(tiles, xs, seed=self._seed(40), samples=plan.race_samples)
+            rows = self.pictures.halves(tiles, xs, seed=Stream.COAT.seed(self.seed), samples=plan.race_samples)
             if self.course.should_stop():
                 return x
             equations = [two_half_equations(*pair) for pair in rows]
@@ -243,16 +249,18 @@ class TransmissionFit:
         count, few = 0, self.plan.counted_paths // 4
         for turn in range(MOST_COUNTINGS):
             most = (4 * few if turn else few) // MOST_COUNT
-            counts = self.pictures.count_samples(x, most, self._seed(5000 + 100 * turn))
+            counts = self.pictures.count_samples(x, most, Stream.COUNT.seed(self.seed, 100 * turn))
             if counts is None or abs(counts.count - count) <= STILL * count or self.course.should_stop():
                 break
             count = counts.count
             starts = [x] if turn else [x, *self.rivals]
             ends = [
-                self._pool(stage, start, self._extras, 200 + 10 * turn, steps=COUNTED_STEPS, paths=few).x
+                self._pool(
+                    stage, start, self._extras, Stream.POLISH_COUNTED, 10 * turn, steps=COUNTED_STEPS, paths=few
+                ).x
                 for start in starts
             ]
-            x = ends[self.choose(ends)]
+            x = ends[self.choose(ends, Stream.CHOOSE_COUNTED, GUARD_PARTS * turn)]
         return x
 
     def _pool(
@@ -260,12 +268,16 @@ class TransmissionFit:
         stage: Stage,
         start: Vector,
         frozen: NDArray[np.bool_],
-        stream: int,
+        stream: Stream,
+        first: int = 0,
         *,
         steps: int | None = None,
         paths: int | None = None,
     ) -> Polished:
-        """A polish from `start` with the `frozen` values held; `paths` of a step bound those at equal counts."""
+        """A polish from `start` with the `frozen` values held; `paths` of a step bound those at equal counts.
+
+        Every step has a number of its own in `stream`, from `first` on.
+        """
         plan, counts = self.plan, self.pictures.counts
         x, equations, size = start.copy(), None, 0
         most = plan.polish_pixels
@@ -281,7 +293,7 @@ class TransmissionFit:
             unseen /= counts.mean_noise  # differences count in deviations of the noise
         moved, settled = 0.0, 0
         for turn in range(steps or plan.polish_steps):
-            (table,) = self.pictures.tables(pools.pixels, x[None], self._seed(stream + turn), samples)
+            (table,) = self.pictures.tables(pools.pixels, x[None], stream.seed(self.seed, first + turn), samples)
             if self.course.should_stop():
                 break
             table[..., 1:][..., frozen] = 0.0
@@ -314,7 +326,7 @@ class TransmissionFit:
             x = x + self._step(equations, x, 1e-3, 0.1, frozen)
             stage.vector = x
         covariance, noise = pools.covariance(equations, size, self._width)
-        again = self.pictures.recount(x, pools.pixels, self._seed(3000 + stream)) if steps is None else None
+        again = self._recount(x, pools, stream) if steps is None else None
         if again is not None and not self.course.should_stop():
             away = pools.answer(again.slope, equations, size, self._width)
             x = self.table.clip(x + again.log_ratio * away)
@@ -327,37 +339,9 @@ class TransmissionFit:
         parts = [self.table.slice_of(name) for name in GEOMETRIC if name in self.table.names]
         return max((float(np.max(np.abs(step[part]) / self._width[part])) for part in parts), default=0.0)
 
-    def choose(self, candidates: list[Vector]) -> int:
-        """The first candidate, unless a later one is better by two standard errors on paths that none has seen.
-
-        Nor does a third take the place of that one unless it is better than it by as much.
-        """
-        if len(candidates) == 1:
-            return 0
-        xs, samples, most = np.array(candidates), self.plan.guard_samples, self.plan.polish_pixels
-        counts = self.pictures.counts
-        if counts is not None:
-            samples = counts.count
-            most = min(most, self.plan.counted_paths // (len(candidates) * samples))
-        tiles = self.pictures.tiles(4, most)
-        parts: list[Vector] = []
-        chosen = 0
-        for part in range(GUARD_PARTS):
-            rows = self.pictures.halves(tiles, xs, seed=self._seed(999 + part), samples=samples, jacobian=False)
-            if self.course.should_stop():
-                return 0
-            parts.append(
-                np.array([(a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, 3).mean(axis=1) for a, b in rows])
-            )
-            costs, chosen = np.mean(parts, axis=0), 0
-            for other in range(1, len(xs)):
-                mean, error = _gain(costs[chosen], costs[other])
-                chosen = other if mean > 2.0 * error else chosen
-            # more paths only where another looks better and it is not sure
-            left = [_gain(costs[chosen], cost) for cost in costs]
-            if not any(error < mean <= 2.0 * error for mean, error in left):
-                break
-        return chosen
+    def choose(self, candidates: list[Vector], stream: Stream = Stream.CHOOSE, first: int = 0) -> int:
+        """See `choose_end`."""
+        return choose_end(self.pictures, candidates, self.plan, self.seed, stream, first)
 
     def _step(
         self,
@@ -383,14 +367,9 @@ class TransmissionFit:
                 break
         return chosen
 
-    def _seed(self, stream: int) -> int:
-        return (self.seed * 1009 + stream) & 0xFFFFFFFF
+    def _recount(self, x: Vector, pools: TilePools, stream: Stream) -> Recount | None:
+        seed = Stream.RECOUNT.seed(self.seed, stream.value.first)
+        return self.pictures.recount(x, pools.pixels, seed)
 
     def _note(self, stage: Stage, x: Vector, cost: float) -> None:
         self.course.reached(stage, x, float(np.sqrt(max(2.0 * cost, 0.0))))
-
-
-def _gain(costs: Vector, other: Vector) -> tuple[float, float]:
-    """How much less the `other` costs in the mean of the tiles, and the standard error of that."""
-    gain = costs - other
-    return float(gain.mean()), float(gain.std() / np.sqrt(len(gain)))
