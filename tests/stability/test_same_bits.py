@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same job gives the same bits with any number of threads; only times differ."""
+"""The same job gives the same bits with any number of Dr.Jit's threads, glass too; only times differ."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 
 from mfo_backend.scene.image_file import read_image
 
+from ..fit.traced.glass import TRUTH, fit, load
 from .test_extremes import POINT, ROOT, SKY, run
 
 PRESETS, LIGHTS = ("fast", "balanced"), {"point": POINT, "sky": SKY}
@@ -48,6 +50,12 @@ def results(threads: int, folder: Path) -> dict[str, Any]:
             assert result, sentence
             pixels = read_image(job / "job" / "pictures" / "result.exr").pixels
             found[job.name] = [without_times(result), hashlib.sha256(pixels.tobytes()).hexdigest()]
+    (folder / "glass").mkdir()
+    glass = load(folder / "glass", size=24)
+    result, _ = fit(glass, glass.image(glass.table.pack(TRUTH), seed=5, spp=16))
+    certainty = {name: list(known.sd) for name, known in result.certainty.items()}
+    curves = [[[*point[:3], point[4]] for point in map(astuple, stage.curve)] for stage in result.stages]
+    found["glass"] = [{"errors": result.errors, "values": result.recovered, "sd": certainty, "curves": curves}, ""]
     return found
 
 
@@ -62,7 +70,7 @@ def test_threads_change_no_bit(tmp_path: Path) -> None:
         done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=250)
         assert done.returncode == 0, done.stderr[-2000:]
         found.append(json.loads(done.stdout.splitlines()[-1]))
-    assert list(found[0]) == ["fast_point", "fast_sky", "balanced_point", "balanced_sky"]
+    assert list(found[0]) == ["fast_point", "fast_sky", "balanced_point", "balanced_sky", "glass"]
     for name, (result, _) in found[0].items():
         assert "seconds" not in str(result)
         assert result["errors"]["flip"][0] > 0
