@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from mfo_backend.fit.paper.adam_stage import SCHEDULES, run_stage
+from mfo_backend.fit.paper.loop import SCHEDULES, run_stage
 from mfo_backend.render.interruptible import InterruptibleRenderer, NativeThread
 from mfo_backend.render.pass_counter import PassCounter
 from mfo_backend.render.renderer import Interrupted

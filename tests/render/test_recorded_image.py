@@ -75,3 +75,16 @@ def test_groups_have_the_means_of_their_pixels():
     expected = samples.reshape(2, 2, 3, 3, 4).mean(axis=2)
     np.testing.assert_allclose(averaged.mean, expected.mean(axis=0), atol=1e-6)
     np.testing.assert_allclose(averaged.half_difference, 0.5 * (expected[0] - expected[1]), atol=1e-6)
+
+
+def test_a_glance_changes_nothing_that_is_known():
+    evaluate, asked = counted()
+    known = evaluate(np.array([1.0]))
+    assert evaluate.glance(np.array([1.0])) is known
+    assert len(asked) == 1
+    evaluate.glance(np.array([2.0]))
+    assert len(asked) == 2
+    assert evaluate(np.array([1.0])) is known  # the only one that is kept
+    assert len(asked) == 2
+    evaluate(np.array([2.0]))
+    assert len(asked) == 3

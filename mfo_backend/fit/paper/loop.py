@@ -1,27 +1,75 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's course of a fit: every stage is a new optimisation from the best values of the one before."""
+"""The loop of "Multi-Fidelity Optimization for Inverse Material Rendering", as it is in the paper.
+
+Given are one reference R, and a renderer that makes a picture I(x) of the material x with its derivatives.
+
+1. LF: from the user's x, minimise a low-fidelity loss L(I(x), R), the mean square error, until its stopping rule fires.
+2. HF: from the best x of that, begin a *new* optimisation on a high-fidelity loss, FLIP: the optimiser's moments and
+   its rate are those of a beginning (`FitSettings.keep_optimizer_state` keeps them, which the paper tried, too).
+
+A stage stops when for ten iterations its loss does not change, when for ten iterations its best loss does not improve,
+or at the user's maximum of iterations (`solve.stopping`). The paper leaves the optimiser open; this one is Adam
+(`solve.adam`), and `Schedule` says what becomes of its rate. Any list of losses makes as many stages.
+
+With a fixed seed every I(x) of a fit sees the same random numbers, so the losses of two iterates differ by x alone.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...metrics.loss import Loss
-from ...render.renderer import Renderer
+from ...render.renderer import Interrupted, Renderer, Vector
 from ...solve.adam import Adam
-from ...types.event import Listener, Preview, Progress, StageEnd
+from ...solve.stopping import Stopping, StoppingRules
+from ...types.event import Listener
 from ...types.image import Pixels
-from ...types.result import CurvePoint, StageReport
+from ...types.result import StageReport
 from ...types.status import Status
 from ..result.best_so_far import BestSoFar
 from ..result.outcome import Candidate
 from ..settings import FitSettings
-from .adam_stage import SCHEDULES, StageOutcome, Step, run_stage
+from .stage_log import StageLog, Step
 
-_PREVIEW_SECONDS = 1.0  # no more than one preview in this time
+_STRIKES = 3  # steps in a row without a finite loss and gradient after which a stage gives up
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Rates a stage goes through: `levels` of them, each `factor` of the one before.
+
+    With a constant rate near a minimum Adam walks in steps of about that rate. The best loss stops improving, and the
+    rule of ten iterations ends the stage wherever it happens to be; under FLIP that is often at its very start. With
+    more levels each such stall is answered by going back to the best x with a third of the rate and new moments. The
+    stage ends by the same rule at the last level.
+    """
+
+    levels: int = 1
+    factor: float = 1.0 / 3.0
+
+    def rate(self, first: Vector, level: int) -> Vector:
+        """The rate at `level`, counted from 0."""
+        return first * self.factor**level
+
+
+SCHEDULES = {"constant": Schedule(levels=1), "decay": Schedule(levels=4)}
+
+
+@dataclass(frozen=True)
+class StageOutcome:
+    """How a stage ended, and its best iterate with its picture; `vector` is the start where nothing was better."""
+
+    status: Status
+    vector: Vector
+    image: Pixels | None = field(repr=False)
+    loss_start: float
+    loss_best: float
+    iterations: int
 
 
 @dataclass(frozen=True)
@@ -44,7 +92,10 @@ def run_stages(
     clock: Callable[[], float] = time.monotonic,
     began: float | None = None,
 ) -> StagesOutcome:
-    """Minimise the losses one after another; `began` is the time on `clock` at which the fit began."""
+    """The stages: minimise the losses one after another, each from the best x of the one before.
+
+    `began` is the time on `clock` at which the fit began.
+    """
     began = clock() if began is None else began
     candidates, reports, status = [start], [], Status.CONVERGED
     adam = _new_adam(renderer, settings)
@@ -52,7 +103,7 @@ def run_stages(
     for index, loss in enumerate(losses):
         if not settings.keep_optimizer_state:
             adam = _new_adam(renderer, settings)
-        log = _StageLog(renderer, loss.name, index, len(losses), listener, clock, began, best)
+        log = StageLog(renderer, loss.name, index, len(losses), listener, clock, began, best)
         outcome = run_stage(
             renderer,
             loss.value_and_gradient,
@@ -66,90 +117,14 @@ def run_stages(
             should_stop=should_stop,
         )
         status = outcome.status
-        candidates.append(_candidate(outcome, candidates[-1]))
-        reports.append(log.report(outcome))
+        found = candidates[-1] if outcome.image is None else Candidate(outcome.vector, outcome.image)
+        candidates.append(found)
+        reports.append(
+            log.report(status, found.vector, outcome.loss_start, outcome.loss_best, iterations=outcome.iterations)
+        )
         if status in (Status.CANCELLED, Status.FAILED):
             break
     return StagesOutcome(status, tuple(candidates), tuple(reports))
-
-
-class _StageLog:
-    """Turns the steps of one stage into events and its report."""
-
-    def __init__(
-        self,
-        renderer: Renderer,
-        name: str,
-        index: int,
-        count: int,
-        listener: Listener,
-        clock: Callable[[], float],
-        began: float,
-        best: BestSoFar,
-    ) -> None:
-        self._renderer, self._name, self._index, self._count = renderer, name, index, count
-        self._listener, self._clock, self._began, self._best = listener, clock, began, best
-        self._entered = clock()
-        self._previewed = -np.inf
-        self._unseen: Pixels | None = None
-        self._fraction = 0.0
-        self._curve: list[CurvePoint] = []
-
-    def __call__(self, step: Step) -> None:
-        now = self._clock()
-        done = step.iteration / (step.iteration + step.more)
-        self._fraction = max(self._fraction, (self._index + done) / self._count)
-        in_stage = now - self._entered
-        stage_total = in_stage * (step.iteration + step.more) / step.iteration
-        # later stages are thought to take as long as this one; nothing better is known before they run
-        remaining = stage_total - in_stage + stage_total * (self._count - 1 - self._index)
-        seconds = now - self._began
-        self._curve.append(CurvePoint(step.iteration, step.loss, step.best, seconds, self._renderer.passes))
-        self._listener(
-            Progress(
-                stage=self._name,
-                stage_index=self._index,
-                stage_count=self._count,
-                iteration=step.iteration,
-                loss=step.loss,
-                best=step.best,
-                fraction=self._fraction,
-                seconds=seconds,
-                remaining_seconds=remaining,
-            )
-        )
-        if step.improved:
-            self._unseen = step.image
-            self._best.found(self._name, step.vector)
-        self._best.tell(now)
-        if self._unseen is not None and now - self._previewed >= _PREVIEW_SECONDS:
-            self._previewed = now
-            self._listener(Preview(self._unseen))
-            self._unseen = None
-
-    def report(self, outcome: StageOutcome) -> StageReport:
-        status = outcome.status
-        self._best.tell(self._clock(), at_once=True)
-        self._listener(
-            StageEnd(
-                stage=self._name,
-                status=status.value,
-                sentence=status.sentence,
-                iterations=outcome.iterations,
-                loss_start=outcome.loss_start,
-                loss_best=outcome.loss_best,
-            )
-        )
-        return StageReport(
-            name=self._name,
-            status=status,
-            loss_start=outcome.loss_start,
-            loss_best=outcome.loss_best,
-            iterations=outcome.iterations,
-            seconds=self._clock() - self._entered,
-            values=self._renderer.table.unpack(outcome.vector),
-            curve=tuple(self._curve),
-        )
 
 
 def _new_adam(renderer: Renderer, settings: FitSettings) -> Adam:
@@ -157,5 +132,78 @@ def _new_adam(renderer: Renderer, settings: FitSettings) -> Adam:
     return Adam(lower, upper, settings.learning_rate * (upper - lower))
 
 
-def _candidate(outcome: StageOutcome, before: Candidate) -> Candidate:
-    return before if outcome.image is None else Candidate(outcome.vector, outcome.image)
+def run_stage(
+    renderer: Renderer,
+    value_and_gradient: Callable[[Pixels], tuple[float, Pixels]],
+    start: Vector,
+    adam: Adam,
+    *,
+    rules: StoppingRules,
+    schedule: Schedule,
+    seed: int,
+    spp: int,
+    on_step: Callable[[Step], None],
+    should_stop: Callable[[], bool],
+) -> StageOutcome:
+    """One stage: x <- Adam(x, dL/dx), dL/dx = (dI/dx)^T dL/dI, until a stopping rule fires.
+
+    The rate of `adam` is that of the schedule's first level. A step that leads to a loss or gradient that is not finite
+    is taken back half way to the best iterate; three in a row end the stage.
+    """
+    stopping = Stopping(rules)
+    first_rate, level, strikes = adam.rate, 0, 0
+    x, best = start, start
+    best_loss, best_image, loss_start = math.inf, None, math.nan
+    status = None
+    while status is None:
+        if should_stop():
+            status = Status.CANCELLED
+            break
+        try:
+            image, pullback = renderer.image_and_pullback(x, seed=seed, spp=spp)
+        except Interrupted:
+            status = Status.CANCELLED
+            break
+        loss, pixel_gradient = value_and_gradient(image)
+        if stopping.iterations == 0:
+            loss_start = loss
+        improved = loss < best_loss
+        if improved:
+            best, best_loss, best_image = x, loss, image
+        status = stopping.observe(loss)
+        more = _expected_iterations(stopping, schedule.levels - 1 - level)
+        more = more if status is None else 0.0
+        on_step(Step(stopping.iterations, loss, best_loss, more, improved, x, image))
+
+        may_go_on = level + 1 < schedule.levels and stopping.iterations < rules.max_iterations
+        if status is Status.STALE and may_go_on:
+            level += 1
+            adam.rate = schedule.rate(first_rate, level)
+            adam.reset()
+            stopping.resume()
+            x, status = best, None
+            continue
+        if status is not None:
+            break
+        try:
+            gradient = pullback(pixel_gradient) if math.isfinite(loss) else np.full_like(x, math.nan)
+        except Interrupted:
+            status = Status.CANCELLED
+            break
+        if np.isfinite(gradient).all():
+            strikes = 0
+            x = adam.step(x, gradient)
+            continue
+        strikes += 1
+        adam.reset()
+        x = 0.5 * (x + best)
+        if strikes >= _STRIKES or best_image is None:
+            status = Status.FAILED
+    return StageOutcome(status, best, best_image, loss_start, best_loss, stopping.iterations)
+
+
+def _expected_iterations(stopping: Stopping, levels_left: int) -> float:
+    """A guess for the remaining time only: half as many again as so far, and two patiences for each level to come."""
+    patience = stopping.rules.patience
+    guess = 0.5 * stopping.iterations + max(patience - stopping.stalled, 0) + 2.0 * patience * levels_left
+    return min(guess, stopping.rules.max_iterations - stopping.iterations)

@@ -73,7 +73,7 @@ def _lower_squares(
     """A stage with another residual of the groups of `problem`, from each start; its ends that are finite."""
     setting = recording.setting
     with setting.course.stage(name) as stage:
-        stage.picture = recording.picture
+        stage.picture = recording.preview
         problem = replace(problem, residual=make(problem.groups.average(setting.reference)), near=starts[0])
         found = [solve(setting, problem, start, EVALUATIONS, stage=stage, box=box) for start in starts]
         stage.vector = min(found, key=lambda solution: solution.equations.cost).x
@@ -95,7 +95,7 @@ def _lower_flip(recording: Recording, judge: PictureJudge, starts: list[Vector],
         return recording.shown(table[:, :, 0]), pullback
 
     with course.stage("flip") as stage:
-        stage.picture = recording.picture
+        stage.picture = recording.preview
         told, stop = course.values(stage), course.should_stop
         ends = [minimise_flip(judge, picture, x, *box, on_value=told, should_stop=stop) for x in starts]
         stage.vector = min(ends, key=lambda end: end[1])[0]

@@ -165,6 +165,10 @@ class Recording:
         """The recorded picture of a vector, linear; the reference where nothing is recorded."""
         return self.shown(self.pixels(x))
 
+    def preview(self, x: Vector) -> Pixels:
+        """The same for a look in between, of which the fit knows nothing afterwards."""
+        return self.shown(self._pictures.glance(x)[:, :, 0])
+
     def shown(self, pixels: NDArray[np.float32]) -> Pixels:
         """The picture that these covered pixels are part of, which is the reference elsewhere."""
         image = self.setting.reference.astype(np.float32).copy()

@@ -55,7 +55,7 @@ def refine_exact(setting: Setting, started: Started, make: MakeResidual) -> OnRe
             grid = solution_grid(setting.reference, setting.mask, lambda: first(start), started.edges)
             if grid is not None:
                 recording = setting.record(start, grid, recording.number + 1)
-            stage.picture = recording.picture
+            stage.picture = recording.preview
         groups = all_groups(recording.paths, 1, setting.reference)
         groups = fewer_groups(groups, setting.reference, setting.plan.refine_lanes)
         problem = recording.problem(groups, make)
@@ -97,7 +97,7 @@ def refine_sampled(
                 del found, recording
                 stage.picture = None
                 recording = setting.record(x, grid, number + 1)
-                stage.picture = recording.picture
+                stage.picture = recording.preview
                 found = _problems(recording, x, make, weigh, solve_all=True)
         refined = _last_steps(setting, stage, found.refined, weighted=weigh is not None)
         stage.vector = refined.x
@@ -123,7 +123,7 @@ def _recorded_near(
         number += 1
         stage.picture = None  # it holds the recording before this one
         recording = setting.record(start, grid, number)
-        stage.picture = recording.picture
+        stage.picture = recording.preview
         few = _problems(recording, start, make, weigh).refined.few
         x = solve(setting, few, start, EVALUATIONS, stage=stage).x
         before, after = few.own_noise(start), few.own_noise(x)

@@ -57,13 +57,13 @@ def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
     with course.stage("scan") as stage:
         recording, edges = _first_recording(setting)
         groups = _groups(recording)
-        stage.picture = None if recording.thinned else recording.picture
+        stage.picture = None if recording.thinned else recording.preview
         lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
         few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         starts = _starts(setting, few, stage)
         stage.vector = starts[0] if starts else None
     with course.stage("start") as stage:
-        stage.picture = None if recording.thinned else recording.picture
+        stage.picture = None if recording.thinned else recording.preview
         lanes = plan.start_lanes if setting.sampled else plan.exact_start_lanes
         more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         basins = _race(setting, more, [*starts, setting.user, random_start(setting.table, setting.seed)], stage)

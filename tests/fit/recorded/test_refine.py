@@ -119,7 +119,7 @@ def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_th
 
     def record(x, grid, number):
         recorded.append((x, grid, number))
-        return SimpleNamespace(number=number, picture=None, setting=setting)
+        return SimpleNamespace(number=number, preview=None, setting=setting)
 
     def recorded_near(setting, stage, start, make, weigh, number):
         grid = 9 if start is rival else 7
