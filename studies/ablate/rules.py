@@ -57,21 +57,21 @@ RULES = (
     Rule("starts of the scan", "fit.search.global_start:best_starts", _constant([]), (*EXACT, *SAMPLED)),
     Rule("metals in the scan", "fit.search.global_start:METAL_SECOND_NODES", _number(()), (*EXACT, *SAMPLED)),
     Rule("other basins", "fit.alike.exchanges:best_basin", _argument(1), (*EXACT, *HARD)),
-    Rule("fireflies left out", "fit.recorded.fireflies:without_fireflies",
+    Rule("fireflies left out", "fit.recorded.where_to_look:without_fireflies",
          lambda original: lambda image, mask: (image, 0), SAMPLED),
     # where the fit looks
     Rule("edges of light", "fit.recorded.where_to_look:edges_of_light", _constant(None), (*EXACT, *HARD)),
     Rule("finer grid at the solution", "fit.recorded.where_to_look:solution_grid", _constant(None), (*EXACT, *HARD)),
     Rule("thinning", "fit.recorded.where_to_look:thinned_grid", _argument(0), EXACT),
-    Rule("finer recording for little noise", "fit.recorded.finer_grid:finer_grid", _argument(0), SAMPLED),
+    Rule("finer recording for little noise", "fit.recorded.where_to_look:finer_grid", _argument(0), SAMPLED),
     # noise
     Rule("own noise taken away", "fit.squares.recording_noise:without_own_noise", _argument(0), SAMPLED),
     Rule("equal counts", "fit.traced.sample_count:equal_counts", _constant(None), TRACED),
-    Rule("recount", "fit.traced.recount:recount", _not_recounted, TRACED),
+    Rule("recount", "fit.traced.sample_count:recount", _not_recounted, TRACED),
     # materials that look alike
     Rule("metal rivals", "fit.alike.exchanges:metal_rivals",
          lambda original: lambda problem, solve, found, table: (found, ()), (*EXACT, *HARD)),
-    Rule("width rivals", "fit.alike.width_rivals:width_rivals", _constant(()), (*EXACT, *SAMPLED, *HARD)),
+    Rule("width rivals", "fit.alike.exchanges:width_rivals", _constant(()), (*EXACT, *SAMPLED, *HARD)),
     Rule("simplest end", "fit.alike.simplest:OtherEnds.simplest", _argument(1), (*SAMPLED, *HARD)),
     Rule("unneeded lobes", "fit.alike.unneeded_lobes:unneeded_lobes", _constant([]), (*EXACT, *SAMPLED, *HARD)),
     Rule("values back to the user's", "fit.recorded.keep_user_values:_sets_to_return", _constant(()),
@@ -79,7 +79,8 @@ RULES = (
     # certainty
     Rule("few pixels that rule a value", "solve.leverage:residuals_left_out", _argument(1), (*EXACT, *SAMPLED, *HARD)),
     # perceptual stages
-    Rule("all perceptual stages", "fit.recorded.perceptual_stages:perceptual_ends", _constant([]), (*EXACT, *SAMPLED)),
+    Rule("all perceptual stages", "fit.recorded.perceptual_stages:perceptual_ends",
+         lambda original: lambda *given: ([], []), (*EXACT, *SAMPLED)),
     Rule("stage itp", "fit.squares.stage_residuals:finishing_residuals", _without("itp"), (*EXACT, *SAMPLED)),
     Rule("stage pu21", "fit.squares.stage_residuals:finishing_residuals", _without("pu21"), (*EXACT, *SAMPLED)),
     Rule("none at the noise", "fit.recorded.fit:AT_NOISE", _number(0.0), SAMPLED),

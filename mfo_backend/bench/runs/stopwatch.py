@@ -28,9 +28,8 @@ _PLACES = {
     "render/": "render",
     "material/": "render",
     "metrics/": "metric",
-    "fit/residuals.py": "metric",
-    "fit/displayed_residual.py": "metric",
-    "fit/region.py": "metric",
+    "fit/squares/residuals.py": "metric",
+    "fit/judge/region.py": "metric",
     "solve/": "solve",
     "scene/": "files",
 }

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.recorded import stages, where_to_look
+from mfo_backend.fit.recorded import start, where_to_look
 from studies.ablate.page import page
 from studies.ablate.rules import RULES, Rule, switched_off, target_of
 
@@ -24,15 +24,15 @@ def test_a_rule_is_off_where_its_name_was_imported() -> None:
     grid = np.full((4, 4), 3)
     with switched_off(rule):
         assert where_to_look.thinned_grid(grid, None, None, 1) is grid
-        assert stages.thinned_grid is where_to_look.thinned_grid
-    assert stages.thinned_grid is where_to_look.thinned_grid
+        assert start.thinned_grid is where_to_look.thinned_grid
+    assert start.thinned_grid is where_to_look.thinned_grid
 
 
 def test_a_list_given_instead_is_a_new_one_each_time() -> None:
     rule = next(rule for rule in RULES if rule.name == "opposite starts")
     with switched_off(rule):
-        stages.agreeing_ends().append(1)
-        assert stages.agreeing_ends() == []
+        start.agreeing_ends().append(1)
+        assert start.agreeing_ends() == []
 
 
 def test_the_names_are_different() -> None:
