@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ...metrics.colour import srgb_from_linear
 from ...metrics.flip import flip_map
+from ...metrics.neighbours import sums_around
 from ...types.verdict import Difference
-from .neighbours import sums_around
 
 # Pixels between two whose differences are multiplied. Those next to each other may share some of their noise: by
 # compression, by resampling
