@@ -18,7 +18,7 @@ import numpy as np
 from mathutils import Matrix, Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from ..versions import active_output, can_denoise, node_tree_of
+from ..versions import active_output, node_tree_of
 from .light_path import CAMERA, SCATTERED, answer_light_paths, light_path_outputs
 
 Pixels = NDArray[np.float32]
@@ -67,7 +67,7 @@ def _studio(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
         studio.collection.objects.link(camera)
         studio.camera = camera
         studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-        _set_up(studio)
+        _set_up(studio, scene)
         yield studio
     finally:
         bpy.data.objects.remove(camera)
@@ -75,7 +75,7 @@ def _studio(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
         bpy.data.scenes.remove(studio)
 
 
-def _set_up(studio: bpy.types.Scene) -> None:
+def _set_up(studio: bpy.types.Scene, scene: bpy.types.Scene) -> None:
     render, cycles = studio.render, studio.cycles
     render.engine = "CYCLES"
     render.resolution_percentage = 100
@@ -86,10 +86,9 @@ def _set_up(studio: bpy.types.Scene) -> None:
         settings.media_type = "IMAGE"
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
     settings.exr_codec = "NONE"
-    cycles.device = "CPU"
+    cycles.device, cycles.shading_system = "CPU", scene.cycles.shading_system
     cycles.use_adaptive_sampling = cycles.film_transparent_glass = False
-    if can_denoise():
-        cycles.use_denoising = False
+    cycles.use_denoising = False
     cycles.pixel_filter_type = "BOX"
     cycles.film_exposure = 1.0
 

@@ -17,7 +17,7 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..export.read_mesh import material_of_slot, slot_count
-from ..versions import active_output, can_denoise
+from ..versions import active_output
 from .closure_tree import ClosureTree, Leaf, Value
 from .light_path import SCATTERED, answer_light_paths, light_path_outputs
 from .unwrap import unwrapped
@@ -29,8 +29,10 @@ MARGIN = 8  # texels around islands that take the colour beside them
 SAMPLES = 4  # a texel, so that fine patterns are averaged
 MOST_UV_MAPS = 8  # of a mesh
 FLAT = 2e-3  # largest slope of a normal map that counts as none
-NORMALS = ("Normal", "Coat Normal")
-SKIPPED = ("Weight", "Tangent", *NORMALS)
+LEFT_OUT = ("Coat Normal", "Tangent")
+SKIPPED = ("Weight", "Normal", *LEFT_OUT)
+# bakes are of one object alone, and these look at what is around it
+OF_SURROUNDINGS = ("ShaderNodeAmbientOcclusion", "ShaderNodeRaycast")
 # what these nodes tell depends on where a surface is looked at from
 OF_VIEW = {
     "ShaderNodeFresnel": ("Fac", "Factor"),
@@ -48,7 +50,8 @@ def baked_surface(
 
     Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``, each
     with ``kind``, ``name``, ``weight``, ``sockets`` and what of the node's settings counts; ``emission`` and for leaves
-    ``normal``, where there are any; ``view`` and ``paths``: what of the view and of light paths the nodes ask for.
+    ``normal``, where there are any; ``view``, ``paths`` and ``around``: what of the view, of light paths and of other
+    objects the nodes ask for; ``left_out``: linked sockets that are not baked.
     A value is a number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working
     space. Normals are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
     """
@@ -63,12 +66,14 @@ def baked_surface(
         emits = _emits(tree)
         with _stage(scene, instance, original, depsgraph, slot, material) as stage:
             bake = _Bake(stage, material, folder, size, bool(view))
-            answer: dict[str, Any] = {"view": view, "paths": sorted(paths)}
+            answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": _asks_around(tree)}
             if emits:
                 answer["emission"] = bake.file(bake.closure())
             closures = ClosureTree(tree)
             groups += closures.groups
             answer["leaves"] = _leaves(closures, bake)
+            sockets = [leaf.node.inputs.get(name) for leaf in closures.leaves for name in LEFT_OUT]
+            answer["left_out"] = sorted({socket.name for socket in sockets if socket is not None and socket.is_linked})
             np.save(folder / "corners.npy", stage.corners)
             answer["corners"] = "corners.npy"
             return answer
@@ -181,11 +186,10 @@ def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object,
 
 def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
     stage.render.engine = "CYCLES"
-    stage.cycles.device = "CPU"
+    stage.cycles.device, stage.cycles.shading_system = "CPU", scene.cycles.shading_system
     stage.cycles.samples = SAMPLES
     stage.cycles.use_adaptive_sampling = False
-    if can_denoise():
-        stage.cycles.use_denoising = False
+    stage.cycles.use_denoising = False
     stage.render.resolution_x, stage.render.resolution_y = scene.render.resolution_x, scene.render.resolution_y
     bake = stage.render.bake
     bake.target, bake.margin, bake.margin_type = "IMAGE_TEXTURES", MARGIN, "EXTEND"
@@ -353,6 +357,17 @@ def _emits(tree: bpy.types.NodeTree) -> bool:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and _emits(node.node_tree):
             return True
     return False
+
+
+def _asks_around(tree: bpy.types.NodeTree) -> list[str]:
+    """Labels of nodes that look at other objects."""
+    found = []
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            found += _asks_around(node.node_tree)
+        elif node.bl_idname in OF_SURROUNDINGS and any(output.is_linked for output in node.outputs):
+            found.append(node.bl_label)
+    return sorted(set(found))
 
 
 def _asks_for_view(tree: bpy.types.NodeTree) -> list[str]:

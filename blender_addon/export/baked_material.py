@@ -59,6 +59,7 @@ NEAREST = {
     "ShaderNodeBsdfHairPrincipled": _MATTE,
 }
 EMISSION = ("Emission Color", "Emission Strength")
+TURNED = ("Anisotropic", "Anisotropy")  # sockets that turn highlights along a tangent
 WHITE = 1.0 - 1e-3  # a Transparent BSDF of this colour or brighter counts as white
 BLACK = Socket((0.0, 0.0, 0.0))
 MISSING = 1e-3  # of the weights' sum, below which nothing is missing
@@ -165,6 +166,14 @@ class Baked:
                 f"Material '{name}': {', '.join(self._answer['view'])} depend on the view; the fit has them as the "
                 "camera sees them."
             )
+        if self._answer["around"]:
+            asked = ", ".join(self._answer["around"])
+            findings.note(f"Material '{name}': {asked} sees its own object alone in the fit.")
+        if self._answer["left_out"]:
+            left = ", ".join(self._answer["left_out"])
+            findings.note(f"Material '{name}': what is linked to {left} is left out.")
+        if any(leaf["sockets"].get(turned, 0.0) != 0.0 for leaf in self._answer["leaves"] for turned in TURNED):
+            findings.note(f"Material '{name}': its anisotropy follows the UV map of the bake.")
         if self._answer["paths"]:
             asked = ", ".join(self._answer["paths"])
             findings.note(f"Material '{name}' asks Light Path for {asked}: the fit has it as diffuse rays see it.")

@@ -65,7 +65,7 @@ def read_target(material: bpy.types.Material | None, owner: str, slot: int, find
             Fix("principled"),
         )
         return None
-    _note_volume(material, findings)
+    note_volume(material, findings)
     return _read_principled(material, node, True, findings)
 
 
@@ -83,7 +83,7 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     if tree is None:
         color = [float(value) for value in to_rec709(list(material.diffuse_color)[:3])]
         return Material(material.name, "diffuse", {"Base Color": Socket(color)})
-    _note_volume(material, findings)
+    note_volume(material, findings)
     node = surface_of(tree)
     if node is None:
         return Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
@@ -182,7 +182,8 @@ def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings
         return Socket(plain_value(socket), True)
 
 
-def _note_volume(material: bpy.types.Material, findings: Findings) -> None:
+def note_volume(material: bpy.types.Material, findings: Findings) -> None:
+    """Name what lies below a surface, or moves it: neither is exported."""
     name_settings(MATERIAL, material, material.name, findings)
     name_settings(MATERIAL_CYCLES, cycles_settings(material), material.name, findings)
     output = active_output(node_tree_of(material))

@@ -20,7 +20,7 @@ from .mesh_arrays import CornerMesh, joined, world_mesh
 from .ply_file import TriangleMesh
 from .read_camera import read_camera, read_pixel_filter
 from .read_light import read_light
-from .read_material import needs_bake, read_context, read_target
+from .read_material import needs_bake, note_volume, read_context, read_target
 from .read_mesh import material_of_slot, read_mesh, slot_count
 from .read_world import BLACK, read_world
 from .render_state import instanced_objects, layer_collections, render_state, rendered_layer, rendered_objects
@@ -258,6 +258,7 @@ class _Walk:
             if needs_bake(original):
                 assert original is not None
                 self.findings.note(f"Material '{original.name}' of '{item.name}' is baked into textures by Cycles.")
+                note_volume(original, self.findings)
                 self.baked.add(self.bsdfs[key])
                 if self.bakes is None:
                     self.data.materials[self.bsdfs[key]] = grey(original.name)

@@ -61,7 +61,7 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bake
     except UnsupportedNodeError as problem:
         findings.note(f"World '{world.name}' uses {problem}: Cycles renders it into a panorama for the fit.")
         if bakes is not None:
-            bakes.ask_world(world)
+            bakes.ask_world(world, findings)
         return replace(UNKNOWN, camera=camera)
 
 

@@ -84,9 +84,11 @@ def texture(report: Any, bsdf: str, socket: str) -> np.ndarray:
 def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
     target, _, nodes = stage
     place = nodes.place()
-    apart = nodes.new("SeparateXYZ")
+    apart, bump = nodes.new("SeparateXYZ"), nodes.new("Bump")
     nodes.tree.links.new(place, apart.inputs[0])
     nodes.tree.links.new(place, nodes.principled.inputs["Base Color"])
+    nodes.tree.links.new(bump.outputs[0], nodes.principled.inputs["Coat Normal"])
+    nodes.tree.links.new(place, nodes.tree.get_output_node("CYCLES").inputs["Displacement"])
     for axis, socket in (("X", "Roughness"), ("Y", "Metallic")):
         nodes.tree.links.new(apart.outputs[axis], nodes.principled.inputs[socket])
     report = export(target)
@@ -96,6 +98,8 @@ def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
     for socket, values in (("Base Color", expected), ("Roughness", expected[:, :1]), ("Metallic", expected[:, 1:2])):
         found = at_vertices(texture(report, bsdf, socket), uv)[:, : values.shape[1]]
         assert np.sqrt(np.mean((found - values) ** 2)) < 0.01, socket
+    for left in ("what is linked to Coat Normal is", "its displacement is"):
+        assert f"Material 'Ball': {left} left out." in report.notes
     assert report.request["materials"][bsdf]["sockets"]["IOR"] == {"value": 1.5, "linked": False}
 
 
@@ -186,6 +190,25 @@ def test_glow_of_any_tree_is_emission(stage: Any, export: Any) -> None:
     found = at_vertices(texture(report, bsdf, "Emission Color"), uv)
     assert np.sqrt(np.mean((found - 3.0 * (0.5 * positions + 0.5)) ** 2)) < 0.03
     assert report.request["materials"][bsdf]["sockets"]["Emission Strength"]["value"] == 1.0
+
+
+def test_a_missing_image_is_magenta_and_named(stage: Any, export: Any) -> None:
+    target, _, nodes = stage
+    image = bpy.data.images.new("Lost", 8, 8)
+    image.source, image.filepath = "FILE", "//nowhere.png"
+    picture, mixed = nodes.new("TexImage"), nodes.new("MixRGB")
+    picture.image = image
+    mixed.inputs["Fac"].default_value = 0.5
+    mixed.inputs["Color1"].default_value = (0.0, 0.0, 0.0, 1.0)
+    nodes.tree.links.new(picture.outputs[0], mixed.inputs["Color2"])
+    nodes.tree.links.new(mixed.outputs[0], nodes.principled.inputs["Base Color"])
+    report = export(target)
+    bsdf = shape_of(report)[0]
+    color = report.request["materials"][bsdf]["sockets"]["Base Color"]
+    np.testing.assert_allclose(color["value"], (0.5, 0.0, 0.5), atol=1e-4)
+    assert "texture" not in color  # the same everywhere
+    said = "Material 'Ball': the image 'Lost' of the node 'Image Texture' is missing; it is magenta, as in Blender."
+    assert said in report.notes
 
 
 def _circle(nodes: Nodes) -> None:
