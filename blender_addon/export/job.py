@@ -17,6 +17,8 @@ from ..local_copy import unwritable
 from .findings import ExportError, Findings
 from .job_folder import GENERATOR, new_job_folder
 from .material_model import Material
+from .node_graph import FOLDER as GRAPH_FOLDER
+from .node_graph import evaluate_graph, probe_for
 from .read_material import principled_node
 from .read_scene import read_scene
 from .reference import Reference, read_reference
@@ -62,30 +64,38 @@ def export_job(
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
     findings = Findings()
-    with SceneBakes(context) as bakes:
-        data = read_scene(context, obj, findings, bakes)
-    findings.raise_first()
-    assert data is not None
-    if unwritable(obj.active_material):
-        findings.note(f"The values cannot be applied as it is. {unwritable(obj.active_material)}")
-    for said in animation_notes(principled_node(obj.active_material), context.scene.frame_current):
-        findings.note(said)
-    tell(0.4)
-    size = (data.camera.width, data.camera.height)
-    picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
-    for said in picture.notes if picture is not None else ():
-        findings.note(said)
-    files = scene_files(data, findings)
-    tell(0.5)
-    request = _request(context, obj, data, files, picture, fit, findings)
-    with new_job_folder(Path(folder)) as partial:
-        files.write(partial)
-        tell(0.9)
-        if picture is not None:
-            picture.write(partial)
-        (partial / "request.json").write_text(
-            json.dumps(request, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
-        )
+    with probe_for(obj) as probe:
+        with SceneBakes(context) as bakes:
+            data = read_scene(context, obj, findings, bakes)
+        findings.raise_first()
+        assert data is not None
+        if unwritable(obj.active_material):
+            findings.note(f"The values cannot be applied as it is. {unwritable(obj.active_material)}")
+        for said in animation_notes(principled_node(obj.active_material), context.scene.frame_current):
+            findings.note(said)
+        tell(0.4)
+        size = (data.camera.width, data.camera.height)
+        picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
+        for said in picture.notes if picture is not None else ():
+            findings.note(said)
+        graph = None
+        if probe is not None:
+            data.materials[TARGET_BSDF], graph = evaluate_graph(probe, context, obj, data.materials[TARGET_BSDF])
+        files = scene_files(data, findings)
+        tell(0.5)
+        request = _request(context, obj, data, files, picture, fit, findings)
+        if graph is not None:
+            request["graph"] = graph.request()
+        with new_job_folder(Path(folder)) as partial:
+            files.write(partial)
+            tell(0.9)
+            if picture is not None:
+                picture.write(partial)
+            if graph is not None:
+                graph.write(partial)
+            (partial / "request.json").write_text(
+                json.dumps(request, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
+            )
     return ExportReport(Path(folder), request, tuple(findings.notes))
 
 
@@ -155,6 +165,8 @@ def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
         sockets[name] = {"value": plain, "linked": socket.linked}
         if socket.texture is not None:
             sockets[name]["texture"] = files.texture(socket.texture)
+        if socket.seen is not None:
+            sockets[name]["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
     return {
         "name": material.name,
         "distribution": material.distribution,

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,11 +26,17 @@ class Texture:
 
 @dataclass(frozen=True)
 class Socket:
-    """A socket's value (float, bool or three linear Rec.709 numbers), whether it is linked, and to which picture."""
+    """A socket's value (float, bool or three linear Rec.709 numbers), whether it is linked, and to which picture.
+
+    `by_graph` says that nodes give it which Cycles has to evaluate; `seen` is the file with what they give where the
+    camera sees the surface, and `value` their mean, once that is done.
+    """
 
     value: Any
     linked: bool = False
     texture: Texture | None = None
+    by_graph: bool = False
+    seen: Path | None = None
 
 
 @dataclass

@@ -10,12 +10,16 @@ from .audit.rules import name_settings
 from .audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from .color_space import to_rec709
 from .findings import Findings, Fix
+from .graph_findings import graph_problem
 from .image_pixels import without_pixels
 from .material_model import Material, Socket, grey
 from .shader_graph import MissingPictureError, UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 
 NORMAL_SOCKETS = ("Normal", "Coat Normal", "Tangent")
 SKIPPED_SOCKETS = ("Weight",)
+# sockets without an effect in the fit, whatever is linked to them
+UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
+EMISSION_SOCKETS = ("Emission Color", "Emission Strength")
 # what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
 DEFAULT_SOCKETS = {
     "Base Color": Socket((0.8, 0.8, 0.8)),
@@ -136,12 +140,17 @@ def _read_principled(
             continue
         if socket.name in NORMAL_SOCKETS:
             source = source_of(socket)
-            sockets[socket.name] = Socket(plain_value(socket), source is not None)
-            if source is not None and not (socket.name == "Tangent" and _is_uv_tangent(source.node)):
-                fixes = (Fix("unlink", socket.name),) if is_target else ()
-                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.", *fixes)
+            uv_tangent = source is not None and socket.name == "Tangent" and _is_uv_tangent(source.node)
+            by_graph = is_target and source is not None and not uv_tangent
+            if by_graph:
+                _refuse(socket, material.name, findings, is_copied=True)
+            sockets[socket.name] = Socket(plain_value(socket), source is not None, by_graph=by_graph)
+            if source is not None and not uv_tangent and not is_target:
+                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
             continue
-        sockets[socket.name] = _read(socket, material.name, is_target, findings)
+        sockets[socket.name] = _read(socket, material.name, is_target and socket.name not in UNUSED_SOCKETS, findings)
+        if socket.name in EMISSION_SOCKETS and sockets[socket.name].by_graph:
+            findings.note(f"Material '{material.name}': what is linked to {socket.name} counts with its average.")
     method = getattr(node, "subsurface_method", "RANDOM_WALK")
     found = Material(material.name, "principled", sockets, node.distribution, method)
     _note_default_tangent(found, findings)
@@ -164,22 +173,31 @@ def _is_uv_tangent(node: bpy.types.Node) -> bool:
 
 def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings: Findings) -> Socket:
     try:
-        return read_socket(socket)
+        read = read_socket(socket)
+        if is_target:
+            _refuse(socket, material, findings, is_copied=False)
+        return read
     except UnsupportedNodeError as problem:
         if is_target:
-            findings.error(
-                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported: unlink it "
-                "or use an image texture.",
-                Fix("unlink", socket.name),
-            )
-        elif isinstance(problem, MissingPictureError):
+            _refuse(socket, material, findings, is_copied=True)
+        if isinstance(problem, MissingPictureError) and not is_target:
             findings.error(f"{socket.name} of material '{material}' is magenta in Cycles: it is linked to {problem}.")
-        else:
+        elif not is_target:
             findings.note(
                 f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported; the "
                 "socket's own value is used."
             )
-        return Socket(plain_value(socket), True)
+        return Socket(plain_value(socket), True, by_graph=is_target)
+
+
+def _refuse(socket: bpy.types.NodeSocket, material: str, findings: Findings, *, is_copied: bool) -> None:
+    """An error where Cycles could not evaluate what feeds a socket of the target."""
+    problem = graph_problem(socket, is_copied=is_copied)
+    if problem is not None:
+        findings.error(
+            f"{socket.name} of material '{material}' is linked to {problem}: mend or unlink it.",
+            Fix("unlink", socket.name),
+        )
 
 
 def note_volume(material: bpy.types.Material, findings: Findings) -> None:

@@ -183,4 +183,8 @@ def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str
         for name, socket in material["sockets"].items():
             if socket.get("texture"):
                 socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
+            if socket.get("graph") and request.graph is not None:
+                socket["graph"] = str(folder.file(socket["graph"], what=f"request.json: graph of {name}"))
+                socket["positions"] = str(folder.file(request.graph.positions, what="request.json: graph.positions"))
+                socket["camera"] = request.graph.camera
     return materials

@@ -14,6 +14,7 @@ from ..types.errors import BadInputError
 from ..types.image import Encoding
 from ..types.light_paths import NO_LIMIT, LightPaths
 from .checked_object import CheckedObject, is_number, shown
+from .graph_files import check_graph_files
 from .job_folder import JobFolder
 from .scene_files import check_scene_files
 
@@ -22,7 +23,7 @@ LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size
 WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
-    *("fit", "notes"),
+    *("graph", "fit", "notes"),
 )
 
 
@@ -39,11 +40,25 @@ class Target:
 
 @dataclass(frozen=True)
 class Socket:
-    """A socket of a Blender Principled node; a linked one stays as it is, its texture is a file of the job."""
+    """A socket of a Blender Principled node; a linked one stays as it is.
+
+    Its `texture` is a picture over the UV map, its `graph` holds what nodes give as the camera sees it; both are files
+    of the job.
+    """
 
     value: Any = None
     linked: bool = False
     texture: str | None = None
+    graph: str | None = None
+
+
+@dataclass(frozen=True)
+class NodeGraph:
+    """How the target's `graph` files are seen: the (3, 4) matrix from the world to column, row and 1, and the file of
+    world positions."""
+
+    camera: tuple[tuple[float, ...], ...]
+    positions: str
 
 
 @dataclass(frozen=True)
@@ -81,6 +96,7 @@ class Request:
     view_table: ViewTable | None = None
     light_paths: LightPaths | None = None
     materials: Mapping[str, Material] = field(default_factory=dict)
+    graph: NodeGraph | None = None
     fit: FitSettings = field(default_factory=FitSettings)
     notes: tuple[str, ...] = ()
     generator: Mapping[str, Any] = field(default_factory=dict)
@@ -111,6 +127,9 @@ def read_request(folder: JobFolder, *, trusted: bool = False) -> Request:
         for name, socket in material.sockets.items():
             if socket.texture is not None:
                 folder.file(socket.texture, what=f"{WHERE}: materials.{bsdf_id}.sockets.{name}.texture")
+    named = request.materials.get(request.target.bsdf_id)
+    held = {name: socket.graph for name, socket in named.sockets.items() if socket.graph} if named else {}
+    check_graph_files(folder, request.graph.positions if request.graph else None, held)
     return request
 
 
@@ -143,6 +162,7 @@ def request_from_json(data: Any) -> Request:
         view_table=_view_table(top.raw("view", None)),
         light_paths=_light_paths(top.raw("light_paths", None)),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
+        graph=_graph(top.raw("graph", None)),
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
         generator=_generator(top.mapping("generator", {})),
@@ -154,7 +174,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
     materials = asdict(request)["materials"]
     for material in materials.values():
         material["sockets"] = {
-            name: {key: value for key, value in socket.items() if key != "texture" or value is not None}
+            name: {key: value for key, value in socket.items() if key not in ("texture", "graph") or value is not None}
             for name, socket in material["sockets"].items()
         }
     view = asdict(request.view) if request.view is not None else None
@@ -174,6 +194,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "view": view,
         "light_paths": asdict(request.light_paths) if request.light_paths is not None else None,
         "materials": materials,
+        "graph": asdict(request.graph) if request.graph is not None else None,
         "fit": asdict(request.fit),
         "notes": list(request.notes),
     }
@@ -202,19 +223,33 @@ def _material(bsdf_id: str, data: Any) -> Material:
     material = CheckedObject(data, where, ("name", "distribution", "subsurface_method", "sockets"))
     sockets = {}
     for name, entry in material.mapping("sockets").items():
-        socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture"))
+        socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture", "graph"))
         value = socket.raw("value", None)
         numbers = value if isinstance(value, list) else [value]
         if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
             raise socket.wrong("value", "a number, a list of one to four, true, false or null")
         texture = socket.text("texture") if socket.raw("texture", None) is not None else None
-        sockets[name] = Socket(value, socket.boolean("linked", False), texture)
+        graph = socket.text("graph") if socket.raw("graph", None) is not None else None
+        sockets[name] = Socket(value, socket.boolean("linked", False), texture, graph)
     return Material(
         name=material.text("name"),
         distribution=material.text("distribution", "MULTI_GGX"),
         sockets=sockets,
         subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
     )
+
+
+def _graph(data: Any) -> NodeGraph | None:
+    if data is None:
+        return None
+    graph = CheckedObject(data, f"{WHERE}: graph", ("camera", "positions"))
+    rows = graph.raw("camera")
+    if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
+        raise graph.wrong("camera", "three rows of four numbers")
+    for row in rows:
+        if not (isinstance(row, (list, tuple)) and len(row) == 4 and all(map(is_number, row))):
+            raise graph.wrong("camera", "three rows of four numbers")
+    return NodeGraph(tuple(tuple(float(number) for number in row) for row in rows), graph.text("positions"))
 
 
 def _fit(data: Any) -> FitSettings:

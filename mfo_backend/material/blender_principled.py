@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from . import dual as dr
+from .bumped_normals import BumpedNormals, about
 from .cycles_model import CyclesModel
 from .diffuse import lambert, oren_nayar
 from .fresnel import dielectric
@@ -48,37 +49,90 @@ def emitted(parameters: Mapping[str, Any], wi: Any, lobes: Lobes = ALL_LOBES, mo
 
 def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     """f_r |cos| of the stack for light from `wo` in the frame of the layers; `reachable_only` as in `refracted`."""
+    if layers.normals is not None:
+        return _evaluate_bumped(layers, layers.normals, wo, reachable_only)
     wi = layers.wi
-    above = wo.z > 0
-    h = dr.normalize(wi + dr.kind_of(wi)(wo.x, wo.y, dr.abs(wo.z)))
-    c = dr.minimum(dr.dot(wi, h), 1)
-    up = dr.kind_of(wo)(wo.x, wo.y, dr.maximum(wo.z, 1e-7))
-    value: Any = 0
-    if layers.metal is not None or layers.specular is not None:
-        fresnel: Any = 0
-        if layers.metal is not None and layers.metal_fresnel is not None:
-            fresnel += layers.metal * layers.metal_fresnel(c)
-        if layers.specular is not None and layers.specular_fresnel is not None:
-            fresnel += layers.specular * layers.specular_fresnel(c)
-        value += fresnel * reflection(wi, up, h, layers.ax, layers.ay)
+    up = _above(wo)
+    value = _microfacets(layers, wo)
     if layers.coat is not None:
-        lobe = reflection(wi, up, h, layers.coat_alpha, layers.coat_alpha)
-        value += layers.coat * (lobe * dielectric(c, layers.coat_ior))
-    if layers.glass is not None and layers.glass_fresnel is not None:
-        lobe = reflection(wi, up, h, layers.glass_alpha, layers.glass_alpha)
-        value += layers.glass * layers.glass_fresnel(c) * lobe
-    if layers.sheen is not None and layers.sheen_shape is not None:
-        value += layers.sheen * layers.sheen_shape.value(up)
-    if layers.diffuse is not None:
-        if layers.diffuse_roughness is None:
-            value += layers.diffuse * lambert(up)
-        else:
-            value += layers.diffuse * oren_nayar(wi, up, layers.base, layers.diffuse_roughness)
-    if layers.subsurface is not None:
-        value += layers.subsurface * lambert(up)
-    value = dr.select(above & (wi.z > 0), value, 0)
+        value += _coat(layers, wi, up)
+    if layers.glass is not None:
+        value += _glass_reflection(layers, wo)
+    value += _diffuse(layers, wi, up)
+    value = dr.select((wo.z > 0) & (wi.z > 0), value, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
         value += refracted(layers, wo, reachable_only=reachable_only)
+    return value
+
+
+def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_only: bool) -> Any:
+    """The same with a normal for each group of lobes; the layers' frame is that of the microfacets."""
+    wi = layers.wi
+    own = dr.kind_of(wi)(0, 0, 1)
+    value = _microfacets(layers, wo)
+    if layers.glass is not None:
+        value += _glass_reflection(layers, wo)
+    value = dr.select(normals.lit(own, wo) & (wi.z > 0), value, 0)
+    if layers.coat is not None:
+        wi_coat, wo_coat = about(normals.coat, wi), about(normals.coat, wo)
+        seen = normals.lit(normals.coat, wo) & (wi_coat.z > 0)
+        value += dr.select(seen, _coat(layers, wi_coat, _above(wo_coat)), 0)
+    diffuse = _diffuse(layers, about(normals.diffuse, wi), _above(about(normals.diffuse, wo)))
+    value += dr.select(normals.lit(normals.diffuse, wo), diffuse * normals.terminator(wo), 0)
+    if layers.glass is not None and layers.glass_fresnel is not None:
+        value += refracted(layers, wo, reachable_only=reachable_only)
+    return value
+
+
+def _above(wo: Any) -> Any:
+    return dr.kind_of(wo)(wo.x, wo.y, dr.maximum(wo.z, 1e-7))
+
+
+def _half(wi: Any, wo: Any) -> tuple[Any, Any]:
+    """The half vector and its cosine with `wi`."""
+    h = dr.normalize(wi + dr.kind_of(wi)(wo.x, wo.y, dr.abs(wo.z)))
+    return h, dr.minimum(dr.dot(wi, h), 1)
+
+
+def _microfacets(layers: Layers, wo: Any) -> Any:
+    """Metal and specular."""
+    if layers.metal is None and layers.specular is None:
+        return 0
+    h, c = _half(layers.wi, wo)
+    fresnel: Any = 0
+    if layers.metal is not None and layers.metal_fresnel is not None:
+        fresnel += layers.metal * layers.metal_fresnel(c)
+    if layers.specular is not None and layers.specular_fresnel is not None:
+        fresnel += layers.specular * layers.specular_fresnel(c)
+    return fresnel * reflection(layers.wi, _above(wo), h, layers.ax, layers.ay)
+
+
+def _coat(layers: Layers, wi: Any, wo: Any) -> Any:
+    h, c = _half(wi, wo)
+    lobe = reflection(wi, wo, h, layers.coat_alpha, layers.coat_alpha)
+    return layers.coat * (lobe * dielectric(c, layers.coat_ior))
+
+
+def _glass_reflection(layers: Layers, wo: Any) -> Any:
+    if layers.glass_fresnel is None:
+        return 0
+    h, c = _half(layers.wi, wo)
+    lobe = reflection(layers.wi, _above(wo), h, layers.glass_alpha, layers.glass_alpha)
+    return layers.glass * layers.glass_fresnel(c) * lobe
+
+
+def _diffuse(layers: Layers, wi: Any, wo: Any) -> Any:
+    """Sheen, diffuse and what stands for subsurface."""
+    value: Any = 0
+    if layers.sheen is not None and layers.sheen_shape is not None:
+        value += layers.sheen * layers.sheen_shape.value(wo)
+    if layers.diffuse is not None:
+        if layers.diffuse_roughness is None:
+            value += layers.diffuse * lambert(wo)
+        else:
+            value += layers.diffuse * oren_nayar(wi, wo, layers.base, layers.diffuse_roughness)
+    if layers.subsurface is not None:
+        value += layers.subsurface * lambert(wo)
     return value
 
 

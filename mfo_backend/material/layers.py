@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from . import dual as dr
+from .bumped_normals import BumpedNormals, about
 from .clamp import at_least, largest, root, saturate
 from .cycles_model import CyclesModel
 from .energy import NO_COMPENSATION, Compensation, compensation, glass_albedo, reflection_albedo, schlick_albedo
@@ -36,8 +37,9 @@ from .thin_film import ThinFilm
 class Layers:
     """Weights (RGB, compensation included) and shapes of the lobes; None where a lobe is left out.
 
-    `wi`, in the frame of the anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a
-    direction of the surface's own frame into it.
+    `normals` are there where nodes give them; then the frame is that of the microfacet lobes. `wi`, in the frame of the
+    anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a direction of the surface's own
+    frame into it.
     """
 
     wi: Any
@@ -66,6 +68,7 @@ class Layers:
     base: Any = None
     diffuse_roughness: Any = None
     subsurface: Any = None
+    normals: BumpedNormals | None = None
 
     def to_frame(self, direction: Any) -> Any:
         """`direction` of the surface's frame in that of the lobes: the view's side up, tangent along the first axis."""
@@ -120,10 +123,12 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
 
     w = colour(saturate(p["alpha"])) if lobes.alpha else colour(1)
     stack["transparency"] = 1 - saturate(p["alpha"]) if lobes.alpha else number(0)
+    frame = Layers(view, cosine, sine, wi.z, 0, 0, ax, ay)
+    stack["normals"] = normals = BumpedNormals.of(parameters, frame.to_frame)
     if lobes.sheen:
-        w = _add_sheen(stack, p, w, view)
+        w = _add_sheen(stack, p, w, view if normals is None else about(normals.diffuse, view))
     if lobes.coat:
-        w = _add_coat(stack, p, w, mu, model)
+        w = _add_coat(stack, p, w, mu if normals is None else dr.maximum(dr.dot(normals.coat, view), 1e-7), model)
     stack["emission"] = p["emission_color"] * p["emission_strength"] * w
 
     film = ThinFilm(p["thin_film_thickness"], p["thin_film_ior"], model) if lobes.thin_film else None
@@ -145,7 +150,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
 
 
 def _is_colour(name: str) -> bool:
-    return BLENDER_PRINCIPLED[name].size == 3
+    return name in BLENDER_PRINCIPLED.names and BLENDER_PRINCIPLED[name].size == 3
 
 
 def _compensation(white: tuple[Any, Any] | None, mean_fresnel: Any) -> Compensation:

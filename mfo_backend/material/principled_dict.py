@@ -13,6 +13,8 @@ from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 # Sockets without effect here: normals and tangents are the mesh's, subsurface is replaced by a diffuse lobe
 _IGNORED = {"Normal", "Coat Normal", "Tangent", "Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR"}
 _IGNORED |= {"Subsurface Anisotropy", "Thin Wall"}
+# but for those that nodes give as the camera sees them
+DIRECTIONS = {"Normal": "normal", "Coat Normal": "coat_normal", "Tangent": "tangent"}
 
 
 def blender_principled_dict(
@@ -25,9 +27,10 @@ def blender_principled_dict(
 ) -> dict[str, Any]:
     """Properties for `mi.load_dict` from `{"Base Color": {"value": [r, g, b]}, ...}`, colours linear Rec.709.
 
-    A socket with a `texture` becomes a nested bitmap read without colour conversion. Sockets at their default are left
-    out unless `free`, so that their lobes stay out of the kernel. `unreachable_refraction` should be False where a
-    uniform world is the only light (see the plugin).
+    A socket with a `texture` becomes a nested bitmap read without colour conversion, one with a `graph` a texture that
+    is projected from the camera (`projective_texture`). Sockets at their default are left out unless `free`, so that
+    their lobes stay out of the kernel. `unreachable_refraction` should be False where a uniform world is the only light
+    (see the plugin).
 
     Raises
     ------
@@ -44,6 +47,8 @@ def blender_principled_dict(
     if free:
         result["free"] = ",".join(BLENDER_PRINCIPLED.select(free).names)
     for socket, content in sockets.items():
+        if socket in DIRECTIONS and content.get("graph"):
+            result[DIRECTIONS[socket]] = projective(content, [0.0, 0.0, 0.0])
         if socket in _IGNORED:
             continue
         if socket not in PARAMETER_OF_SOCKET:
@@ -51,6 +56,9 @@ def blender_principled_dict(
                 f"Unknown socket {socket!r} of the Principled BSDF: known are {', '.join(PARAMETER_OF_SOCKET)}."
             )
         item = BLENDER_PRINCIPLED[PARAMETER_OF_SOCKET[socket]]
+        if content.get("graph"):
+            result[item.name] = projective(content, content.get("value"))
+            continue
         if content.get("texture"):
             result[item.name] = {"type": "bitmap", "filename": str(content["texture"]), "raw": True}
             continue
@@ -60,6 +68,17 @@ def blender_principled_dict(
         if components != default or item.name in free:
             result[item.name] = {"type": "rgb", "value": list(components)} if item.size == 3 else components[0]
     return result
+
+
+def projective(content: Mapping[str, Any], outside: Any) -> dict[str, Any]:
+    """The texture of a socket whose `graph` is a file; `positions` and `camera` belong to it."""
+    return {
+        "type": "projective",
+        "filename": str(content["graph"]),
+        "positions": str(content["positions"]),
+        "camera": ",".join(repr(float(number)) for row in content["camera"] for number in row),
+        "outside": outside,
+    }
 
 
 def socket_value(socket: str, value: Any) -> Value:

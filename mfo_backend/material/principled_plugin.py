@@ -8,7 +8,8 @@ brings the lobe back and compiles anew. `unreachable_refraction` (true) is for r
 no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `filtered` (false) reads
 the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of Mitsuba 3.9 looks at: the integrator
 `cycles_path` puts Filter Glossy there. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
-`<id>.<name>.data`.
+`<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be textures of world directions on the camera's side, zero
+for the mesh's own.
 
 A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
 on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
@@ -17,6 +18,7 @@ tells the radiance by view direction. The tangent is that of Mitsuba's shading f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -25,6 +27,7 @@ import mitsuba as mi
 from ..types.errors import SetupError
 from ..types.parameter import Value
 from .blender_principled import evaluate
+from .bumped_normals import valid_normal
 from .cycles_model import cycles_model
 from .layers import Layers, layer_stack
 from .lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
@@ -32,6 +35,25 @@ from .lobes import needed_lobes
 from .principled_parameters import BLENDER_PRINCIPLED
 
 PLUGIN_NAME = "blender_principled"
+DIRECTIONS = ("normal", "coat_normal", "tangent")
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """The layers at a surface point, and their frame in the world where it is not that of the point."""
+
+    layers: Layers
+    si: Any
+    frame: Any
+
+    def to_local(self, wo: Any) -> Any:
+        """A direction of the point's frame in that of the layers."""
+        return self.layers.to_frame(wo if self.frame is None else self.frame.to_local(self.si.to_world(wo)))
+
+    def from_local(self, direction: Any) -> Any:
+        """The inverse of `to_local`."""
+        wo = self.layers.from_frame(direction)
+        return wo if self.frame is None else self.si.to_local(self.frame.to_world(wo))
 
 
 class BlenderPrincipled(mi.BSDF):
@@ -60,6 +82,7 @@ class BlenderPrincipled(mi.BSDF):
                 fixed[item.name] = float(value)
                 value = mi.Float(value)
             setattr(self, item.name, value)
+        self.directions = {name: props[name] for name in DIRECTIONS if name in props}
         self.fixed = fixed
         self._choose_lobes()
         # A lobe that is left out keeps its literal values, which the compiler removes
@@ -96,6 +119,8 @@ class BlenderPrincipled(mi.BSDF):
         """Show every value; those of lobes that are left out too, so that a caller can set them."""
         for item in BLENDER_PRINCIPLED:
             callback.put(item.name, getattr(self, item.name), mi.ParamFlags.Differentiable)
+        for name, texture in self.directions.items():
+            callback.put(name, texture, mi.ParamFlags.NonDifferentiable)
 
     def parameters_changed(self, keys: Any = ()) -> None:
         """Trace the lobes of the changed values from now on, whatever they are."""
@@ -116,9 +141,43 @@ class BlenderPrincipled(mi.BSDF):
             values[item.name] = value
         return values
 
-    def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> Layers:
-        layers = layer_stack(self.values_at(si, active), si.wi, self.lobes, self.model)
-        return layers.blurred(si.duv_dx.x) if self.filtered else layers
+    def bumped_frame(
+        self, si: mi.SurfaceInteraction3f, active: Any
+    ) -> tuple[mi.Frame3f, mi.Vector3f, dict[str, mi.Vector3f]]:
+        """The frame of the microfacet lobes at a surface point, the view in it, and the other normals in it by name."""
+        view: Any = si.to_world(si.wi)
+        side: Any = dr.mulsign(mi.Float(1), si.wi.z)
+        smooth: Any = mi.Vector3f(si.sh_frame.n) * side
+        geometric = mi.Vector3f(si.n)
+        geometric = dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
+        given = {name: mi.Vector3f(texture.eval(si, active)) for name, texture in self.directions.items()}
+
+        def normal(name: str, instead: mi.Vector3f) -> mi.Vector3f:
+            if name not in given:
+                return instead
+            length = dr.norm(given[name])
+            return dr.select(length > 0.1, given[name] / dr.maximum(length, 1e-6), instead)
+
+        bumped = normal("normal", smooth)
+        coat = valid_normal(geometric, view, normal("coat_normal", smooth))
+        up = valid_normal(geometric, view, bumped)
+        along = normal("tangent", mi.Vector3f(si.sh_frame.s))
+        n = up * side
+        s = dr.normalize(along - n * dr.dot(n, along))
+        # a frame turned to the view is left-handed
+        own: Any = si.sh_frame
+        handed = dr.dot(dr.cross(own.n, own.s), own.t)
+        frame = mi.Frame3f(s, dr.mulsign(dr.cross(n, s), handed), n)
+        others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
+        return frame, frame.to_local(view), {name: frame.to_local(other) for name, other in others.items()}
+
+    def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> _Surface:
+        values, wi, frame = self.values_at(si, active), si.wi, None
+        if self.directions:
+            frame, wi, normals = self.bumped_frame(si, active)
+            values |= normals
+        layers = layer_stack(values, wi, self.lobes, self.model)
+        return _Surface(layers.blurred(si.duv_dx.x) if self.filtered else layers, si, frame)
 
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)
@@ -131,20 +190,21 @@ class BlenderPrincipled(mi.BSDF):
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
-        layers = self._layers(si, active)
-        return dr.select(active, self._value(layers, layers.to_frame(wo)), 0)
+        surface = self._layers(si, active)
+        return dr.select(active, self._value(surface.layers, surface.to_local(wo)), 0)
 
     def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""
-        layers = self._layers(si, active)
-        return dr.select(active, self._density(layers, self._choice(ctx, layers), layers.to_frame(wo)), 0)
+        surface = self._layers(si, active)
+        layers = surface.layers
+        return dr.select(active, self._density(layers, self._choice(ctx, layers), surface.to_local(wo)), 0)
 
     def eval_pdf(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
     ) -> tuple[Any, Any]:
         """`eval` and `pdf`, the layers evaluated once."""
-        layers = self._layers(si, active)
-        local = layers.to_frame(wo)
+        surface = self._layers(si, active)
+        layers, local = surface.layers, surface.to_local(wo)
         density = self._density(layers, self._choice(ctx, layers), local)
         return dr.select(active, self._value(layers, local), 0), dr.select(active, density, 0)
 
@@ -157,7 +217,8 @@ class BlenderPrincipled(mi.BSDF):
         active: Any = True,
     ) -> tuple[mi.BSDFSample3f, Any]:
         """A direction of any lobe and value over density; straight through with probability 1 - alpha."""
-        layers = self._layers(si, active)
+        surface = self._layers(si, active)
+        layers = surface.layers
         choice = self._choice(ctx, layers)
         local, lobe, valid = sample(layers, choice, sample1, sample2)
         valid &= active
@@ -174,7 +235,7 @@ class BlenderPrincipled(mi.BSDF):
             weight = dr.select(through, mi.Color3f(layers.transparency / dr.maximum(density, 1e-12)), weight)
             kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.Null), kind)
         bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = layers.from_frame(local)
+        bs.wo = surface.from_local(local)
         bs.pdf = dr.select(valid, density, 0)
         bs.eta = 1.0  # radiance is not scaled at the interface
         bs.sampled_type = kind

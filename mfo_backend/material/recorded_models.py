@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable, Value
 from .blender_principled import BLENDER_5_0, blender_principled
+from .bumped_normals import BUMPED_NORMALS
 from .cycles_model import CyclesModel
 from .grid_table import loaded_buffers
 from .lobes import needed_lobes
@@ -25,6 +26,8 @@ class RecordedModel(Protocol):
 
     Attributes
     ----------
+    normals
+        Directions that the functions take besides, where nodes give the surface normals.
     scanned
         Values a global start scans: the main lobe's width first.
     two_sided
@@ -35,6 +38,7 @@ class RecordedModel(Protocol):
 
     name: str
     table: ParameterTable
+    normals: ParameterTable
     scanned: tuple[str, ...]
     two_sided: bool
     limited_width: bool
@@ -63,6 +67,7 @@ class BlenderPrincipledModel:
 
     name: str = "blender_principled"
     table: ParameterTable = BLENDER_PRINCIPLED
+    normals: ParameterTable = BUMPED_NORMALS
     scanned: tuple[str, ...] = ("roughness", "coat_roughness")
     two_sided: bool = True
     limited_width: bool = True

@@ -97,6 +97,8 @@ def _rewrite(bsdf: Element, bsdf_id: str, properties: Mapping[str, Any], texture
             continue
         if isinstance(value, str):
             ElementTree.SubElement(bsdf, "string", name=name, value=value)
+        elif isinstance(value, Mapping) and value["type"] == "projective":
+            bsdf.append(_projective(name, value))
         elif isinstance(value, Mapping) and value["type"] == "rgb":
             ElementTree.SubElement(bsdf, "rgb", name=name, value=", ".join(map(repr, value["value"])))
         elif isinstance(value, Mapping):
@@ -107,6 +109,18 @@ def _rewrite(bsdf: Element, bsdf_id: str, properties: Mapping[str, Any], texture
             bsdf.append(texture)
         else:
             ElementTree.SubElement(bsdf, "float", name=name, value=repr(float(value)))
+
+
+def _projective(name: str, properties: Mapping[str, Any]) -> Element:
+    texture = ElementTree.Element("texture", type="projective", name=name)
+    for key in ("filename", "positions", "camera"):
+        ElementTree.SubElement(texture, "string", name=key, value=properties[key])
+    outside = properties["outside"]
+    if isinstance(outside, Sequence):
+        ElementTree.SubElement(texture, "rgb", name="outside", value=", ".join(repr(float(v)) for v in outside))
+    else:
+        ElementTree.SubElement(texture, "float", name="outside", value=repr(float(outside)))
+    return texture
 
 
 def _bitmap(filename: str) -> Element:

@@ -234,11 +234,12 @@ def load_mitsuba_renderer(
     _forget_scenes_before()
     import mitsuba as mi
 
-    from ..material import principled_plugin
+    from ..material import principled_plugin, projective_texture
     from . import cycles_path
     from .lamps import lamp_plugins
 
     principled_plugin.register()
+    projective_texture.register()
     cycles_path.register()
     lamp_plugins.register()
     if light_paths is None and any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter")):

@@ -40,12 +40,12 @@ class RecordSettings:
     proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
-    wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. With
-    `light_paths` light over other surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the
-    only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more rays start
-    where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many
-    independent `samples`, or in samples of the same directions if they are `alike`. The first `direct_samples` leave
-    light over other surfaces out and need no other kernels than a recording with it.
+    wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. `bumped` says
+    that nodes give normals to the plugin. With `light_paths` light over other surfaces has Cycles' blur, clamping and
+    limits. `pixels` (height, width) are the only ones looked at; where they hold all that see the target, nothing is
+    missed. With `highlights` more rays start where lights of no extent are mirrored. Every camera ray meets the lights
+    with extent in as many independent `samples`, or in samples of the same directions if they are `alike`. The first
+    `direct_samples` leave light over other surfaces out and need no other kernels than a recording with it.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -56,6 +56,7 @@ class RecordSettings:
     stride: int = 1
     two_sided: bool = False
     held: tuple[str, ...] = ()
+    bumped: bool = False
     light_paths: LightPaths | None = None
     pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
@@ -134,7 +135,10 @@ def record_paths(
         if settings.held:
             plugin: Any = shape.bsdf()
             values = plugin.values_at(si, mi.Bool(True))
+            if settings.bumped:
+                values |= plugin.bumped_frame(si, mi.Bool(True))[2]
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
+        si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si)
@@ -186,7 +190,7 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
         hit = scene.ray_intersect_preliminary(ray, coherent=True)
         on_target = hit.is_valid() & (hit.shape == target)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
-        return _facing(shape, settings, si), on_target
+        return _turned(shape, settings, _facing(shape, settings, si)), on_target
 
     cells = PixelCells.grid((per_axis + 1) // 2)
     return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
@@ -212,6 +216,16 @@ def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     back = si.wi.z < 0.0
     si.sh_frame.n = dr.select(back, -si.sh_frame.n, si.sh_frame.n)
     si.wi.z = dr.abs(si.wi.z)
+    return si
+
+
+def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    """Shading frames turned to the normals of a bumped material's microfacets: light is sampled about them."""
+    if not settings.bumped:
+        return si
+    plugin: Any = shape.bsdf()
+    frame, wi, _ = plugin.bumped_frame(si, mi.Bool(True))
+    si.sh_frame, si.wi = frame, wi
     return si
 
 

@@ -74,7 +74,8 @@ class RecordedJacobian:
         self._width = 1 + free.length * derivatives
         values = {name: value for name, value in fixed.items() if name not in free.names}
         self._absent = [name for name, value in values.items() if value == 0.0]
-        self._held = [model.table[name] for name, value in values.items() if value is None]
+        tables = (model.table, model.normals)
+        self._held = [table[name] for table in tables for name in table.names if values.get(name, 0.0) is None]
         self._fixed_table = [model.table[n] for n, value in values.items() if value is not None and value != 0.0]
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
         self._constants = own_memory(np.concatenate([*constants, np.ones(1, np.float32)]), mi.Float)
@@ -141,7 +142,8 @@ class RecordedJacobian:
         """
         theta = own_memory(self.table.pack({}), mi.Float)
         up = dr.opaque(mi.Vector3f, (0.0, 0.0, 1.0))
-        some = [dr.opaque(mi.Color3f if p.size == 3 else mi.Float, 0.5) for p in self._held]
+        kinds = dict.fromkeys(self.model.normals.names, mi.Vector3f)
+        some = [dr.opaque(kinds.get(p.name, mi.Color3f if p.size == 3 else mi.Float), 0.5) for p in self._held]
         self._evaluate(self._parameters(*self._numbers(theta, self._constants), some), up, up)  # traced, never run
 
     def _numbers(self, theta, constants) -> tuple[list[Any], list[Any]]:

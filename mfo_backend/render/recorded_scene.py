@@ -75,6 +75,9 @@ class RecordedScene:
         self._taken = 0  # bytes for the rays of the largest recording so far
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
+        self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
+        if self._bumped:
+            self._fixed |= dict.fromkeys(self.model.normals.names)
         self._held = tuple(name for name, value in self._fixed.items() if value is None)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
 
@@ -146,6 +149,7 @@ class RecordedScene:
             stride=stride,
             two_sided=two_sided,
             held=held,
+            bumped=self._bumped,
             light_paths=light_paths,
             pixels=pixels,
             highlights=highlights,

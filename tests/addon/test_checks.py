@@ -86,8 +86,10 @@ def diffuse(scene: SimpleNamespace) -> None:
     tree(scene).links.new(shader.outputs[0], output.inputs["Surface"])
 
 
-def noise(scene: SimpleNamespace) -> None:
-    node = tree(scene).nodes.new("ShaderNodeTexNoise")
+def empty_group(scene: SimpleNamespace) -> None:
+    node = tree(scene).nodes.new("ShaderNodeGroup")
+    node.node_tree = scene.bpy.data.node_groups.new("Empty", "ShaderNodeTree")
+    node.node_tree.interface.new_socket("Value", in_out="OUTPUT", socket_type="NodeSocketFloat")
     tree(scene).links.new(node.outputs[0], principled(scene).inputs["Roughness"])
 
 
@@ -108,7 +110,7 @@ SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
     (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (render_region, "whole_frame"),
     (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
     (another_size, "resolution"), (another_display, "reference_view"),
-    (no_material, "new_material"), (diffuse, "principled"), (noise, "unlink"), (nothing_active, "select"),
+    (no_material, "new_material"), (diffuse, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
     (the_light_is_active, "select"), (nothing_chosen, "all_parameters"),
 ]  # fmt: skip
 

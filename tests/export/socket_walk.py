@@ -19,6 +19,7 @@ if __name__ == "__main__":
 
 from blender_addon.export.findings import Findings
 from blender_addon.export.material_elements import bsdf_element
+from blender_addon.export.node_graph import names_by_graph
 from blender_addon.export.read_material import principled_node, read_context, read_target
 from mfo_backend.material.principled_parameters import PARAMETER_OF_SOCKET
 
@@ -59,6 +60,8 @@ def silent_sockets() -> list[str]:
         unlinked = {is_target: _said(material, is_target) for is_target in (True, False)}
         link = material.node_tree.links.new(noise.outputs[0], socket)
         for is_target, known in unlinked.items():
+            if is_target and socket.name in names_by_graph(_target(material)):  # Cycles evaluates it
+                continue
             if not any(socket.name in new for new in set(_said(material, is_target)) - set(known)):
                 found.append(f"{socket.name}: a link is dropped ({'target' if is_target else 'another object'})")
         material.node_tree.links.remove(link)
@@ -68,6 +71,10 @@ def silent_sockets() -> list[str]:
 
 def _carried(name: str) -> bool:
     return name in PARAMETER_OF_SOCKET
+
+
+def _target(material: Any) -> Any:
+    return read_target(material, "Thing", 0, Findings())
 
 
 def _said(material: Any, is_target: bool = True) -> list[str]:
