@@ -203,7 +203,8 @@ def _file_reference(scene: bpy.types.Scene) -> _Picture:
     refuse_kind(path, header)
     if header is None:
         raise ExportError(f"The reference {path.name} holds no picture its name promises: choose another file.")
-    words = f"{header.width} x {header.height}, {header.depth} {header.kind}" if header.width else header.kind
+    kind = f"{header.depth} {header.kind}".strip()
+    words = f"{header.width} x {header.height}, {kind}" if header.width else header.kind
     is_linear = path.suffix.lower() in LINEAR_SUFFIXES
     said = turn_notes(path.name, header, picture_size(scene.render))
     space = other_space(header) if is_linear else ""

@@ -18,6 +18,7 @@ _GERMAN = {
     "Advanced": "Erweitert",
     "All": "Alle",
     "An image of this .blend file": "Ein Bild dieser .blend-Datei",
+    "Animated values": "Animierte Werte",
     "Animated": "Animierte",
     "Ask the backend's Python again whether it can run a fit": "Das Python des Backends erneut fragen, ob es eine Anpassung rechnen kann",
     "Automatic": "Automatisch",

@@ -48,8 +48,8 @@ class Result:
         text = ("A: own values" if shows_own else "B: recovered values") if applied else "A/B"
         node = principled_node(material) if material is not None else None
         if node is not None and animation_of(node):
+            layout.label(text="Animated values", icon="ANIM")
             row = layout.row()
-            row.label(text="Animated", icon="ANIM")
             row.prop(context.scene.mfo, "animated", expand=True)
         column.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         if runtime.has_result:

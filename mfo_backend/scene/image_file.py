@@ -6,18 +6,23 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..types.errors import BadInputError
 from ..types.image import Encoding, Image, Pixels
+from .colour_profile import other_profile
 from .exr_file import read_exr, write_exr
 from .hdr_file import read_hdr
 from .picture_kind import SHOWN, refuse_another_kind
 from .picture_size import Size, check_declared_size
 from .png_file import deep_colour
 from .scene_xml import is_file
+
+if TYPE_CHECKING:
+    from PIL import Image as PillowImage
 
 __all__ = ["check_reference", "read_image", "write_exr", "write_png"]
 
@@ -128,12 +133,25 @@ def _read_display(path: Path, size: Size | None) -> Image:
         raise BadInputError(f"Image {path.name!r} cannot be read: the file is damaged or not an image.") from error
     if picture.mode.startswith("I") or picture.mode == "F":
         return _read_grey(path, np.asarray(picture))
-    shown = SHOWN.get(orientation, "")
-    note = f"{path.name}: its EXIF data want it shown {shown}; it was taken as it is stored, as in Blender."
+    notes = _said(path.name, picture, orientation)
     rgba = np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
     has_alpha = "A" in picture.getbands() or "transparency" in picture.info
     alpha = _contiguous(rgba[..., 3]) if has_alpha else None
-    return Image(_contiguous(rgba[..., :3]), Encoding.SRGB, alpha, (note,) if shown else ())
+    return Image(_contiguous(rgba[..., :3]), Encoding.SRGB, alpha, notes)
+
+
+def _said(name: str, picture: PillowImage.Image, orientation: int) -> tuple[str, ...]:
+    """What a user should know of a display picture that is taken as it is stored, its numbers as sRGB."""
+    notes = []
+    if orientation in SHOWN:
+        shown = SHOWN[orientation]
+        notes.append(f"{name}: its EXIF data want it shown {shown}; it was taken as it is stored, as in Blender.")
+    profile = other_profile(picture.info.get("icc_profile") or b"")
+    if profile:
+        notes.append(f"{name}: its colour profile is {profile!r}; its numbers were taken as sRGB, as in Blender.")
+    if picture.mode == "CMYK":
+        notes.append(f"{name}: it holds ink (CMYK), which was turned into RGB without a profile: save it as sRGB.")
+    return tuple(notes)
 
 
 def _read_grey(path: Path, grey: NDArray) -> Image:

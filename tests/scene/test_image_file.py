@@ -9,6 +9,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from PIL import Image as PillowImage
+from PIL import ImageCms
 
 from mfo_backend.scene.image_file import check_reference, read_image, write_exr, write_png
 from mfo_backend.scene.picture_kind import SHOWN
@@ -209,6 +210,25 @@ def test_exif_orientation_is_said_and_left(tmp_path, suffix, orientation):
     np.testing.assert_allclose(image.pixels * 255, levels, atol=12)  # JPEG and WebP are lossy
     assert len(image.notes) == 1
     assert f"want it shown {SHOWN[orientation]}; it was taken as it is stored" in image.notes[0]
+
+
+def test_a_colour_profile_that_is_not_srgb_is_said(tmp_path):
+    picture = PillowImage.new("RGB", (4, 4))
+
+    def said(profile):
+        picture.save(tmp_path / "a.jpg", icc_profile=profile)
+        return read_image(tmp_path / "a.jpg").notes
+
+    assert said(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()) == ()
+    header, table = bytes(128), struct.pack(">I4sII", 1, b"desc", 144, 64)
+    old = b"desc" + bytes(4) + struct.pack(">I", 11) + b"Display P3\0"
+    new = b"mluc" + bytes(4) + struct.pack(">II2s2sII", 1, 12, b"en", b"US", 20, 28) + "Display P3".encode("utf-16-be")
+    for description in (old, new):
+        (note,) = said(header + table + description.ljust(64, b"\0"))
+        assert note == "a.jpg: its colour profile is 'Display P3'; its numbers were taken as sRGB, as in Blender."
+    assert said(header + table) == ()  # cut off
+    PillowImage.new("CMYK", (4, 4)).save(tmp_path / "a.jpg")
+    assert "it holds ink (CMYK)" in read_image(tmp_path / "a.jpg").notes[0]
 
 
 @pytest.mark.parametrize(
