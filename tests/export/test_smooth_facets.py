@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.export.job import check_export
 from blender_addon.versions import shadow_terminator
 
 from .scenes import add_camera, add_light, new_material
@@ -91,3 +92,15 @@ def test_recorded_paths_see_the_same(scene: Any, export: Any, render_cycles: Any
     picture = groups.average(renderer.image(renderer.start, seed=7, spp=256))
     got = recorded.evaluator(paths, groups)(renderer.start)[:, :, 0]
     assert np.abs(got - picture).mean() / picture.mean() < 0.02
+
+
+@pytest.mark.parametrize(("segments", "is_named"), [(12, True), (48, False)])
+def test_meshes_whose_normals_turn_far_are_named(segments: int, is_named: bool, scene: Any) -> None:
+    coarse_ball(scene, 0.1, 0.0, **PLASTIC)
+    bpy.data.objects.remove(bpy.context.object)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2)
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.data.materials.append(new_material("Other"))
+    errors, notes = check_export(bpy.context, bpy.context.object)
+    assert not errors
+    assert any("smooth over few faces" in note for note in notes) == is_named

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random scenes rendered by Cycles and, from their export, by our renderer; failures are minimised to their causes.
+
+    python -m studies.differential [--scenes 100] [--seed 0] [--size 48] [--samples 64] [--exported]
+
+A scene fails if the pictures differ (`compare`), the export was not refused, and no note names a setting without which
+they agree. Prints each failure with the settings it takes, and how many scenes in a row had none. Needs `bpy`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .compare import Difference, Picture, compare
+from .random_scene import PLAIN_WORDS, WORDS, Rig, build, drawn
+
+AGAIN = 4  # times as many samples, with other seeds, before a difference is believed
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one scene: what was set, the export's refusal if any, its notes, and the difference of the pictures."""
+
+    settings: tuple[str, ...]
+    refusal: str
+    notes: tuple[str, ...]
+    difference: Difference | None
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the pictures differ and no sentence names one of the settings."""
+        words = [*PLAIN_WORDS, *(word for name in self.settings for word in WORDS[name])]
+        named = any(word in note for word in words for note in self.notes)
+        return self.difference is not None and self.difference.is_failure and not named
+
+
+def try_scene(settings: Sequence[str], seed: int, folder: Path, *, size: int, samples: int) -> Outcome:
+    """Build, export and render one scene."""
+    from blender_addon.export.job import ExportError, export_job
+
+    rig = build(settings, seed, folder, size=size, samples=samples)
+    theirs = (_cycles(rig, folder, 1), _cycles(rig, folder, 2))
+    job = folder / f"job_{len(list(folder.glob('job_*')))}"
+    try:
+        import bpy
+
+        report = export_job(bpy.context, rig.target, job, reference=folder / "cycles_1.exr", fit={})
+    except ExportError as refusal:
+        return Outcome(tuple(settings), str(refusal), (), None)
+    ours = _ours(job, samples)
+    return Outcome(tuple(settings), "", report.notes, compare(ours, theirs))
+
+
+def minimised(outcome: Outcome, seed: int, folder: Path, *, size: int, samples: int) -> Outcome:
+    """Leave settings out as long as the scene stays a silent failure."""
+    for name in outcome.settings:
+        fewer = [kept for kept in outcome.settings if kept != name]
+        found = try_scene(fewer, seed, folder, size=size, samples=samples)
+        if found.is_silent:
+            outcome = found
+    return outcome
+
+
+def study(scenes: int, seed: int, *, size: int, samples: int, exported: bool = False) -> list[Outcome]:
+    """Try that many scenes and return the silent failures, minimised."""
+    failures, refused, named = [], 0, 0
+    for number in range(seed, seed + scenes):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            outcome = try_scene(drawn(number, exported=exported), number, folder, size=size, samples=samples)
+            refused += bool(outcome.refusal)
+            named += outcome.difference is not None and outcome.difference.is_failure and not outcome.is_silent
+            if outcome.is_silent:
+                outcome = try_scene(outcome.settings, number, folder, size=size, samples=AGAIN * samples)
+            if outcome.is_silent:
+                outcome = minimised(outcome, number, folder, size=size, samples=AGAIN * samples)
+                failures.append(outcome)
+                print(f"scene {number}: {', '.join(outcome.settings) or 'the plain scene'}: {outcome.difference}")
+            sys.stdout.flush()
+    print(f"{scenes} scenes from {seed}: {len(failures)} silent failures, {named} named, {refused} refused")
+    return failures
+
+
+def _cycles(rig: Rig, folder: Path, seed: int) -> Picture:
+    import bpy
+    import OpenEXR
+
+    rig.scene.cycles.seed = seed
+    path = folder / f"cycles_{seed}.exr"
+    rig.scene.render.filepath = str(path)
+    with _quiet():
+        bpy.ops.render.render(write_still=True)
+    channels: Any = OpenEXR.File(str(path)).channels()
+    return np.asarray(next(iter(channels.values())).pixels[:, :, :3], np.float64)
+
+
+def _ours(job: Path, samples: int) -> tuple[Picture, Picture]:
+    from mfo_backend.job.fit_scene import request_materials
+    from mfo_backend.job.job_folder import JobFolder
+    from mfo_backend.job.request import read_request
+    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.renderer import load_renderer
+
+    if needs_llvm():
+        configure_llvm()
+    folder = JobFolder.open(job)
+    request = read_request(folder)
+    renderer = load_renderer(
+        job / request.scene,
+        request.target.shape_id,
+        model="blender_principled",
+        parameters=["specular_ior_level"],
+        materials=request_materials(folder, request),
+        light_paths=request.light_paths,
+    )
+    first, second = (renderer.image(renderer.start, seed=seed, spp=samples).astype(np.float64) for seed in (11, 12))
+    return first, second
+
+
+@contextlib.contextmanager
+def _quiet() -> Any:
+    """Without Blender's own lines on stdout."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 1)
+            os.close(kept)
+
+
+def main() -> None:
+    """Run the study from the command line; ends with 1 after a silent failure."""
+    parser = argparse.ArgumentParser(prog="python -m studies.differential", description=__doc__)
+    parser.add_argument("--scenes", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--size", type=int, default=48, help="pixels along each side")
+    parser.add_argument("--samples", type=int, default=64, help="a pixel, of each of two halves")
+    parser.add_argument("--exported", action="store_true", help="only settings that no sentence names")
+    chosen = parser.parse_args()
+    failures = study(chosen.scenes, chosen.seed, size=chosen.size, samples=chosen.samples, exported=chosen.exported)
+    sys.exit(1 if failures else 0)

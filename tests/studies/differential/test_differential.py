@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A slice of the study, and what it says of a planted difference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studies.differential.compare import compare
+
+pytest.importorskip("bpy")
+
+
+SEED = 1  # a fine ball
+
+
+def noisy(mean: np.ndarray, deviation: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    draw = np.random.default_rng(seed)
+    return tuple(mean + draw.normal(0.0, deviation, mean.shape) for _ in range(2))  # type: ignore[return-value]
+
+
+def test_noise_is_no_difference() -> None:
+    mean = np.full((48, 48, 3), 0.5)
+    for seed in range(50):
+        assert not compare(noisy(mean, 0.2, seed), noisy(mean, 0.2, 1000 + seed)).is_failure
+
+
+def test_a_block_or_a_level_is_one() -> None:
+    mean = np.full((48, 48, 3), 0.5)
+    block = mean.copy()
+    block[8:16, 8:16] *= 1.2
+    assert compare(noisy(block, 0.05, 1), noisy(mean, 0.05, 2)).block_deviations > 4.0
+    found = compare(noisy(1.03 * mean, 0.05, 1), noisy(mean, 0.05, 2))
+    assert found.is_failure
+    assert found.level == pytest.approx(0.03, abs=0.005)
+
+
+def test_five_scenes_hold_no_silent_difference() -> None:
+    from studies.differential.study import study
+
+    assert study(5, 0, size=32, samples=32) == []
+
+
+def test_a_planted_difference_is_minimised_to_its_cause(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+    """A lamp that the export forgets: the setting that brightens it is what remains of three."""
+    from blender_addon.export import read_light
+    from studies.differential.study import minimised, try_scene
+
+    monkeypatch.setattr(read_light, "light_strength", lambda light: 350.0)
+    settings = ("lens", "lamp energy", "muted node")
+    outcome = try_scene(settings, SEED, tmp_path, size=32, samples=32)
+    assert outcome.is_silent
+    assert minimised(outcome, SEED, tmp_path, size=32, samples=32).settings == ("lamp energy",)
