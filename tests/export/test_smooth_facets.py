@@ -77,7 +77,7 @@ def test_light_is_where_cycles_has_it(
     renderer = our_renderer(export(item, reference=tmp_path / "cycles.exr"))
     ours = renderer.image(renderer.start, seed=1, spp=64)
     assert abs(ours.mean() / theirs.mean() - 1.0) < 0.01
-    assert np.abs(ours - theirs).mean() / theirs.mean() < 0.02  # without it 0.06: facets at the terminator are black
+    assert np.abs(ours - theirs).mean() / theirs.mean() < 0.03  # without it 0.06: facets at the terminator are black
 
 
 def test_recorded_paths_see_the_same(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, tmp_path: Path) -> None:

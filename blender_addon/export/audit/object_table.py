@@ -18,7 +18,8 @@ OBJECT = Owner(
     "add_rest_position_attribute",
     no_effect="active_selection_set animation_visualization bound_box collision color dimensions display "
     "display_bounds_type display_type empty_display_size empty_display_type empty_image_depth empty_image_offset "
-    "empty_image_side field hide_probe_plane hide_probe_sphere hide_probe_volume hide_select hide_surface_pick "
+    "empty_image_side field grease_pencil_modifiers hide_probe_plane hide_probe_sphere hide_probe_volume "
+    "hide_select hide_surface_pick "
     "image_user is_from_set lightgroup lineart lock_location lock_rotation lock_rotation_w lock_rotations_4d "
     "lock_scale "
     "motion_path pass_index rigid_body rigid_body_constraint selection_sets shader_effects "
@@ -85,7 +86,10 @@ WORLD_VISIBILITY = Owner(
 LIGHT = Owner(
     exported="angle color cycles energy exposure node_tree normalize shadow_soft_size shape size size_y spot_blend "
     "spot_size spread temperature temperature_color type use_nodes use_shadow use_soft_falloff use_temperature",
-    no_effect="cutoff_distance diffuse_factor shadow_buffer_clip_start shadow_cascade_count shadow_cascade_exponent "
+    # the first line is of Eevee before Blender 4.3
+    no_effect="contact_shadow_bias contact_shadow_distance contact_shadow_thickness shadow_buffer_bias shadow_color "
+    "use_contact_shadow cutoff_distance diffuse_factor shadow_buffer_clip_start shadow_cascade_count "
+    "shadow_cascade_exponent "
     "shadow_cascade_fade shadow_cascade_max_distance shadow_filter_radius shadow_jitter_overblur "
     "shadow_maximum_resolution show_cone specular_factor transmission_factor use_absolute_resolution "
     "use_custom_distance use_shadow_jitter use_square volume_factor",

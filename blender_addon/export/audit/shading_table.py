@@ -10,7 +10,8 @@ MATERIAL = Owner(
     no_effect="alpha_threshold blend_method grease_pencil is_grease_pencil line_color line_priority lineart "
     "max_vertex_displacement metallic paint_active_slot paint_clone_slot pass_index preview_render_type "
     "refraction_depth "
-    "roughness show_transparent_back specular_color specular_intensity surface_render_method texture_paint_images "
+    "roughness shadow_method show_transparent_back specular_color specular_intensity surface_render_method "
+    "texture_paint_images "
     "texture_paint_slots thickness_mode use_backface_culling use_backface_culling_lightprobe_volume "
     "use_backface_culling_shadow use_preview_world use_raytrace_refraction use_screen_refraction use_sss_translucency "
     "use_thickness_from_shadow use_transparency_overlap volume_intersection_method",
