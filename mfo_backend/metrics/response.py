@@ -141,6 +141,12 @@ class OnDisplay:
         return self.response.push(self.view.light(linear), self.view.light_push(linear, tangent))
 
 
+# Part of the mean radiance that counts as dim: relative differences are of radiance and this, so that pixels that are
+# nearly black do not decide. Larger: shadows count less. Smaller: their noise decides. A metal under one lamp has a
+# median of a thousandth of its mean, and its dark part outweighed its highlight (docs/notebook/hard_cases.md).
+DIM_FLOOR = 0.1
+
+
 def relative_to(reference: Array) -> Scaled:
     """Radiance relative to the reference's own, with a floor of 1 % of its mean under dark pixels."""
     floor = 0.01 * _mean(reference)
@@ -149,7 +155,7 @@ def relative_to(reference: Array) -> Scaled:
 
 def logarithmic_for(reference: Array) -> Logarithmic:
     """The logarithmic response whose toe is a tenth of the reference's mean."""
-    return Logarithmic(0.1 * _mean(reference))
+    return Logarithmic(DIM_FLOOR * _mean(reference))
 
 
 def nits_per_unit(reference: Array, mask: NDArray[np.bool_] | None = None, median_nits: float = 100.0) -> float:

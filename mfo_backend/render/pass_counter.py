@@ -6,6 +6,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+# Passes that a derivative takes, as a part of one without: Dr.Jit's forward mode took 564 operations for a value of
+# Mitsuba's principled and 2098 with 14 derivatives. Dual numbers take less by now, and a pass stays what it was.
+OF_A_DERIVATIVE = 0.2
+
+
+def with_derivatives(passes: float, count: int) -> float:
+    """Passes of an evaluation with its derivatives by so many values: 1 + 0.2 K times those without."""
+    return passes * (1.0 + OF_A_DERIVATIVE * count)
+
 
 class PassCounter:
     """Counts passes: a pass is one render of a full picture, and whatever a fit does is a number of them.

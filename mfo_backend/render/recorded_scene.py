@@ -25,6 +25,7 @@ from .lamps.met_lamps import lights_have_no_extent
 from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
 from .packed_lanes import LaneReader, Lanes
+from .pass_counter import with_derivatives
 from .primary_rays import tile_order
 from .proposal import DefensiveProposal
 from .record_paths import RecordSettings, record_paths
@@ -227,9 +228,7 @@ class RecordedScene:
         """The function from a vector to image and Jacobian of the groups, background included."""
         constant = groups.average(paths.constant)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
-        # 1 + 0.2 K: of Dr.Jit's own forward mode, 564 operations for a value of Mitsuba's principled and 2098 with 14
-        # derivatives; dual numbers take less, and a pass stays what it was
-        cost = self._share(groups) * (1.0 + 0.2 * self.renderer.table.length)
+        cost = with_derivatives(self._share(groups), self.renderer.table.length)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             samples = self.jacobian(vector, lanes(), groups)

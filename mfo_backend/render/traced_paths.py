@@ -32,6 +32,7 @@ from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable
 from .lamps.met_lamps import SceneLamps, alone
 from .mitsuba_renderer import MitsubaRenderer
+from .pass_counter import with_derivatives
 from .primary_rays import camera_ray, through_filter
 from .smooth_facets import ShadowTerminator, sample_light, seen_side
 
@@ -147,7 +148,7 @@ class TracedPaths:
                 result[group, some] = self._launch(vectors[group], pixels[some], begin, seed, samples, jacobian)
         film = self.renderer.scene.sensors()[0].film().crop_size()
         share = len(pixels) * samples * len(vectors) / float(film[0] * film[1])
-        self.renderer.counter.add(share / 16.0 * (1.0 + (0.2 * self.table.length if jacobian else 0.0)))
+        self.renderer.counter.add(with_derivatives(share / 16.0, self.table.length if jacobian else 0))
         return self._tangents.expand(result) if jacobian else result
 
     def _launch(self, vectors, pixels, begin, seed, samples, jacobian) -> NDArray[np.float32]:

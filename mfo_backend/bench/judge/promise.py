@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...fit.certainty.covariance import DETERMINED_BELOW
+from ...fit.tolerances import DETERMINED_BELOW
 from ...types.parameter import Parameter
 
 _INTERVAL = 1.96  # standard deviations: 95 % of a normal distribution

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable
-from ..certainty.covariance import MODEL_ERROR
 from ..search.global_start import OPPOSITE
-from ..search.race_starts import CLEARLY_LOWER
 from ..squares.problem import Problem, Rival
+from ..tolerances import ANOTHER_MATERIAL, CLEARLY_LOWER, HOPELESS, MODEL_ERROR
 from .compare import compare
-from .simplest import APART, HOPELESS, exchangeable, exchanged
+from .simplest import exchangeable, exchanged
 
 Vector = NDArray[np.float64]
 # of a start, given up where it promises no less than this cost
@@ -78,15 +77,20 @@ def metal_rivals(
     if start is None:
         return found, ()
     cost = found.equations.cost
-    noise = max(cost, 0.5 * MODEL_ERROR**2)
-    most = cost + HOPELESS * noise / problem.independent
+    most = _out_of_reach(problem, cost)
     other = solve(np.clip(start, table.lower, table.upper), most)
     away = np.max(np.abs(other.x - found.x) / (table.upper - table.lower))
-    if other.equations.cost > most or away < APART:
+    if other.equations.cost > most or away < ANOTHER_MATERIAL:
         return found, ()
     if other.equations.cost < cost:
         found, other = other, found
     return found, (Rival(other.x, compare(problem, found.x, other.x, MODEL_ERROR).better),)
+
+
+def _out_of_reach(problem: Problem, cost: float) -> float:
+    """The cost above which a material is no rival of one of this `cost`, on a problem without noise."""
+    noise = max(cost, 0.5 * MODEL_ERROR**2)
+    return cost + HOPELESS * noise / problem.independent
 
 
 def metal_exchanged(x: Vector, table: ParameterTable) -> Vector | None:
@@ -138,8 +142,7 @@ def width_rivals(problem: Problem, x: Vector, table: ParameterTable) -> tuple[Ri
     if past <= least:
         return ()
     cost = problem.equations(x).cost
-    noise = max(cost, 0.5 * MODEL_ERROR**2)
-    if problem.equations(alike(past)).cost > cost + HOPELESS * noise / problem.independent:
+    if problem.equations(alike(past)).cost > _out_of_reach(problem, cost):
         return ()
     return (Rival(alike(least), SHARE, last=True),)
 

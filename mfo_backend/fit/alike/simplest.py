@@ -17,18 +17,15 @@ from numpy.typing import NDArray
 from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable
 from ..squares.problem import Problem, Refined, Rival
+from ..tolerances import ANOTHER_MATERIAL, HOPELESS, SIGNIFICANT
 from .compare import compare
-from .unneeded_lobes import SIGNIFICANT, Box, box_holding, is_off, values_off
+from .unneeded_lobes import Box, box_holding, is_off, values_off
 
 Vector = NDArray[np.float64]
 
 BASE, COAT = ("specular_ior_level", "roughness"), ("coat_weight", "coat_roughness")
 SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the same index does (Blender 4.0)
 EVALUATIONS = 12
-APART = 0.02  # of the box, in some value: another material
-# More chi squared is not looked at: in nine scenes that Cycles had rendered, such differences were 2.6 to 17 standard
-# deviations by the scatter between tiles, and smaller ones at most 2.3
-HOPELESS = 60.0
 
 
 class Solve(Protocol):
@@ -66,7 +63,7 @@ class OtherEnds:
         box = box_holding(table, self._user, found.off)
         end = self._attempt(found.end, np.clip(exchanged(x, table), *box), box)
         width = table.upper - table.lower
-        if end is None or np.max(np.abs(end.x - x) / width) < APART:
+        if end is None or np.max(np.abs(end.x - x) / width) < ANOTHER_MATERIAL:
             return found
         if is_off(COAT[0], end.x, table) and COAT[0] in values_off(table, self._user):
             return found  # which is simpler: `_without_lobes` comes there, too

@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import NormalEquations, Solution, step_in_box
 from ...types.parameter import ParameterTable
+from ..tolerances import OFF, SIGNIFICANT
 
 Vector = NDArray[np.float64]
 Box = tuple[Vector, Vector]
-
-# A lobe that the user's material lacks comes in only where the picture asks for it by three standard deviations
-SIGNIFICANT = 9.0
-OFF = 2e-3  # of the box: a value this near its lower bound is switched off
 
 
 def solve_without_unneeded(

@@ -19,13 +19,10 @@ from ...types.certainty import Certainty, Level
 from ...types.parameter import ParameterTable
 from ..squares.problem import Rival
 from ..squares.recording_noise import without_own_noise
+from ..tolerances import DETERMINED_BELOW, MODEL_ERROR, WEAK_BELOW
 
 Vector = NDArray[np.float64]
 
-DETERMINED_BELOW = 0.02  # of a value that spans [0, 1]: two such steps are hard to tell apart by eye
-WEAK_BELOW = 0.15
-# Relative error a picture has even where the residual says 0: float32, quantisation, small differences of renderers
-MODEL_ERROR = 0.002
 INFLATION = 1.2  # where own noise in the derivatives is not known
 TOGETHER, MOST_NAMED = 0.5, 2  # correlation from which on two values move together; so many are named
 PRIOR_SD = 1.0  # of the box: keeps directions without any effect finite

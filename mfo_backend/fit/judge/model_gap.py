@@ -12,11 +12,11 @@ from ...metrics.neighbours import sums_around
 from ...metrics.tone_mapping import View
 from ...types.image import Encoding, Image, Pixels
 from ...types.model_gap import ModelGap
+from ..tolerances import DIM_FLOOR
 from .region import blocks_around
 
 BLOCK = 4  # pixels along each side of what is compared
 LEAST_BLOCKS = 32  # fewer say too little
-FLOOR = 0.1  # of the mean level: darker blocks count as if they were so bright
 CONFIDENCE = 1.64  # standard deviations that 95 % of normal draws stay below
 # A difference whose square is not twice its standard deviation above 0 may be none
 SIGNIFICANT = 2.0
@@ -47,7 +47,7 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
         for render, chosen in ((first, even), (second, ~even))
     )
     level = _around(block_sums(np.asarray(first, np.float64) + second, BLOCK).mean(axis=-1) / (2 * BLOCK**2), full)
-    scale = np.maximum(level, 0.0) + FLOOR * max(float(level.mean()), 1e-12)
+    scale = np.maximum(level, 0.0) + DIM_FLOOR * max(float(level.mean()), 1e-12)
     squares = (a * b / scale**2).mean(axis=-1)
     square, sd = float(squares.mean()), float(squares.std()) / squares.size**0.5
     found = max(square, 0.0) ** 0.5 if square > SIGNIFICANT * sd else 0.0

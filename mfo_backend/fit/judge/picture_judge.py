@@ -15,8 +15,6 @@ from .checked_reference import counted_pixels, stage_losses
 from .region import fill_outside
 
 BLUR = 2.0  # pixels: takes nine tenths of independent noise away and little of what few global values change
-NOISY = 0.02  # noise of a pixel relative to its radiance that FLIP sees
-VISIBLE = 0.002  # mean FLIP; values that the picture does not show change it by less than half of this
 
 
 class PictureJudge:

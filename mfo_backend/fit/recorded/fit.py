@@ -15,7 +15,7 @@ from ...types.image import Pixels
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.weak_combinations import weak_combinations
 from ..judge.fit_task import FitTask
-from ..judge.picture_judge import NOISY, PictureJudge
+from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from ..plans import RecordedPlan
 from ..result.course import Course
@@ -30,6 +30,7 @@ from ..squares.residuals import (
     log_residual,
 )
 from ..squares.stage_residuals import finishing_residuals
+from ..tolerances import AT_NOISE, NOISY
 from .keep_user_values import Kept, keep_values
 from .perceptual_stages import perceptual_ends
 from .recording import Setting, Vector
@@ -37,8 +38,6 @@ from .refine import OnRecording, refine_exact, refine_sampled
 from .start import start_from_nothing
 
 STAGES = ("scan", "start", "refine")
-# Root mean square residual, in standard deviations of the noise, from which on there is more than noise to explain
-AT_NOISE = 1.5
 NOTHING_SEEN = "What is left of the picture ({:.1g} %) nobody sees: perceptual stages were left out."
 NOTHING_BUT_NOISE = (
     "The fit has reached the noise of the picture and of its own rays ({:.2g} % a pixel): "

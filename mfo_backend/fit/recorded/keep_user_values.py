@@ -15,23 +15,16 @@ from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..alike.compare import rival_notes
-from ..alike.unneeded_lobes import SIGNIFICANT, box_holding, dispensable, moved_to_user, unneeded_lobes
-from ..certainty.covariance import MODEL_ERROR, certainties, covariance, standard_deviations, with_rivals
-from ..judge.picture_judge import VISIBLE
+from ..alike.unneeded_lobes import box_holding, dispensable, moved_to_user, unneeded_lobes
+from ..certainty.covariance import certainties, covariance, standard_deviations, with_rivals
 from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
 from ..squares.recording_noise import rows_of_samples
 from ..squares.residuals import RelativeResidual
+from ..tolerances import AS_GOOD, MODEL_ERROR, NOT_AS_GOOD, SIGNIFICANT, UNSEEN_CHANGE, VISIBLE
 from .recording import Recording, Setting, Vector
 from .refine import OnRecording
 from .solve import solve_within
-
-# Values the picture does not determine go back to the user's if that costs no more than this share of the residual
-KEEP_TOLERANCE = 1.01
-HOPELESS = 1.1  # the same, by some of the groups
-# Mean change of a picture's pixels, relative to them and to a hundredth of their median, that FLIP need not be asked
-# about: even where both were equal, where FLIP is steepest, it rises by 0.0013 at most
-UNSEEN_CHANGE = 5e-5
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,7 @@ def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], fl
         for back in _sets_to_return(unseen, off, problem, found, user, table):
             held = [*back, *(name for name in off if name not in back)]
             kept = _solve_holding(setting, refined, found, held)
-            if kept is not None and judged(kept)[0] <= KEEP_TOLERANCE * cost + 1e-8 and unseen_change(kept):
+            if kept is not None and judged(kept)[0] <= AS_GOOD * cost + 1e-8 and unseen_change(kept):
                 found, off = kept, held
                 notes.append(kept_note(back))
                 break
@@ -173,10 +166,10 @@ def _solve_holding(setting: Setting, refined: Refined, found: Vector, names: lis
             return None
         guess, cost = found + step, refined.few.equations
         before = cost(found).cost
-        if cost(guess).cost <= KEEP_TOLERANCE * before:
+        if cost(guess).cost <= AS_GOOD * before:
             start = guess
         else:
-            nearer, hopeless = min(start, guess, key=lambda x: cost(x).cost), HOPELESS * before
+            nearer, hopeless = min(start, guess, key=lambda x: cost(x).cost), NOT_AS_GOOD * before
             start = solve_within(setting, refined.few, nearer, (lower, upper), wanted=hopeless)
             if cost(start).cost > hopeless:
                 return None

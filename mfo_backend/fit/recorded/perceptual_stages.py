@@ -16,10 +16,10 @@ from ..result.outcome import End
 from ..settings import FitSettings
 from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual
+from ..tolerances import ANOTHER_BASIN
 from .recording import Recording, Vector
 from .solve import solve, solve_within
 
-BASIN = 0.1  # of the box: solutions nearer than this in every value are one
 FLIP_STARTS = 2
 FINALISTS = 2  # ends that are path-traced besides the start and the end of the least squares
 EVALUATIONS = 25  # of a stage, from each start
@@ -59,7 +59,7 @@ def perceptual_ends(
         nearest: list[Vector] = []
         width = setting.table.upper - setting.table.lower
         for x in sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(recording.picture(x))):
-            if all(np.max(np.abs(x - other) / width) > BASIN for other in nearest):
+            if all(np.max(np.abs(x - other) / width) > ANOTHER_BASIN for other in nearest):
                 nearest.append(x)
         ends += [End("flip", x) for x in _lower_flip(recording, judge, nearest[:FLIP_STARTS], box)]
     if len(ends) <= FINALISTS:

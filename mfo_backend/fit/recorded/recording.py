@@ -20,13 +20,12 @@ from ..random_streams import Stream
 from ..result.course import Course
 from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual, MakeWeighted, OneSidedResidual, WeightedResidual
+from ..tolerances import MODEL_ERROR
 from .reference_noise import TileNoise, tile_noise
 from .where_to_look import all_groups, detail_grid, without_fireflies
 
 Vector = NDArray[np.float64]
 
-# Share of the radiance that no weight looks below: float32, quantisation, small differences of renderers
-LEAST_NOISE = 0.002
 SAMPLES = 2  # of the light in a recording at the solution: their difference shows the recording's own noise
 
 
@@ -196,7 +195,7 @@ class Recording:
 
     def weighing(self, noise: TileNoise, side: int, weigh: MakeWeighted = WeightedResidual) -> MakeResidual:
         """Residuals of tiles of this side, or of some of them, in standard deviations of their `noise`."""
-        least = LEAST_NOISE * float(self.tiles(side).average(self.setting.reference).mean())
+        least = MODEL_ERROR * float(self.tiles(side).average(self.setting.reference).mean())
         weight = (1.0 / np.hypot(noise.deviation, max(least, 1e-12))).astype(np.float32)
         return lambda target: weigh(target, weight)
 

@@ -19,11 +19,11 @@ from ...metrics.neighbours import next_to, sums_around
 from ...render.primary_rays import TILE
 from ...render.recorded_paths import LaneGroups, RecordedPaths
 from ...types.image import Pixels
+from ..tolerances import DIM_FLOOR
 
 REACH = 8  # pixels to each side of a tile that its variance is taken from
 PRIOR_PAIRS = 8  # pairs of pixels that the variance of the whole picture counts for
 SKEW = 1.5  # mean over median of the tiles' variances under path tracing's skewed noise, about
-DARK = 0.1  # share of the mean below which noise no longer shrinks with the radiance
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def tile_noise(
     shown[at] = model * keep[:, None]
     rows, columns = (np.minimum(line.index, n - 1) for line, n in zip(lines, reference.shape[:2], strict=True))
     reference = np.where(inside, reference[np.ix_(rows, columns)], np.float32(0.0))
-    level = block_sums(shown, side) / np.maximum(block_sums(inside, side), 1) + DARK * max(
+    level = block_sums(shown, side) / np.maximum(block_sums(inside, side), 1) + DIM_FLOOR * max(
         float(reference[inside[..., 0]].mean()), 1e-12
     )
     residual = (reference - shown) / np.repeat(np.repeat(level, side, 0), side, 1)

@@ -11,8 +11,8 @@ import numpy as np
 from ...solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
 from ..alike.unneeded_lobes import Box
 from ..result.course import Stage
-from ..search.race_starts import CLEARLY_LOWER
 from ..squares.problem import Problem
+from ..tolerances import CLEARLY_LOWER
 from .recording import Setting, Vector
 
 COST_CHANGE = 1e-5  # relative, of a step that ends a solve

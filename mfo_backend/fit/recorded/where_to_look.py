@@ -14,6 +14,7 @@ from ...render.recorded_paths import LaneGroups, RecordedPaths
 from ...render.widened_mask import widened
 from ...types.image import Pixels
 from ..plans import RecordedPlan
+from ..tolerances import DIM_FLOOR
 
 # A pixel with background in it depends on the exact positions of its samples, which the reference does not share
 MINIMUM_INTERIOR_SHARE = 0.3
@@ -89,7 +90,7 @@ def detail_grid(
     """
     value = luminance(reference)
     lit = value[mask & (value > 0.0)]
-    floor = 0.1 * float(np.median(lit)) if lit.size else 1.0
+    floor = DIM_FLOOR * float(np.median(lit)) if lit.size else 1.0
     level = np.log(np.maximum(value, 0.0) + floor)
     change, inside = np.zeros_like(level), mask.copy()
     for axis in (0, 1):
@@ -182,7 +183,7 @@ def without_fireflies(image: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, i
     near = np.zeros_like(level)
     for dy, dx in _AROUND:
         np.maximum(near, padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width], out=near)
-    floor = 0.1 * float(level[mask].mean()) if mask.any() else 0.0
+    floor = DIM_FLOOR * float(level[mask].mean()) if mask.any() else 0.0
     row, column = np.nonzero(mask & (level > FIREFLY * np.maximum(near, floor)))
     around = [image[np.clip(row + dy, 0, height - 1), np.clip(column + dx, 0, width - 1)] for dy, dx in _AROUND]
     calm = image.astype(np.float32)

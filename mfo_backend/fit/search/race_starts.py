@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import Solution
 from ..plans import RecordedPlan
+from ..tolerances import ANOTHER_BASIN
 
 Vector = NDArray[np.float64]
 # of a start, at most so many evaluations, and the cost of the best solution so far, which it has to be better than
 Solve = Callable[[Vector, int, float], Solution]
 
-# part of the cost a solution in another basin must be below to be gone on with: it takes a new recording, and the
-# weights, which come from the solution that it is compared with, are only about right
-CLEARLY_LOWER = 0.97
 _LONGER = 40  # evaluations of those that their trial has not finished
-_APART = 0.1  # of the box, in some value: another basin
 
 
 def race(
@@ -58,7 +55,7 @@ def race(
 def _different(solutions: Sequence[Solution], width: Vector, plan: RecordedPlan) -> list[Solution]:
     chosen = [solutions[0]]
     for solution in solutions[1:]:
-        apart = all(np.max(np.abs(solution.x - other.x) / width) > _APART for other in chosen)
+        apart = all(np.max(np.abs(solution.x - other.x) / width) > ANOTHER_BASIN for other in chosen)
         if apart and solution.equations.cost <= plan.basin_factor * chosen[0].equations.cost:
             chosen.append(solution)
     return chosen[: plan.basins]

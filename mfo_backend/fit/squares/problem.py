@@ -13,6 +13,7 @@ from ...render.recorded_image import RecordedImage
 from ...render.recorded_paths import LaneGroups
 from ...render.renderer import Vector
 from ...solve.bounded_least_squares import NormalEquations
+from ..tolerances import DIM_FLOOR
 from .recording_noise import rows_of_samples, unbiased_equations
 from .residuals import Residual, normal_equations
 
@@ -46,13 +47,13 @@ class Problem:
             return 0.0
         radiance = np.abs(two.mean[:, :, 0])
         return float(
-            np.sqrt(np.mean(np.square(two.half_difference[:, :, 0] / (radiance + 0.1 * radiance.mean() + 1e-12))))
+            np.sqrt(np.mean(np.square(two.half_difference[:, :, 0] / (radiance + DIM_FLOOR * radiance.mean() + 1e-12))))
         )
 
     def change(self, before: Vector, after: Vector) -> float:
         """Root mean square change of the groups, relative to their radiance and a tenth of its mean."""
         old, new = (self.evaluate(x)[:, :, 0] for x in (before, after))
-        return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + 0.1 * np.abs(new).mean() + 1e-12)))))
+        return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + DIM_FLOOR * np.abs(new).mean() + 1e-12)))))
 
     def own_share(self, x: Vector) -> float:
         """Part of the mean square residual at `x` that is the recording's own noise, 0 for one sample of the light."""

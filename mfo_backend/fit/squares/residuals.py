@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ...metrics.baked_view import BakedView
 from ...metrics.response import ChannelResponse, Logarithmic, Response
 from ...solve.bounded_least_squares import NormalEquations
+from ..tolerances import DIM_FLOOR
 
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
 ImageAndJacobian = Callable[[Vector], Rows]  # (g, 3, 1 + k): the image and its derivatives
-LEAST_MEDIAN = 0.1
 # Display values a stop; where a display shows no more, this alone leads back. A level of 8 bits is 0.004, so two
 # pictures that both stay below white differ by nothing else
 _ABOVE_WHITE = 0.05
@@ -56,11 +56,11 @@ class ResponseResidual:
 def log_residual(reference: Rows) -> ResponseResidual:
     """log(1 + 3 L / median): compressive, so highlights and shadows both count; the median lies mid-curve.
 
-    It is the mean's `LEAST_MEDIAN` at least. A metal under one lamp is black but for its highlight: there a smaller
-    scale would weigh differences that nobody sees as much as the highlight.
+    The median counts as a tenth of the mean at least (`DIM_FLOOR`). A metal under one lamp is black but for its
+    highlight: there a smaller scale would weigh differences that nobody sees as much as the highlight.
     """
     lit = reference[reference > 0.0]
-    median = max(float(np.median(lit)), LEAST_MEDIAN * float(lit.mean())) if lit.size else 1.0
+    median = max(float(np.median(lit)), DIM_FLOOR * float(lit.mean())) if lit.size else 1.0
     return ResponseResidual(Logarithmic(median / 3.0), reference)
 
 
@@ -73,7 +73,7 @@ class RelativeResidual:
 
     def __init__(self, reference: Rows) -> None:
         self._reference = reference
-        self._floor = np.float32(max(0.1 * float(reference.mean()), 1e-12))
+        self._floor = np.float32(max(DIM_FLOOR * float(reference.mean()), 1e-12))
 
     def __call__(self, image: Rows) -> tuple[Rows, Rows]:
         """See `Residual`."""

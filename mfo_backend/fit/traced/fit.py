@@ -14,15 +14,16 @@ from ...render.mitsuba_renderer import MitsubaRenderer
 from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
-from ..certainty.covariance import WEAK_BELOW, certainties
+from ..certainty.covariance import certainties
 from ..judge.fit_task import FitTask
-from ..judge.picture_judge import VISIBLE, PictureJudge
+from ..judge.picture_judge import PictureJudge
 from ..judge.verification import Verification
 from ..plans import TransmissionPlan
 from ..random_streams import Stream
 from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds, kept_note
 from ..squares.stage_residuals import finishing_residuals
+from ..tolerances import VISIBLE, WEAK_BELOW
 from .linear_pictures import LinearPictures
 from .perceptual_stages import FLIP, lower_seen_error
 from .polished import CORE, Polished

@@ -12,8 +12,8 @@ from ...material.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import SafeMatrix
 from ...types.parameter import ParameterTable
-from ..alike.unneeded_lobes import SIGNIFICANT, dispensable, values_off
-from ..certainty.covariance import WEAK_BELOW
+from ..alike.unneeded_lobes import dispensable, values_off
+from ..tolerances import SIGNIFICANT, WEAK_BELOW
 
 Vector = NDArray[np.float64]
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...metrics.neighbours import neighbour_pairs, sums_around
 from ...types.image import Pixels
+from ..tolerances import DIM_FLOOR
 
 Vector = NDArray[np.float64]
 Shape = tuple[int, ...]
@@ -112,7 +113,7 @@ def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArra
     model = halves.mean(axis=0)
     inside, shown = _in_picture(model, pixels, shape)
     total, count = (sums_around(picture, REACH) for picture in (shown, inside.astype(np.float64)))
-    level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + 0.1 * float(model.mean())
+    level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + DIM_FLOOR * float(model.mean())
     residual = (seen - model) / np.maximum(level, 1e-30)
     here, there = neighbour_pairs(pixels, shape)
     return float(np.mean(np.square(residual[here] - residual[there]))) / 3.0 if len(here) else 0.0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types.image import Pixels
+from ..tolerances import DIM_FLOOR
 
 Rows = NDArray[np.float32]
 
@@ -139,4 +140,4 @@ def _weights(sums, count, tile, columns: int, rows: int) -> NDArray[np.float64]:
     around = total[r + 1, c + 1]
     mean = sums.sum(axis=0) / count.sum()
     local = np.where(around[:, 3:] > 0, around[:, :3] / np.maximum(around[:, 3:], 1.0), mean)
-    return 1.0 / (0.1 * max(float(mean.mean()), 1e-12) + local)
+    return 1.0 / (DIM_FLOOR * max(float(mean.mean()), 1e-12) + local)

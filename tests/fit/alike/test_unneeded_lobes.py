@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from mfo_backend.fit.alike.unneeded_lobes import SIGNIFICANT, box_holding, solve_without_unneeded
+from mfo_backend.fit.alike.unneeded_lobes import box_holding, solve_without_unneeded
+from mfo_backend.fit.tolerances import SIGNIFICANT
 from mfo_backend.solve.bounded_least_squares import NormalEquations, SolveLimits, solve_bounded
 from mfo_backend.types.parameter import Parameter, ParameterTable
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.judge.model_gap import FLOOR, model_gap
+from mfo_backend.fit.judge.model_gap import model_gap
+from mfo_backend.fit.tolerances import DIM_FLOOR
 from mfo_backend.metrics.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.model_gap import ModelGap
@@ -33,10 +34,10 @@ def gap_of(reference, renders, mask=None):
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.15])
 def test_a_known_difference_is_found_through_noise(noise):
-    """The level is raised by FLOOR of its mean, so dark blocks count less."""
+    """The level is raised by DIM_FLOOR of its mean, so dark blocks count less."""
     reference, renders = pictures(0.03, noise)
     level = np.linspace(0.05, 0.8, SIZE).reshape(-1, 4).mean(axis=1)
-    expected = 0.03 * np.sqrt(np.mean((level / (level + FLOOR * level.mean())) ** 2))
+    expected = 0.03 * np.sqrt(np.mean((level / (level + DIM_FLOOR * level.mean())) ** 2))
     found = gap_of(reference, renders)
     assert found.relative == pytest.approx(expected, rel=0.01 + noise / 2)
     assert found.at_most >= found.relative

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit import tolerances
 from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded import keep_user_values as kept_values
 from mfo_backend.fit.recover_material import recover_material
@@ -28,9 +29,7 @@ TRUTH = {"base_color": (0.7, 0.2, 0.1), "roughness": 0.35, "sheen": 0.001, "shee
 USER = {"base_color": (0.5, 0.5, 0.5), "roughness": 0.6, "sheen": 0.001, "sheen_tint": 0.4}
 
 
-@pytest.mark.parametrize(
-    ("visible", "given_back"), [(kept_values.VISIBLE, True), (-1.0, False)], ids=["unseen", "seen"]
-)
+@pytest.mark.parametrize(("visible", "given_back"), [(tolerances.VISIBLE, True), (-1.0, False)], ids=["unseen", "seen"])
 def test_undetermined_values_go_back_where_nothing_is_seen_of_it(tmp_path, monkeypatch, visible, given_back):
     # below zero, every change counts as seen
     monkeypatch.setattr(kept_values, "VISIBLE", visible)
@@ -81,7 +80,7 @@ def test_the_error_to_the_eye_may_grow_by_a_trace_only():
 
 
 def test_a_change_that_nobody_can_see_needs_no_picture():
-    fit = Pictures({0.0: 1.0, 1.0: 1.0 + 0.9 * kept_values.UNSEEN_CHANGE, 2.0: 1.0 + 1.1 * kept_values.UNSEEN_CHANGE})
+    fit = Pictures({0.0: 1.0, 1.0: 1.0 + 0.9 * tolerances.UNSEEN_CHANGE, 2.0: 1.0 + 1.1 * tolerances.UNSEEN_CHANGE})
     unseen = fit.unseen(lambda picture: 1e6 * float(picture.mean()))
     assert unseen(np.array([1.0]))
     assert fit.shown == 0
@@ -106,11 +105,11 @@ def test_such_a_change_moves_flip_less_than_what_counts_as_visible(picture, chan
         "another hue": np.array([1.0, -1.0, 1.0]),
         "noise": np.sqrt(np.pi / 2) * rng.normal(size=shape),  # its mean size is 1
     }[change]
-    changed = (reference * (1.0 + kept_values.UNSEEN_CHANGE * sign)).astype(np.float32)
+    changed = (reference * (1.0 + tolerances.UNSEEN_CHANGE * sign)).astype(np.float32)
     loss = make_loss(name, Image(reference, Encoding.LINEAR))
-    assert 0.0 < loss.value(changed) < kept_values.VISIBLE
+    assert 0.0 < loss.value(changed) < tolerances.VISIBLE
     rows = [pixels.reshape(-1, 3) for pixels in (reference, changed)]
-    assert kept_values.relative_change(*rows) == pytest.approx(kept_values.UNSEEN_CHANGE, rel=0.1)
+    assert kept_values.relative_change(*rows) == pytest.approx(tolerances.UNSEEN_CHANGE, rel=0.1)
 
 
 TRADED = ParameterTable([Parameter(name, 1, 0.0, 1.0, 0.5) for name in ("roughness", "sheen", "sheen_tint", "coat")])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.plans import RecordedPlan
-from mfo_backend.fit.search.race_starts import CLEARLY_LOWER, race
+from mfo_backend.fit.search.race_starts import race
+from mfo_backend.fit.tolerances import CLEARLY_LOWER
 from mfo_backend.solve.bounded_least_squares import TRIED, NormalEquations, SolveLimits, solve_bounded
 
 LOWER, UPPER = np.array([-3.0]), np.array([3.0])

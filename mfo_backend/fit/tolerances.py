@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers by which a fit decides what is noise, what can be seen and what is another material: one name a meaning.
+
+Each says its unit, what turning it does, and the measurement that it rests on. How much a fit does is in `plans`.
+A number that one file alone needs, and that decides nothing about a result, lies there.
+"""
+
+from __future__ import annotations
+
+from ..metrics.response import DIM_FLOOR as DIM_FLOOR
+
+# ---- noise
+
+# Relative error of a picture, also where a residual says 0: float32, quantisation, small differences of renderers.
+# Larger: less is called determined, and weights look less at bright and clean tiles. Smaller: exact scenes call values
+# determined that are off by what two renderers differ in. No measurement of its own; certainties with it are in
+# docs/method/certainty.md (the table of what is promised and kept).
+MODEL_ERROR = 0.002
+# Root mean square residual in standard deviations of the noise: above, there is more than noise to explain, and
+# perceptual stages run. Larger: they are left out of fits that could gain. Smaller: they fit noise and take their time.
+# No measurement.
+AT_NOISE = 1.5
+# Noise of a pixel relative to its radiance from which on FLIP is of blurred pictures. Larger: FLIP sees noise, which
+# shifts the best values. Smaller: pictures without visible noise lose detail. No measurement.
+NOISY = 0.02
+
+# ---- what is sure (chi squared of one value is the square of its standard deviations)
+
+# Chi squared by which a picture has to ask for a lobe that the user's material lacks: three standard deviations.
+# Larger: weak lobes are lost. Smaller: noise switches lobes on. No measurement.
+SIGNIFICANT = 9.0
+# Chi squared above which another material is not looked at any more. In nine scenes that Cycles had rendered such
+# differences were 2.6 to 17 standard deviations by the scatter between tiles, and smaller ones at most 2.3. Larger:
+# more trials. Smaller: likely rivals are not named.
+HOPELESS = 60.0
+# Standard deviation, of the range of a value, below which it is called determined. Of a value that spans [0, 1] two
+# such steps are hard to tell apart by eye. Larger: more is promised than an eye would grant.
+DETERMINED_BELOW = 0.02
+# The same below which it is weak; above, the picture does not show it, and it goes back to the user's. Larger: values
+# that only noise has chosen stay. Smaller: values that the picture shows go back. No measurement.
+WEAK_BELOW = 0.15
+
+# ---- what can be seen
+
+# Mean FLIP that a change may add and still count as unseen; values that the picture does not show change it by less
+# than half of this. Larger: a visible difference is accepted. Smaller: undetermined values stay as noise has put them.
+VISIBLE = 0.002
+# Mean change of pixels, relative to them and to a hundredth of their median, that FLIP need not be asked about. Even
+# where both pictures were equal, where FLIP is steepest, it then rises by 0.0013 at most
+# (tests/fit/recorded/test_keep_user_values.py). Smaller: more pictures are computed.
+UNSEEN_CHANGE = 5e-5
+
+# ---- what costs no more (factors of a mean square residual)
+
+# Up to it values go back to the user's. Larger: values go back that the picture tells a little of. No measurement.
+AS_GOOD = 1.01
+# Above it, on some of the groups, it is not tried on all of them. Larger: more time. Smaller: what all groups would
+# allow is missed. No measurement.
+NOT_AS_GOOD = 1.1
+# Another basin is gone on with below it: it takes a new recording, and weights come from the solution it is compared
+# with. Eight random materials: noise put the right basin second by 0.3 % of the cost (docs/notebook/recorded_paths.md).
+# Larger: time for basins that noise prefers. Smaller: better ones are missed.
+CLEARLY_LOWER = 0.97
+
+# ---- what is another material (of the box, in some value)
+
+# Starts and solutions further apart are followed both. Larger: a second basin is taken for the first. Smaller: one
+# basin is solved twice. No measurement.
+ANOTHER_BASIN = 0.1
+# Of two solved ends, which lie as near to their minimum as a solve comes: further apart they are two materials.
+# Larger: a rival is taken for the result itself. Smaller: the result is named as its own rival. No measurement.
+ANOTHER_MATERIAL = 0.02
+# A value this near to its lower bound is switched off. Larger: weak lobes count as none. No measurement.
+OFF = 0.002
