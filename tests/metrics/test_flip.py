@@ -213,3 +213,14 @@ def test_a_feature_that_rounding_lifts_above_its_largest_has_a_finite_error():
     test = SimpleNamespace(perceived=Perceived(colours, edge, flat))
     difference = FlipDifference(Perceived(colours, flat, flat), test)
     assert difference.error[0, 0] == 1.0
+
+
+@pytest.mark.parametrize("curve", HDR_GOLDEN)
+def test_black_has_the_slope_that_light_added_to_it_sees(curve):
+    """0 is the end that clips; a fit must see that a black pixel grows brighter."""
+    tone, black, step = ToneCurve(curve), np.zeros((3, 1, 2)), 1e-6
+    slope = tone.pullback(black, 1.0, np.ones_like(black))
+    rise = (tone.apply(black + step, 1.0) - tone.apply(black, 1.0)) / step
+    np.testing.assert_allclose(slope, rise, rtol=1e-3, atol=1e-6)
+    assert (slope > 0.0).all()
+    assert (tone.pullback(black - step, 1.0, np.ones_like(black)) == 0.0).all()

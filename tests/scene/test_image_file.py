@@ -362,9 +362,9 @@ def test_writing_where_no_folder_is(tmp_path, write):
         write(tmp_path / "missing" / "a.file", picture())
 
 
-def with_pixel(value):
+def with_pixel(value, channels=1):
     pixels = picture()
-    pixels[2, 3, 1] = value
+    pixels[2, 3, channels] = value
     return Image(pixels, Encoding.LINEAR)
 
 
@@ -376,6 +376,8 @@ def with_pixel(value):
         (Image(-picture(), Encoding.LINEAR), "Reference is all black"),
         (with_pixel(np.nan), "Reference has 1 pixels with NaN and 0 with infinite values"),
         (with_pixel(np.inf), "Reference has 0 pixels with NaN and 1 with infinite values"),
+        (with_pixel(np.nan, slice(3)), "Reference has 1 pixels with NaN and 0 with infinite values"),
+        (with_pixel(np.inf, slice(3)), "Reference has 0 pixels with NaN and 1 with infinite values"),
     ],
 )
 def test_references_that_cannot_be_fitted(image, sentence):

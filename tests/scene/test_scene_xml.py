@@ -183,3 +183,12 @@ def test_keeps_size_crop_and_filter_of_the_film() -> None:
 def test_a_scene_needs_a_camera() -> None:
     with pytest.raises(BadInputError, match="no camera"):
         prepare_for_fit(scene_of(""))
+
+
+def test_a_wrapper_may_hold_textures_and_must_not_refer_to_nothing() -> None:
+    nested = f'<texture type="bitmap"/><ref id="bumps"/><bsdf type="principled">{VALUES}</bsdf>'
+    around = '<shape type="sphere" id="target"><bsdf type="bumpmap" id="glaze">{}</bsdf></shape>'
+    target = find_target(scene_of('<texture type="bitmap" id="bumps"/>' + around.format(nested)), "target")
+    assert target.inner.get("type") == "principled"
+    with pytest.raises(BadInputError, match=r"holds 0 BSDFs: one is needed"):
+        find_target(scene_of(around.format('<ref id="gone"/>')), "target")

@@ -29,6 +29,13 @@ def test_equal_bounds_hold_a_value():
     np.testing.assert_allclose(got, [0.0, 0.5], atol=1e-15)
 
 
+@pytest.mark.parametrize("at", [0.5, -0.5])
+def test_a_value_may_be_held_elsewhere_than_at_zero(at):
+    hessian, gradient = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-1.0, -1.0])
+    got = minimise_in_box(hessian, gradient, np.array([at, -5.0]), np.array([at, 5.0]))
+    np.testing.assert_allclose(got, [at, (1.0 - at) / 2.0], atol=1e-15)
+
+
 def test_an_indefinite_matrix_is_refused():
     with pytest.raises(np.linalg.LinAlgError):
         minimise_in_box(np.diag([1.0, -1.0]), np.ones(2), -np.ones(2), np.ones(2))
