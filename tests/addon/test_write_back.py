@@ -100,8 +100,9 @@ def test_what_cannot_be_restored_is_said(scene: SimpleNamespace, inputs) -> None
     assert inputs["Metallic"].default_value == 0.0
 
 
+@pytest.mark.parametrize("given", [(0.5, 0.25, 0.125), (0.5, 0.25, 0.125, 1.0)])
 def test_another_working_space_gets_the_same_color(
-    scene: SimpleNamespace, inputs, monkeypatch: pytest.MonkeyPatch
+    scene: SimpleNamespace, inputs, monkeypatch: pytest.MonkeyPatch, given: tuple[float, ...]
 ) -> None:
     import numpy as np
 
@@ -109,7 +110,7 @@ def test_another_working_space_gets_the_same_color(
 
     to_rec709 = np.array([[1.6, -0.5, -0.1], [-0.1, 1.2, -0.1], [0.0, -0.1, 1.1]])
     monkeypatch.setattr(write_back, "working_space_to_rec709", lambda: to_rec709)
-    write_back.apply_values(glaze(scene), {"Base Color": (0.5, 0.25, 0.125)}, JOB)
+    write_back.apply_values(glaze(scene), {"Base Color": given}, JOB)
     found = to_rec709 @ np.array(inputs["Base Color"].default_value[:3])
     np.testing.assert_allclose(found, (0.5, 0.25, 0.125), atol=FLOAT32)
 
