@@ -65,10 +65,9 @@ def _lot(mutant: Mutant, seed: int) -> bytes:
     return hashlib.sha256(f"{seed} {mutant.name}".encode()).digest()
 
 
-def rows_of(path: Path) -> dict[str, dict]:
-    """The last row of each fault."""
-    lines = path.read_text("utf-8").splitlines() if path.exists() else []
-    return {row["mutant"]: row for row in map(json.loads, lines)}
+def rows_of(path: Path) -> list[dict]:
+    """The rows that are there, in the order in which they were written."""
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()] if path.exists() else []
 
 
 def main() -> None:
@@ -89,8 +88,8 @@ def main() -> None:
         copy = Path(folder)
         copy_of(ROOT, commit, copy)
         mutants = [mutant for mutant in drawn(copy, chosen.seed) if mutant.path.startswith(tuple(chosen.only))]
-        rows = rows_of(chosen.rows)
-        done = {name for name, row in rows.items() if row["state"] != ("survived" if chosen.again else "")}
+        last = {row["mutant"]: row["state"] for row in rows_of(chosen.rows)}
+        done = {name for name, state in last.items() if not (chosen.again and state == "survived")}
         for mutant in [mutant for mutant in mutants if mutant.name not in done][: chosen.most]:
             outcome = outcome_of(mutant, copy)
             if outcome.state == "killed" and "::" in outcome.by and failing([outcome.by], copy):
@@ -101,7 +100,7 @@ def main() -> None:
             with chosen.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
             print(f"{outcome.state:9} {outcome.seconds:6.1f} s  {mutant.name}  {outcome.by}", flush=True)
-    chosen.doc.write_text(page(rows_of(chosen.rows).values(), list(DRAWN)), "utf-8")
+    chosen.doc.write_text(page(rows_of(chosen.rows), list(DRAWN)), "utf-8")
 
 
 if __name__ == "__main__":

@@ -91,6 +91,9 @@ def test_the_page_counts_and_names_what_was_not_noticed() -> None:
            "operator": "arithmetic", "commit": "c", "by": "", "seconds": 1.0}  # fmt: skip
     rows = [row | {"state": "survived"}, row | {"mutant": "2", "state": "killed"}, row | {"state": "not counted"}]
     text = page(rows, ["a"])
-    assert "| `a` | 2 | 1 | 50 % |" in text
+    assert "| `a` | 2 | 1 | 1 | 50 % |" in text
     assert "`a/b.py`, line 3" in text
     assert "a test is missing" in text
+    text = page([*rows, row | {"state": "killed"}], ["a"])  # after a test was written
+    assert "| `a` | 2 | 1 | 2 | 100 % |" in text
+    assert "a test is missing" not in text
