@@ -36,6 +36,14 @@ _WITHOUT_LIGHT_PATHS = (
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
     "limits for one kind of bounce."
 )
+_GRAPH_AVERAGES = (
+    "The model 'mitsuba_principled' takes the averages of what nodes give ({names}), and leaves their normals out."
+)
+_GRAPH_UNSEEN = (
+    "What nodes give ({names}) is known where the camera sees the target first: light that meets it elsewhere, behind "
+    "glass or in a mirror, finds the averages."
+)
+_GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
 
 
 @dataclass(frozen=True)
@@ -145,7 +153,23 @@ def fit_scene(
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
+    result = replace(result, notes=(*result.notes, *_graph_notes(request, result)))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant)
+
+
+def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """What is not held of the values that nodes give the target, in sentences."""
+    material = request.materials.get(request.target.bsdf_id)
+    held = [name for name, socket in material.sockets.items() if socket.graph] if material is not None else []
+    if not held:
+        return ()
+    names = ", ".join(held)
+    if result.model == "mitsuba_principled":
+        return (_GRAPH_AVERAGES.format(names=names),)
+    if not any("whole light paths" in note for note in result.notes):
+        return ()
+    flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
+    return (_GRAPH_UNSEEN.format(names=names), *flat)
 
 
 @dataclass(frozen=True)
