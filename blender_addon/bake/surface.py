@@ -31,15 +31,21 @@ MOST_UV_MAPS = 8  # of a mesh
 FLAT = 2e-3  # largest slope of a normal map that counts as none
 LEFT_OUT = ("Coat Normal", "Tangent")
 SKIPPED = ("Weight", "Normal", *LEFT_OUT)
-# bakes are of one object alone, and these look at what is around it
-OF_SURROUNDINGS = ("ShaderNodeAmbientOcclusion", "ShaderNodeRaycast")
-# what these nodes tell depends on where a surface is looked at from
+# outputs of nodes that look at what is around an object, while a bake is of one object alone
+OF_SURROUNDINGS = {"ShaderNodeAmbientOcclusion": ("Color", "AO"), "ShaderNodeRaycast": ("Is Hit", "Hit Distance")}
+# that depend on where a surface is looked at from
 OF_VIEW = {
     "ShaderNodeFresnel": ("Fac", "Factor"),
     "ShaderNodeLayerWeight": ("Fresnel", "Facing"),
     "ShaderNodeCameraData": ("View Vector", "View Z Depth", "View Distance"),
     "ShaderNodeNewGeometry": ("Incoming",),
     "ShaderNodeTexCoord": ("Camera", "Window", "Reflection"),
+}
+# that instances of one object may have each their own of
+OF_PLACE = {
+    "ShaderNodeNewGeometry": ("Position", "Normal"),
+    "ShaderNodeObjectInfo": ("Location", "Random", "Object Index", "Color"),
+    "ShaderNodeParticleInfo": ("Index", "Random", "Age", "Lifetime", "Location", "Size"),
 }
 
 
@@ -50,8 +56,8 @@ def baked_surface(
 
     Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``, each
     with ``kind``, ``name``, ``weight``, ``sockets`` and what of the node's settings counts; ``emission`` and for leaves
-    ``normal``, where there are any; ``view``, ``paths`` and ``around``: what of the view, of light paths and of other
-    objects the nodes ask for; ``left_out``: linked sockets that are not baked.
+    ``normal``, where there are any; ``view``, ``paths``, ``around`` and ``place``: what of the view, of light paths,
+    of other objects and of its own place the nodes ask for; ``left_out``: linked sockets that are not baked.
     A value is a number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working
     space. Normals are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
     """
@@ -62,11 +68,12 @@ def baked_surface(
         tree = material.node_tree
         paths = light_path_outputs(tree)
         groups += answer_light_paths(tree, SCATTERED)
-        view = _asks_for_view(tree)
+        view, around = _asked_for(tree, OF_VIEW), _asked_for(tree, OF_SURROUNDINGS)
         emits = _emits(tree)
         with _stage(scene, instance, original, depsgraph, slot, material) as stage:
             bake = _Bake(stage, material, folder, size, bool(view))
-            answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": _asks_around(tree)}
+            answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": around}
+            answer["place"] = _asked_for(tree, OF_PLACE)
             if emits:
                 answer["emission"] = bake.file(bake.closure())
             closures = ClosureTree(tree)
@@ -359,23 +366,12 @@ def _emits(tree: bpy.types.NodeTree) -> bool:
     return False
 
 
-def _asks_around(tree: bpy.types.NodeTree) -> list[str]:
-    """Labels of nodes that look at other objects."""
+def _asked_for(tree: bpy.types.NodeTree, outputs: dict[str, tuple[str, ...]]) -> list[str]:
+    """Labels of nodes in `tree` and its groups that something asks for one of these outputs."""
     found = []
     for node in tree.nodes:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            found += _asks_around(node.node_tree)
-        elif node.bl_idname in OF_SURROUNDINGS and any(output.is_linked for output in node.outputs):
-            found.append(node.bl_label)
-    return sorted(set(found))
-
-
-def _asks_for_view(tree: bpy.types.NodeTree) -> list[str]:
-    """Labels of nodes whose linked outputs depend on the view."""
-    found = []
-    for node in tree.nodes:
-        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            found += _asks_for_view(node.node_tree)
-        elif any(node.outputs[name].is_linked for name in OF_VIEW.get(node.bl_idname, ()) if name in node.outputs):
+            found += _asked_for(node.node_tree, outputs)
+        elif any(output.is_linked and output.name in outputs.get(node.bl_idname, ()) for output in node.outputs):
             found.append(node.bl_label)
     return sorted(set(found))

@@ -80,6 +80,11 @@ class Baked:
         """UV of the bake, (triangles, 3, 2)."""
         return np.load(self._folder / self._answer["corners"])
 
+    @property
+    def place(self) -> list[str]:
+        """Labels of nodes that may give each instance of the object something of its own."""
+        return self._answer["place"]
+
     def materials(self, identifier: str, name: str, findings: Findings) -> dict[str, Material]:
         """The surface's material under `identifier`, and those it is mixed of under ids of their own.
 

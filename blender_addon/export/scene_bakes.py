@@ -165,6 +165,11 @@ class SceneBakes:
             shown.shape: world_mesh(replace(shown.mesh, uvs=corners), shown.faces, shown.matrix)
             for shown in asked.shown
         }
+        if len(asked.shown) > 1 and baked.place:
+            findings.note(
+                f"Material '{asked.material.name}': {', '.join(baked.place)} may differ between the {len(asked.shown)} "
+                f"instances of '{asked.owner}'; all have the bake of the first."
+            )
         data.materials |= baked.materials(identifier, asked.material.name, findings)
         data.shapes[:] = [
             replace(shape, mesh=pieces[shape.identifier]) if shape.identifier in pieces else shape

@@ -103,6 +103,29 @@ def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
     assert report.request["materials"][bsdf]["sockets"]["IOR"] == {"value": 1.5, "linked": False}
 
 
+def test_instances_share_one_bake_and_say_so(stage: Any, export: Any) -> None:
+    target, ball, nodes = stage
+    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    prefab = bpy.data.collections.new("Prefab")
+    bpy.context.scene.collection.children.link(prefab)
+    prefab.objects.link(ball)
+    bpy.context.scene.collection.objects.unlink(ball)
+    bpy.context.view_layer.layer_collection.children["Prefab"].exclude = True
+    for x in (-1.0, 1.0):
+        empty = bpy.data.objects.new("Instance", None)
+        empty.instance_type, empty.instance_collection, empty.location.x = "COLLECTION", prefab, x
+        bpy.context.scene.collection.objects.link(empty)
+    report = export(target)
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    refs = [shape.find("ref").get("id") for shape in scene.iterfind("shape")]
+    assert refs.count("baked_0001") == 2
+    said = "Geometry may differ between the 2 instances of 'Ball'; all have the bake of the first."
+    assert f"Material 'Ball': {said}" in report.notes
+    bsdf, positions, uv = shape_of(report)  # of the first
+    found = at_vertices(texture(report, bsdf, "Base Color"), uv)
+    assert np.sqrt(np.mean((found - (0.5 * positions + 0.5).clip(0.0)) ** 2)) < 0.01
+
+
 def test_generated_coordinates_are_those_of_the_object_without_its_modifiers(stage: Any, export: Any) -> None:
     target, ball, nodes = stage
     ball.modifiers.new("Array", "ARRAY").count = 2
