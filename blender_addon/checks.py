@@ -177,7 +177,7 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
         if settings.reference_view == SCENE:
             words = f"display colours under the view {output_view(scene)[0].view_transform}"
             words = f"taken as rendered in this scene, {words}" if mixed_by(scene) else words
-    said = [Finding(IGNORED, note, (Fix("upright"),)) for note in found.turned]
+    said = [Finding(IGNORED, " ".join(found.turned), (Fix("upright"),))] if found.turned else []
     return problems or [*said, Finding(FINE, f"Reference: {found.words}, {words}.")]
 
 

@@ -95,7 +95,9 @@ def read_reference(
     header = read_header(path)
     refuse_kind(path, header)
     turn = header.orientation if header is not None and upright else 1
-    said = () if header is None or upright else turn_notes(path.name, header, rendered_size(scene))
+    said = (
+        () if header is None or upright else turn_notes(path.name, header, rendered_size(scene), f"reference{suffix}")
+    )
     is_linear = suffix in LINEAR_SUFFIXES
     if stretched or turn != 1:
         image = bpy.data.images.load(str(path), check_existing=False)

@@ -33,8 +33,10 @@ def turned(pixels: NDArray[np.float32], orientation: int) -> NDArray[np.float32]
     return np.ascontiguousarray(pixels)
 
 
-def turn_notes(name: str, header: PictureHeader, wanted: tuple[int, int]) -> tuple[str, ...]:
+def turn_notes(name: str, header: PictureHeader, wanted: tuple[int, int], copy: str = "") -> tuple[str, ...]:
     """What a user should know of a picture that is taken as it is stored, for a render of `wanted` (width, height).
+
+    `copy` is what the job calls it.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def turn_notes(name: str, header: PictureHeader, wanted: tuple[int, int]) -> tup
             f"is the {wanted[0]}x{wanted[1]} of this scene: take a turned copy (Turn Upright, --upright).",
             Fix("upright"),
         )
-    return (
-        f"The EXIF data of the reference {name} want it shown {shown}; it was taken as it is stored, as in Blender. If "
-        "the scene was matched to the turned picture, take a turned copy (Turn Upright, --upright).",
+    return (  # the first in the backend's words, which finds it too and says it once
+        f"{copy or name}: its EXIF data want it shown {shown}; it was taken as it is stored, as in Blender.",
+        "If the scene was matched to the turned picture, take a turned copy (Turn Upright, --upright).",
     )

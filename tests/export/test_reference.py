@@ -266,6 +266,10 @@ def test_pictures_that_their_exif_data_want_turned(orientation: int, target: Any
     else:
         said = [n for n in export(target, reference=tmp_path / "ref.png").notes if "EXIF" in n]
         assert len(said) == (orientation > 1)
+        if said:
+            from mfo_backend.scene.image_file import read_image
+
+            assert tuple(said) == read_image(tmp_path / "job" / "reference.png").notes
     report = export(target, reference=tmp_path / "ref.png", upright=True)
     assert not [n for n in report.notes if "EXIF" in n]
     with Image.open(tmp_path / "ref.png") as stored, Image.open(report.folder / "reference.png") as found:
