@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits of the values that node graphs leave unlinked, on scenes that Cycles renders and judges.
+
+    python -m studies.graphs ROWS.jsonl --size 96 --seeds 1
+
+Truth and start are drawn at random. Each row has the FLIP over the target, in Cycles, of the start, of the result and
+of another render of the truth (the floor), the largest error of each value, and the seconds. Rows that are in the file
+already are not made again. Needs the bpy module.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import random
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mfo_backend.cli.run_folder import run_folder
+from mfo_backend.job.fit_scene import fit_scene
+from mfo_backend.metrics.flip_error import flip_error
+from mfo_backend.scene.image_file import write_exr
+from mfo_backend.types.image import Encoding, Image, Pixels
+
+from .materials import GRAPHS
+
+LIGHTS = ("lamp", "probe")
+DRAWN = {"Base Color": (0.05, 0.9), "Metallic": (0.0, 1.0), "Roughness": (0.15, 0.8)}  # where they are unlinked
+SAMPLES = {"lamp": 128, "probe": 256}
+
+
+def build_scene(graph: str, light: str, size: int) -> Any:
+    """A head with the graph's material, its Principled node and the scene's light; returns object and node."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.cycles.device = "CPU"
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -4.2, 0.9), (math.radians(78.0), 0.0, 0.0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    if light == "lamp":
+        lamp = bpy.data.lights.new("Lamp", "POINT")
+        lamp.energy, lamp.shadow_soft_size = 700.0, 0.0
+        item = bpy.data.objects.new("Lamp", lamp)
+        item.location = (2.0, -3.0, 3.0)
+        scene.collection.objects.link(item)
+    else:
+        scene.world = bpy.data.worlds.new("World")
+        tree = scene.world.node_tree
+        picture = tree.nodes.new("ShaderNodeTexEnvironment")
+        folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
+        picture.image = bpy.data.images.load(str(folder / "courtyard.exr"))
+        background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+        tree.links.new(picture.outputs[0], background.inputs["Color"])
+    bpy.ops.mesh.primitive_monkey_add()
+    target = bpy.context.object
+    modifier = target.modifiers.new("Smooth", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+    bpy.ops.object.shade_smooth()
+    material = bpy.data.materials.new(graph)
+    target.data.materials.append(material)
+    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    GRAPHS[graph](material.node_tree, node)
+    return target, node
+
+
+def row(graph: str, light: str, seed: int, size: int) -> dict[str, Any]:
+    """One fit and what Cycles says of it."""
+    import bpy
+
+    from blender_addon.export.job import export_job
+    from blender_addon.job_result import read_job_result
+    from blender_addon.write_back import apply_values, result_to_sockets
+
+    target, node = build_scene(graph, light, size)
+    draw = random.Random(f"{graph} {light} {seed}")
+    names = [name for name in DRAWN if not node.inputs[name].is_linked]
+    truth, start = ({name: _drawn(draw, node.inputs[name], *DRAWN[name]) for name in names} for _ in range(2))
+    _put(node, truth)
+    reference, floor = (_cycles(SAMPLES[light], k) for k in (1, 2))
+    _put(node, start)
+    before = _cycles(SAMPLES[light], 3)
+    with tempfile.TemporaryDirectory() as folder:
+        picture, job = Path(folder) / "reference.exr", Path(folder) / "job"
+        write_exr(picture, reference)
+        began = time.monotonic()
+        parameters = [name.lower().replace(" ", "_") for name in names]
+        export_job(bpy.context, target, job, reference=picture, fit={"parameters": parameters})
+        done = run_folder(job, fit_scene, is_new=True)
+        if done.result is None:
+            return {"graph": graph, "light": light, "seed": seed, "size": size, "failed": done.sentence}
+        seconds = time.monotonic() - began
+        result = read_job_result(job)
+        apply_values(target.active_material, result_to_sockets(result), job)
+        after = _cycles(SAMPLES[light], 4)
+        mask = bpy.data.images.load(str(job / "pictures" / "counted.png"))
+        counted = np.array(mask.pixels).reshape(size, size, -1)[::-1, :, 0] > 0.5  # Blender's rows begin below
+    flips = {name: _flip(floor, other, counted) for name, other in
+             (("before", before), ("after", after), ("floor", reference))}  # fmt: skip
+    found = {name: np.ravel(node.inputs[name].default_value)[:3].round(4).tolist() for name in names}
+    wrong = {name: float(np.abs(np.array(found[name]) - np.ravel(truth[name])[:3]).max()) for name in names}
+    return {
+        "graph": graph, "light": light, "seed": seed, "size": size, "seconds": round(seconds, 1),
+        **{f"flip_{name}": round(value, 5) for name, value in flips.items()}, "wrong": wrong,
+    }  # fmt: skip
+
+
+def _drawn(draw: random.Random, socket: Any, low: float, high: float) -> Any:
+    return tuple(draw.uniform(low, high) for _ in range(3)) if socket.type == "RGBA" else draw.uniform(low, high)
+
+
+def _put(node: Any, values: dict[str, Any]) -> None:
+    for name, value in values.items():
+        node.inputs[name].default_value = (*value, 1.0) if isinstance(value, tuple) else value
+
+
+def _cycles(samples: int, seed: int) -> Pixels:
+    import bpy
+    import OpenEXR
+
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.seed = samples, seed
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
+    with tempfile.TemporaryDirectory() as folder:
+        scene.render.filepath = str(Path(folder) / "cycles.exr")
+        bpy.ops.render.render(write_still=True)
+        channels = OpenEXR.File(scene.render.filepath).channels()
+        return np.array(channels["RGB"].pixels, np.float32)[..., :3]
+
+
+def _flip(first: Pixels, second: Pixels, counted: np.ndarray) -> float:
+    error = flip_error(Image(first, Encoding.LINEAR), Image(second, Encoding.LINEAR))
+    return float(error.map[counted].mean())
+
+
+def main() -> None:
+    """Make the rows that are missing."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", type=Path, help="file to append to, one JSON object a line")
+    parser.add_argument("--graphs", nargs="+", choices=GRAPHS, default=list(GRAPHS))
+    parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
+    parser.add_argument("--seeds", type=int, default=1, help="scenes for each graph and light")
+    parser.add_argument("--size", type=int, default=96, help="pixels along each side")
+    chosen = parser.parse_args()
+    import blender_addon
+
+    blender_addon.register()  # what was applied is kept in properties of the material
+    lines = chosen.rows.read_text("utf-8").splitlines() if chosen.rows.is_file() else []
+    known = {tuple(json.loads(line)[key] for key in ("graph", "light", "seed", "size")) for line in lines}
+    for seed in range(chosen.seeds):
+        for light in chosen.lights:
+            for graph in chosen.graphs:
+                if (graph, light, seed, chosen.size) in known:
+                    continue
+                made = row(graph, light, seed, chosen.size)
+                with chosen.rows.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(made) + "\n")
+                print(json.dumps(made), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every graph of the study is one that an export takes, and leaves something to fit."""
+
+from __future__ import annotations
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from blender_addon.export.findings import Findings  # noqa: E402
+from blender_addon.export.node_graph import names_by_graph  # noqa: E402
+from blender_addon.export.read_material import read_target  # noqa: E402
+from studies.graphs.__main__ import DRAWN, build_scene  # noqa: E402
+from studies.graphs.materials import GRAPHS  # noqa: E402
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_a_graph_holds_some_sockets_and_leaves_others(graph: str) -> None:
+    target, node = build_scene(graph, "lamp", 16)
+    findings = Findings()
+    material = read_target(target.active_material, target.name, 0, findings)
+    assert material is not None
+    assert findings.errors == []
+    held = names_by_graph(material)
+    assert held == [socket.name for socket in node.inputs if socket.is_linked]
+    assert held
+    assert set(DRAWN) - set(held)
