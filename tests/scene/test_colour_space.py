@@ -99,6 +99,7 @@ def test_of_several_parts_the_first_may_say_it_for_all(tmp_path):
         ({"chromaticities": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.9, 0.05)}, "chromaticities that span no colours"),
         ({"chromaticities": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.0)}, "chromaticities that span no colours"),
         ({"chromaticities": (float("nan"),) * 8}, "chromaticities that span no colours"),
+        ({"chromaticities": (float("nan"), *REC709[1:])}, "chromaticities that span no colours"),
         ({"chromaticities": (0.0,) * 8}, "chromaticities that span no colours"),
         ({"chromaticities": REC709, "colorInteropID": "lin_ap1_scene"}, "says two colour spaces, lin_ap1_scene and"),
     ],

@@ -339,6 +339,10 @@ def test_postscript_is_not_handed_to_a_program(tmp_path, suffix, monkeypatch):
         ({"Z": picture()[..., 0].copy()}, "has no colour: needed are channels R, G, B or Y, found Z"),
         ({"R": picture()[..., 0].copy(), "G": picture()[..., 0].copy()}, "has no colour: .* found G, R"),
         ({c: np.ones((4, 4), np.uint32) for c in "RGB"}, "holds 32-bit integers, which are no radiance"),
+        (
+            {"R": np.ones((4, 4), np.float32), **{c: np.ones((4, 4), np.uint32) for c in "GB"}},
+            "holds 32-bit integers, which are no radiance",
+        ),
     ],
 )
 def test_exr_without_usable_channels(tmp_path, content, sentence):
