@@ -87,7 +87,7 @@ def _pytest(tests: list[str], copy: Path) -> Outcome:
         return Outcome("survived", "", seconds)
     if done.returncode < 0:
         return Outcome("killed", f"its process ended with signal {-done.returncode}", seconds)
-    found = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    found = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
     if found is None:
         raise RuntimeError(f"pytest ended with {done.returncode}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
     return Outcome("killed", found[1], seconds)

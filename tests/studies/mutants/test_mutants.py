@@ -77,11 +77,14 @@ def test_a_fault_is_noticed_and_the_copy_is_whole_again(tmp_path: Path) -> None:
     (tmp_path / "tests/scene").mkdir(parents=True)
     source = b"def add(a, b):\n    return a + b\n\n\ndef idle(a):\n    return a * 1.0\n"
     (tmp_path / "mfo_backend/scene/sums.py").write_bytes(source)
-    test = "from mfo_backend.scene.sums import add\n\ndef test_sum():\n    assert add(1, 2) == 3\n"
+    test = (
+        "import pytest\nfrom mfo_backend.scene.sums import add\n\n"
+        "@pytest.mark.parametrize('a', [1], ids=['an id of words'])\ndef test_sum(a):\n    assert add(a, 2) == 3\n"
+    )
     (tmp_path / "tests/scene/test_sums.py").write_text(test)
     outcomes = [outcome_of(m, tmp_path) for m in mutants_of("mfo_backend/scene/sums.py", source)]
     assert [(o.state, o.by) for o in outcomes] == [
-        ("killed", "tests/scene/test_sums.py::test_sum"), ("survived", ""), ("survived", ""),
+        ("killed", "tests/scene/test_sums.py::test_sum[an id of words]"), ("survived", ""), ("survived", ""),
     ]  # fmt: skip
     assert (tmp_path / "mfo_backend/scene/sums.py").read_bytes() == source
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import convolve
 
-from mfo_backend.fit.judge.neighbours import neighbour_pairs, sums_around
+from mfo_backend.metrics.neighbours import neighbour_pairs, sums_around
 
 
 def test_pairs_are_all_that_touch_along_an_axis():
