@@ -51,7 +51,7 @@ def test_a_study_says_what_it_can(said: dict[str, list], path: Path) -> None:
     assert code == 0
     assert text.startswith("usage:")
     # the docstring is in the help where another file of the study has it
-    described = f"{ast.get_docstring(ast.parse(source))}\n{text}"
+    described = f"{ast.get_docstring(ast.parse(source), clean=False)}\n{text}"
     usage = re.findall(r"^ {4,10}\S.*$", described, re.MULTILINE)
     source = "".join(file.read_text("utf-8") for file in path.parent.glob("*.py"))
     assert any(f"python -m {name}" in line for line in usage)
