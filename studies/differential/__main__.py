@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `study.py` compares, as a command.
+"""Random scenes by Cycles and by Mitsuba, as a command.
 
-python -m studies.differential [--scenes 100] [--seed 0] [--size 48] [--samples 64] [--exported]
+    python -m studies.differential [--scenes 100] [--seed 0] [--size 48] [--samples 64] [--exported]
+
+`study.py` says what is compared.
 """
 
 from .study import main
