@@ -4,6 +4,9 @@
 _SAME = "The same behaviour: "
 
 REASONS = {
+    "mfo_backend/fit/alike/compare.py: if own is not None and other_own is not None: -> "
+    "if (own is not None or other_own is not None):": _SAME
+    + "both are of one recording, which holds two samples of the light or one.",
     "mfo_backend/scene/image_file.py: "
     'if grey.dtype.kind not in "iu" or grey.max(initial=0) > 65535 or grey.min(initial=0) < 0: -> '
     'if grey.dtype.kind not in "iu" or grey.max(initial=1) > 65535 or grey.min(initial=0) < 0:': _SAME

@@ -397,3 +397,5 @@ def test_negative_reference_pixels_are_clipped_with_a_note():
     assert image.pixels[2, 3, 1] == -0.5
     good = Image(picture(), Encoding.LINEAR)
     assert check_reference(good, 7, 9) == (good, ())
+    dark = with_pixel(0.0)
+    assert check_reference(dark, 7, 9) == (dark, ())  # 0 is black, not negative
