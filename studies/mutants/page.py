@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from textwrap import fill
 
 from .reasons import REASONS
 
@@ -35,9 +36,9 @@ def page(rows: Iterable[dict], places: list[str]) -> str:
     for row in sorted(rows, key=lambda row: row["mutant"]):
         if row["state"] == "survived":
             reason = REASONS.get(row["mutant"], "No reason is known: a test is missing.")
-            lines += [f"- `{row['path']}`, line {row['line']}:", f"  `{row['old']}`", "  became", f"  `{row['new']}`."]
-            lines.append(f"  {reason}")
-    return "\n".join(lines) + "\n"
+            lines += [f"`{row['path']}`, line {row['line']}:", ""]
+            lines += ["```diff", f"- {row['old']}", f"+ {row['new']}", "```", "", fill(reason, 118), ""]
+    return "\n".join(lines).rstrip() + "\n"
 
 
 def _count(name: str, rows: list[dict], at_first: dict[str, str]) -> str:

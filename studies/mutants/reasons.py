@@ -4,7 +4,8 @@
 _SAME = "The same behaviour: "
 
 REASONS = {
-    "mfo_backend/scene/colour_space.py: if not np.isfinite(numbers).all(): -> if not (np.isfinite(numbers).any()):": _SAME
+    "mfo_backend/scene/colour_space.py: if not np.isfinite(numbers).all(): -> "
+    "if not (np.isfinite(numbers).any()):": _SAME
     + "a single number that is none makes a matrix of such numbers, which is refused with the same sentence.",
     "mfo_backend/fit/alike/compare.py: if own is not None and other_own is not None: -> "
     "if (own is not None or other_own is not None):": _SAME
