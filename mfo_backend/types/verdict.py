@@ -50,12 +50,15 @@ class Difference:
         Root mean square of the difference that neighbouring pixels share, in display values of [0, 1]; noise has none.
     shared_at_least
         The same less two standard deviations of chance.
+    fine_at_least
+        The same of pixels at the distance where it is largest, of either sign: fine patterns show here.
     """
 
     seen: float
     noise: float
     shared: float
     shared_at_least: float
+    fine_at_least: float
 
     @property
     def visible(self) -> float:

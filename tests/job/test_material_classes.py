@@ -23,7 +23,7 @@ def material(**values):
 
 
 def judgement(verdict, cause=None, visible=0.2):
-    return Judgement(verdict, cause, Difference(visible + 0.05, 0.05, visible / 2.0, visible / 3.0))
+    return Judgement(verdict, cause, Difference(visible + 0.05, 0.05, visible / 2.0, visible / 3.0, visible / 2.0))
 
 
 def result(judged, model="blender_principled"):

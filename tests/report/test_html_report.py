@@ -210,7 +210,7 @@ def test_the_verdict_is_at_the_top_and_only_the_same_has_a_tick(
     content: ReportContent, verdict: Verdict, tone: str
 ) -> None:
     cause = None if verdict is Verdict.SAME else Cause.LIGHT
-    judgement = Judgement(verdict, cause, Difference(0.1, 0.05, 0.02, 0.01))
+    judgement = Judgement(verdict, cause, Difference(0.1, 0.05, 0.02, 0.01, 0.02))
     page = report_html(
         dataclasses.replace(
             content, result=dataclasses.replace(content.result, judgement=judgement, message=judgement.sentence)

@@ -22,6 +22,9 @@ from ...types.verdict import Difference
 # Pixels between two whose differences are multiplied. Those next to each other may share some of their noise: by
 # compression, by resampling
 APART = ((0, 2), (2, 0), (2, 2), (2, -2), (0, 3), (3, 0))
+# The same of patterns of a few pixels, whose products change their sign with the distance, each pair of distances by
+# itself. Silhouettes that two renderers filter differently show here, too
+FINE = (((0, 1), (1, 0)), ((1, 1), (1, -1)), ((0, 2), (2, 0)), ((2, 2), (2, -2)))
 # The same of means over blocks, which share nothing
 NEXT = ((0, 1), (1, 0), (1, 1), (1, -1))
 BLUR = 2.0  # pixels: of what an eye is asked about, so that it does not look at noise
@@ -50,11 +53,13 @@ def beyond_noise(
     noisy = _display(np.maximum(_blurred(result, mask) + _blurred(drawn, mask), 0.0))
     displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
     shared, deviation = _shared_square(displayed, mask, lags)
+    fine = max(abs(square) - CHANCE * sd for square, sd in (_shared_square(displayed, mask, of) for of in FINE))
     return Difference(
         seen,
         _mean_flip(shown[1], noisy, mask),
         max(shared, 0.0) ** 0.5,
         max(shared - CHANCE * deviation, 0.0) ** 0.5,
+        max(fine, 0.0) ** 0.5,
     )
 
 

@@ -17,9 +17,10 @@ from ...types.verdict import Difference, Judgement, Verdict
 from .beyond_noise import NEXT, beyond_noise
 from .likely_cause import likely_cause
 
-# Measured on Cycles scenes by `studies.verdicts` (docs/method/verdicts.md): without anything planted the first was at
-# most 0.02, the second 0.008; of results more than 0.05 of FLIP above the noise it is above one of them.
+# Measured on Cycles scenes by `studies.verdicts` (docs/user/verdicts.md): with nothing planted at most 0.019, 0.005 and
+# 0.025; a result more than 0.05 of FLIP above the noise is above one of them.
 SAME_VISIBLE, SAME_SHARED = 0.025, 0.01
+SAME_FINE = 0.035
 DIFFERENT_VISIBLE, DIFFERENT_SHARED = 0.1, 0.05
 # Of what surrounds the target: nothing there is fitted, and it is exported less exactly than the target
 AROUND_SHARED = 0.03
@@ -73,7 +74,7 @@ def is_worse(reference: Image, start: Pixels, result: Pixels, mask: Mask, view: 
 
 def _verdict(difference: Difference) -> Verdict:
     visible, shared = difference.visible, difference.shared_at_least
-    if visible <= SAME_VISIBLE and shared <= SAME_SHARED:
+    if visible <= SAME_VISIBLE and shared <= SAME_SHARED and difference.fine_at_least <= SAME_FINE:
         return Verdict.SAME
     if visible > DIFFERENT_VISIBLE or shared > DIFFERENT_SHARED:
         return Verdict.DIFFERENT
