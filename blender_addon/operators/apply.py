@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 from .. import running_job, shown_result
 from ..job_result import JobResult, JobResultError, must_ask, read_job_result
 from ..local_copy import unwritable
+from ..preflight import redraw
 from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values, toggle_values
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
@@ -25,6 +26,7 @@ def was_asked(context: bpy.types.Context, folder: str) -> bool:
     """Whether the user was told before that the result of this job does not match; from now on that is so."""
     runtime = context.window_manager.mfo_runtime
     before, runtime.asked = runtime.asked, folder
+    redraw()  # the button says what a second press does
     return before == folder
 
 

@@ -16,8 +16,8 @@ _CERTAINTY = {
     "determined": ("RADIOBUT_ON", "determined by the picture"),
     "weak": ("QUESTION", "weakly determined"),
     "not_visible": ("HIDE_ON", "not visible, kept as it was"),
-    "not_told_apart": ("ARROW_LEFTRIGHT", "changed, but not told apart from others"),
-    "doubtful": ("ERROR", "doubtful: the picture is not matched"),
+    "not_told_apart": ("ARROW_LEFTRIGHT", "not told apart from others"),
+    "doubtful": ("ERROR", "doubtful: no match"),
 }
 
 

@@ -20,7 +20,6 @@ class Run:
     def draw(self, context: bpy.types.Context) -> None:
         """Draw settings and button, or the progress."""
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
-        runtime = context.window_manager.mfo_runtime
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         column.prop(settings, "preset")
@@ -34,20 +33,28 @@ class Run:
             _draw_progress(layout, context)
         elif needs_setup():
             draw_setup(layout, width=letters(context))
+            _draw_end(layout, context)  # a result of an earlier day needs no backend
             return
         _draw_buttons(layout, context)
         _draw_queue(layout, context)
         if has_trouble():
             draw_setup(layout, width=letters(context))
-        if runtime.state in {"DONE", "FAILED"}:
-            box = layout.box()
-            failed = runtime.state == "FAILED"
-            box.alert = failed or must_ask(runtime.verdict)
-            icon = "ERROR" if failed else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")
-            draw_sentence(box, context, runtime.sentence, icon)
-            for message in runtime.messages if runtime.state == "FAILED" else ():
-                if message.icon == "ERROR":  # the others are notes of the export
-                    draw_sentence(box, context, message.name, message.icon)
+        _draw_end(layout, context)
+
+
+def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """What the last fit came to: its verdict, or why it failed."""
+    runtime = context.window_manager.mfo_runtime
+    if runtime.state not in {"DONE", "FAILED"}:
+        return
+    failed = runtime.state == "FAILED"
+    box = layout.box()
+    box.alert = failed or must_ask(runtime.verdict)
+    icon = "ERROR" if failed else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")
+    draw_sentence(box, context, runtime.sentence, icon)
+    for message in runtime.messages if failed else ():
+        if message.icon == "ERROR":  # the others are notes of the export
+            draw_sentence(box, context, message.name, message.icon)
 
 
 def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -22,7 +22,7 @@ def fitted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
     }  # fmt: skip
     applied: list[bool] = []
 
-    def apply(_host, _blend, _job, _save_as, *, force: bool = False) -> tuple[str, ...]:
+    def apply(_host, _blend, _job, _save_as, *, force: bool = False, **_: object) -> tuple[str, ...]:
         applied.append(force)
         return ()
 

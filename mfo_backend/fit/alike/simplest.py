@@ -19,7 +19,7 @@ from ...types.parameter import ParameterTable
 from ..squares.problem import Problem, Refined, Rival
 from ..tolerances import ANOTHER_MATERIAL, HOPELESS, SIGNIFICANT
 from .compare import compare
-from .unneeded_lobes import Box, box_holding, is_off, values_off
+from .unneeded_lobes import Box, box_holding, is_off, is_plain, values_off
 
 Vector = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class OtherEnds:
         Each of them counts three standard deviations against a material: what it would need to come in alone.
         """
         x, table = found.end.x, self._table
-        lobes = [n for n in values_off(table, self._user) if n not in found.off and not is_off(n, x, table)]
+        lobes = [n for n in values_off(table, self._user) if n not in found.off and not is_plain(n, x, table)]
         if not lobes:
             return found
         off, price = (*found.off, *lobes), SIGNIFICANT * len(lobes)

@@ -67,8 +67,20 @@ def unneeded_lobes(
 
 
 def values_off(table: ParameterTable, user: Vector) -> list[str]:
-    """Names whose values are off in the user's material."""
-    return [name for name in table.names if is_off(name, user, table)]
+    """Names whose values are off in the user's material, and of tints that are white."""
+    return [name for name in table.names if is_plain(name, user, table)]
+
+
+def is_plain(name: str, x: Vector, table: ParameterTable) -> bool:
+    """Whether a value in `x` changes nothing: it is off, or a tint that is white.
+
+    A coat or a sheen with a tint that dims the base's highlight looks like the plain material, so a tint is a lobe's
+    equal here.
+    """
+    if not name.endswith("_tint"):
+        return is_off(name, x, table)
+    part = table.slice_of(name)
+    return bool(np.all((table.upper - x)[part] <= OFF * (table.upper - table.lower)[part]))
 
 
 def is_off(name: str, x: Vector, table: ParameterTable) -> bool:
