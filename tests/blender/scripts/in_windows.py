@@ -154,7 +154,7 @@ def check_and_mend():
     tree.links.new(noise.outputs[0], principled.inputs["Roughness"])
     scene.mfo.reference_path = str(folder / "reference.png")
     bpy.ops.ed.undo_push(message="all wrong")
-    yield from until(lambda: stops() >= {"camera", "resolution", "unlink"}, 5)
+    yield from until(lambda: stops() >= {"camera", "resolution"}, 5)
     yield from shot("01_check_stops")
     do(bpy.ops.mfo.mend, kind="camera", argument="Camera")
     yield from until(lambda: "whole_frame" in stops(), 5)
