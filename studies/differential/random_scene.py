@@ -335,7 +335,7 @@ SETTINGS = (
     Setting("coat", lambda r, d: _sockets(r, d, Coat_Weight=1.0, Coat_Roughness=0.4)),
     Setting("sheen", lambda r, d: _sockets(r, d, Sheen_Weight=1.0, Sheen_Roughness=0.6)),
     Setting("glass", lambda r, d: put_socket(r.target, "Transmission Weight", 1.0), ("caustics",)),
-    Setting("cut-out", lambda r, d: put_socket(r.target, "Alpha", float(d.uniform(0.2, 0.8)))),
+    Setting("cut-out", lambda r, d: put_socket(r.target, "Alpha", float(d.uniform(0.2, 0.8))), ("through Alpha",)),
     Setting("glowing", lambda r, d: _sockets(r, d, Emission_Strength=2.0)),
     Setting("glowing box", lambda r, d: put_socket(r.box, "Emission Strength", 1.5), ("glowing objects",)),
     Setting("bump correction", _uncorrected, ("Bump Map Correction",)),

@@ -113,22 +113,6 @@ def test_muted_nodes_are_as_in_cycles(scene: Any, export: Any, render_cycles: An
         export(item, "muted")
 
 
-def test_a_missing_picture_is_refused(scene: Any, tmp_path: Any) -> None:
-    item = lit_quad(scene)
-    material = new_material("Floor")
-    add_quad("Floor", 6.0, -0.1, material)
-    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
-    image = bpy.data.images.new("Gone", 4, 4)
-    image.source, image.filepath = "FILE", str(tmp_path / "gone.png")
-    texture.image = image
-    principled = material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
-    material.node_tree.links.new(texture.outputs["Color"], principled.inputs["Base Color"])
-    errors, _ = check_export(bpy.context, item)
-    assert len(errors) == 1
-    assert "magenta" in errors[0]
-    assert "Find Missing Files" in errors[0]
-
-
 def test_faces_in_the_same_place_are_named(scene: Any) -> None:
     item = lit_quad(scene)
     for name in ("A", "B"):
