@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a picture tells two materials apart, by how their squared residuals differ from tile to tile.
+"""Whether a picture tells two materials apart, and what the report says of one that it does not.
 
-Two materials that are no neighbours need no truth between them: both may miss it, by what renderers differ in or by the
-recording's own noise, which no chi squared knows of. Their difference of chi squared is a sum over tiles, whose scatter
-says how sure it is (Q. H. Vuong, "Likelihood Ratio Tests for Model Selection and Non-Nested Hypotheses", 1989).
+The difference of their chi squared is a sum over tiles, d = sum_t (b_t^2 - a_t^2). Its standard deviation is the
+scatter of the terms (Q. H. Vuong, "Likelihood Ratio Tests for Model Selection and Non-Nested Hypotheses", 1989).
+Chi squared alone does not say how sure d is: both materials may miss the truth, by what renderers differ in or by the
+recording's own noise.
 """
 
 from __future__ import annotations
@@ -22,6 +23,11 @@ from ..squares.recording_noise import rows_of_samples
 from .unneeded_lobes import is_off
 
 Vector = NDArray[np.float64]
+
+# Of a sentence on another material
+TOLD_FROM = 0.05  # its probability; rarer ones still widen the deviations
+SEEN_CHANGE = 0.05  # of a value's range
+MOST_VALUES = 4
 
 
 @dataclass(frozen=True)
@@ -65,11 +71,6 @@ def compare(problem: Problem, first: Vector, other: Vector, model_error: float =
     least = 4.0 * distance * model_error**2 / (2.0 * unit * problem.independent)
     deviation = float(np.sqrt(max(np.sum((tiles - tiles.mean()) ** 2), least)))
     return Comparison((more - cost) / unit, deviation, distance)
-
-
-TOLD_FROM = 0.05  # probability; rarer ones still widen the deviations
-SEEN_CHANGE = 0.05  # of a value's range
-MOST_VALUES = 4
 
 
 def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: ParameterTable) -> tuple[str, ...]:

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Other basins than the one in which a fit under exact lights has ended.
+"""Materials that are known to be taken for each other, and solves that begin at the other one.
 
-The race of starts ends as soon as one comes near, and with Blender's lobes wrong materials come within a thousandth:
-a coat's highlight for the base's, a rougher coat, a sheen for none. So further solves start from what it is taken for;
-they are given up where they promise no less.
+*Other basins.* Under exact lights the race of starts ends as soon as one comes near. With Blender's lobes wrong
+materials come within a thousandth: a coat's highlight stands for the base's, a rougher coat for another, a sheen for
+none. Further solves start from these. They are given up where they promise no less.
+
+*Metals.* A black dielectric and a dark metal differ in their reflectance at normal incidence alone.
+
+*Widths.* Cycles clamps the larger of the anisotropic lobe's two widths, roughness^2 / stretch, at 1
+(`material/layers.py`). Past that only the other one counts, roughness^2 x stretch. A fit that ends short of the clamp
+knows nothing of the flat part: its derivatives call both values determined.
 """
 
 from __future__ import annotations
@@ -29,6 +35,9 @@ SOLVED = 1e-8  # a relative error of 1.4e-4 a pixel: no wrong basin of 128 hard 
 MOST_MOVES = 3  # from basin to basin
 HALF = 0.5
 SHEENS = (0.1, 0.5)  # roughnesses of a sheen to begin with
+STRETCH = 0.9  # of Blender's anisotropy: the stretch is the root of 1 less so much of it
+PAST = 1.02  # the larger width that says whether the picture knows of the clamp
+SHARE = 1.0 / 3.0  # mean square of what is as likely anywhere on a line from 0 to 1
 F0_OF_LEVEL = 0.08  # of a specular level of 1 (Burley 2012; Blender's at an index of 1.5)
 DARK_ALBEDO, DARK_F0 = 0.05, 0.1  # black plastic and grey metal look alike below
 
@@ -118,11 +127,6 @@ def _with(x: Vector, table: ParameterTable, **values: float | Vector) -> Vector:
         if name in table.names:
             y[table.slice_of(name)] = value
     return y
-
-
-STRETCH = 0.9  # of Blender's anisotropy: the stretch is the root of 1 less so much of it
-PAST = 1.02  # the larger width that says whether the picture knows of the clamp
-SHARE = 1.0 / 3.0  # mean square of what is as likely anywhere on a line from 0 to 1
 
 
 def width_rivals(problem: Problem, x: Vector, table: ParameterTable) -> tuple[Rival, ...]:

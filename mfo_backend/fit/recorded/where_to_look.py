@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which pixels or tiles a stage looks at: few scalars need few residuals."""
+"""Which pixels or tiles a stage looks at, and with how many rays: few values need few residuals."""
 
 from __future__ import annotations
 
@@ -20,6 +20,18 @@ from ..tolerances import DIM_FLOOR
 MINIMUM_INTERIOR_SHARE = 0.3
 MINIMUM_LIGHT_SHARE = 0.5  # of the target's light in the reference
 MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target lights the silhouette and little else
+# Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
+# the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
+GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
+FINER = 2  # rays along each axis at the solution, relative to those a start is found with
+FINEST = 60
+MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
+# A recording that leaves pixels out: no more of them than this share; so many of the brightest are in it; and what
+# counts as lit, of the median of the target
+MOST_THINNED, BRIGHTEST, LIT = 0.6, 100, 0.01
+FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
+FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
+_AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
 
 def all_groups(paths: RecordedPaths, side: int, reference: Pixels | None = None) -> LaneGroups:
@@ -53,18 +65,6 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
     count = max(int(len(rest) * (lanes - size[bright].sum()) / max(size[rest].sum(), 1)), 64)
     spread = rest[np.linspace(0, len(rest) - 1, min(count, len(rest))).astype(int)]
     return groups.take(np.union1d(spread, bright))
-
-
-# Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
-# the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
-GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
-FINER = 2  # rays along each axis at the solution, relative to those a start is found with
-FINEST = 60
-MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
-# A recording that leaves pixels out: no more of them than this share; so many of the brightest are in it; and what
-# counts as lit, of the median of the target
-MOST_THINNED, BRIGHTEST, LIT = 0.6, 100, 0.01
-FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
 
 
 def edges_of_light(paths: RecordedPaths, groups: LaneGroups) -> NDArray[np.bool_] | None:
@@ -166,10 +166,6 @@ def finer_grid(grid: int, noise: float, share: float, plan: RecordedPlan, finest
         clean = math.ceil(grid * math.sqrt(odds / wanted))
         finer = max(finer, min(clean, plan.grid_finest, finest(plan.clean_lanes)))
     return max(finer, grid)
-
-
-FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
-_AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
 
 def without_fireflies(image: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, int]:

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Traced pictures and their derivatives as rows of tiles of the reference, for a fit on whole light paths."""
+"""Traced pictures and their derivatives as rows of tiles of the reference, for a fit on whole light paths.
+
+The early stages trace each picture in two independent halves a and b. Products of the two, a^T b, hold no noise of
+either, where those of one picture with itself would.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +25,11 @@ from ...solve.noisy_least_squares import cross_equations
 Vector = NDArray[np.float64]
 Samples = list[NDArray[np.float32]]
 
+Rows = NDArray[np.float32]
+
+BRIGHT = 10.0  # weighted residual: about eleven times the reference
+CHANNELS = 3  # of a tile follow each other
+SURE = 3.0  # standard errors
 GEOMETRIC = ("roughness", "ior")  # they move the paths
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
 # Wide ones blur what they look at, narrow ones are noisy (docs/notebook/glass.md: 0.03 and 0.06 of the index)
@@ -138,12 +147,6 @@ class TracedTiles:
             return images[0, ..., 0].reshape(2, -1, 3)
 
         return pictures
-
-
-Rows = NDArray[np.float32]
-BRIGHT = 10.0  # weighted residual: about eleven times the reference
-CHANNELS = 3  # of a tile follow each other
-SURE = 3.0  # standard errors
 
 
 def two_half_equations(a: Rows, b: Rows) -> NormalEquations:

@@ -4,7 +4,15 @@
 Under small bright lights few paths carry much of the light, and sums of squares see little else. A compressed pixel
 does not care how bright a firefly is, but its mean depends on how many samples it has: few are darker than many. So
 the model's pixels are made of as many samples as the reference's, and what the compression takes away from both
-cancels (D. McFadden, "A Method of Simulated Moments", 1989). How many those are the noise tells.
+cancels (D. McFadden, "A Method of Simulated Moments", 1989).
+
+*How many samples* the noise tells. Of two pictures of n samples, the reference differs from one, between neighbouring
+pixels, as the other does, if n is its own count. Differences are of strongly compressed pixels and count by their
+absolute values, so that no firefly decides.
+
+*The recount.* The count that a fit compares with is a whole number, found where the model was still off. At the end
+the noise tells it better, and how well. An error of the count is one of the brightness, which the scatter of the
+residuals does not hold.
 """
 
 from __future__ import annotations
@@ -20,6 +28,7 @@ from ...types.image import Pixels
 from ..tolerances import DIM_FLOOR
 
 Vector = NDArray[np.float64]
+Values = NDArray[np.floating]
 Shape = tuple[int, ...]
 # (samples a pixel, stream of random numbers) -> two independent pictures (2, p, 3), scene-linear
 TwoPictures = Callable[[int, int], NDArray[np.float32]]
@@ -29,6 +38,12 @@ MOST_COUNT = 64  # samples a pixel; more take too long, and there is less to com
 ALIKE = 0.2  # logarithm: with so much more noise at the most samples these are taken
 LOUD = 0.25  # relative variance of a pixel's radiance; for a calmer reference plain squares do, in half the time
 REACH = 3  # pixels to each side that noise is averaged over
+FINER = 0.1  # of `LEVEL`, for the count: counts of glass' pictures are off by 7 % with it, and by 9 % without
+GROUPS = 24  # of pixels, whose scatter tells how well the noise is known
+LEAST = 1e-30
+LEAST_SLOPE = 0.05  # of the excess by the logarithm of the count: below, noise hardly tells it
+CURVED = 0.03  # of the logarithm: the excess is not quite a straight line
+FURTHEST = float(np.log(2.0))  # a straight line from n to 2 n samples holds no further
 PRIOR, FLOOR = 8.0, 0.2  # pixels that the whole picture's noise counts for, and the part of it that is everywhere
 
 
@@ -136,13 +151,6 @@ def _in_picture(
     return inside, shown
 
 
-FINER = 0.1  # of the level that pictures are compared at: counts of glass' pictures are off by 7 instead of 9 %
-GROUPS = 24  # of pixels, whose scatter tells how well the noise is known
-LEAST = 1e-30
-
-Values = NDArray[np.floating]
-
-
 @dataclass(frozen=True)
 class NoiseExcess:
     """Natural logarithm of the model's noise over the reference's, and the variance of that."""
@@ -181,11 +189,6 @@ class NoiseComparison:
         """Sums (g,) of differences of residuals (m, p, 3) in pixels next to each other, the mean of the m."""
         steps = np.abs(residuals[:, self._here] - residuals[:, self._there]).sum(axis=2).mean(axis=0)
         return np.bincount(self._group, steps, GROUPS).astype(np.float64)
-
-
-LEAST_SLOPE = 0.05  # of the excess by the logarithm of the count: below, noise hardly tells it
-CURVED = 0.03  # of the logarithm: the excess is not quite a straight line
-FURTHEST = float(np.log(2.0))  # a straight line from n to 2 n samples holds no further
 
 
 @dataclass(frozen=True)
