@@ -56,7 +56,6 @@ class Runner:
     x: Vector
     equations: NormalEquations | None = None
     damping: float = 0.01
-    growth: float = 2.0
 
 
 class TransmissionFit:
