@@ -23,7 +23,7 @@ from ...types.image import Encoding, Image, Pixels
 from ...types.parameter import Value
 from ..scenes.scene import SHAPE, BenchScene
 
-# far from each other and from the seeds of fits, which are the scenes' numbers and those ^ VERIFY_STREAM
+# far from each other and from the seeds of fits, which follow from the scenes' numbers (`fit/random_streams.py`)
 _REFERENCE_STREAM, _JUDGE_STREAM, _NEXT_PART = 0x0BEF0000, 0x70D6E000, 0x10001
 JUDGE_SPP = 256
 UNPAIRED_SPP = 512  # where the truth is another material's or renderer's, so that noise is not the same in both
