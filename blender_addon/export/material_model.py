@@ -44,7 +44,7 @@ class Material:
     """What a surface is made of. `model` is principled, diffuse, emission, null (nothing there), mix or bumped.
 
     A mix and a bumped surface have `parts`, and of sockets those of emission alone. `normal` (height, width, 3) has
-    normals in the frame of the UV map, n / 2 + 1 / 2.
+    normals in the frame of the UV map, n / 2 + 1 / 2. Without `transparent_shadows` no light passes into a shadow.
     """
 
     name: str
@@ -54,6 +54,7 @@ class Material:
     subsurface_method: str = "RANDOM_WALK"
     parts: tuple[Part, ...] = ()
     normal: Texture | None = None
+    transparent_shadows: bool = True
 
     def value(self, name: str, default: Any) -> Any:
         """Value of socket `name`, or `default` if this Blender's Principled has no such socket."""

@@ -153,6 +153,7 @@ def _read_principled(
             findings.note(f"Material '{material.name}': what is linked to {socket.name} counts with its average.")
     method = getattr(node, "subsurface_method", "RANDOM_WALK")
     found = Material(material.name, "principled", sockets, node.distribution, method)
+    found.transparent_shadows = getattr(material, "use_transparent_shadow", True)
     _note_default_tangent(found, findings)
     return found
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from .rules import Named, Owner
 
 MATERIAL = Owner(
-    exported="cycles diffuse_color displacement_method node_tree use_nodes",
+    exported="cycles diffuse_color displacement_method node_tree use_nodes use_transparent_shadow",
     no_effect="alpha_threshold blend_method grease_pencil is_grease_pencil line_color line_priority lineart "
     "max_vertex_displacement metallic paint_active_slot paint_clone_slot pass_index preview_render_type "
     "refraction_depth "
@@ -15,11 +15,6 @@ MATERIAL = Owner(
     "texture_paint_slots thickness_mode use_backface_culling use_backface_culling_lightprobe_volume "
     "use_backface_culling_shadow use_preview_world use_raytrace_refraction use_screen_refraction use_sss_translucency "
     "use_thickness_from_shadow use_transparency_overlap volume_intersection_method",
-    named={
-        "use_transparent_shadow": Named(
-            True, "Material '{owner}' casts no transparent shadows in Cycles (Transparent Shadows is off)."
-        ),
-    },
 )
 
 MATERIAL_CYCLES = Owner(
