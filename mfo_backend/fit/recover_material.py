@@ -17,6 +17,7 @@ from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
 from .judge.fit_task import FitTask, check_task
+from .judge.judged_result import judged_result
 from .judge.model_gap import model_gap
 from .judge.picture_errors import picture_errors
 from .judge.verification import VerifiedEnd, Verifier
@@ -58,6 +59,7 @@ def recover_material(
     should_stop: Callable[[], bool],
     plan: RecordedPlan | None = None,
     hand_over: bool = True,
+    noted: bool = False,
 ) -> FitOutcome:
     """Recover the renderer's parameters from a picture of the same scene.
 
@@ -77,6 +79,8 @@ def recover_material(
         How much a recorded fit does, where that is not for the preset to say.
     hand_over
         Whether the preset `paper` may stand in for another one.
+    noted
+        Whether the export has left something out, which may be why a result does not match.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def recover_material(
     reasons: list[str] = []
     for make, why in _ways(task, plan, hand_over=hand_over):
         try:
-            return _fit_along(make(), task, reasons, why)
+            return _fit_along(make(), task, reasons, why, noted=noted)
         except UnrecordableError as error:
             reasons.append(str(error))
     raise UnrecordableError(" ".join(reasons))
@@ -119,7 +123,7 @@ def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Itera
         )
 
 
-def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says) -> FitOutcome:
+def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says, *, noted: bool) -> FitOutcome:
     """Fit, verify the ends by new random numbers, choose the best, and make the result.
 
     `reasons` say why the routes before this one could not do it.
@@ -145,8 +149,7 @@ def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says)
         began=task.began,
         notes=[" ".join([*reasons, says(route.stages)])] if reasons else [],
     )
-    halves = _halves(task, end)
-    return FitOutcome(_judged(task, result, halves), first.image, end.image, task.counted, halves)
+    return _judged(task, result, first, end, noted=noted)
 
 
 def _verified(verification: Verifier, start: Callable[[], Any], found: RouteEnds) -> tuple[Status, Sequence[Candidate]]:
@@ -178,13 +181,18 @@ def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:
     return first, second
 
 
-def _judged(task: FitTask, result: FitResult, halves: tuple[Pixels, Pixels] | None) -> FitResult:
-    """The result with what its pictures say of it.
+def _judged(task: FitTask, result: FitResult, first: Candidate, end: Candidate, *, noted: bool) -> FitOutcome:
+    """The result with what its pictures say of it, from the start where the end is visibly worse.
 
     All verdicts on a result belong here: reference, result and two pictures of it with independent noise are at hand.
     """
-    if halves is None or result.status is Status.CANCELLED:
-        return result
-    gap = model_gap(task.reference, halves, task.mask, task.view)
-    said = (gap.sentence,) if gap is not None and gap.sentence else ()
-    return replace(result, model_gap=gap, notes=(*result.notes, *said))
+    stopped = result.status is Status.CANCELLED or task.should_stop()
+    if not stopped:
+        result, shown = judged_result(result, task.reference, first.image, end.image, task.mask, task.view, noted=noted)
+        end = first if shown is first.image else end  # the gap below is that of what is shown
+    halves = _halves(task, end)
+    if halves is not None and not stopped:
+        gap = model_gap(task.reference, halves, task.mask, task.view)
+        said = (gap.sentence,) if gap is not None and gap.sentence else ()
+        result = replace(result, model_gap=gap, notes=(*result.notes, *said))
+    return FitOutcome(result, first.image, end.image, task.counted, halves)

@@ -16,6 +16,7 @@ from ..types.event import Listener
 from ..types.image import Image, Pixels
 from ..types.parameter_bounds import narrowed
 from ..types.result import FitResult
+from ..types.status import Status
 from .job_folder import JobFolder
 from .material_classes import (
     MaterialClass,
@@ -24,6 +25,7 @@ from .material_classes import (
     is_worth_another,
     other_classes,
     parameters_of,
+    tried_notes,
     value_of,
 )
 from .request import Request, request_to_json
@@ -101,7 +103,6 @@ def fit_scene(
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit, so the imports below stay here
-    from ..fit.judge.judged_result import judged_result
     from ..fit.recover_material import recover_material
     from ..render.interruptible import InterruptibleRenderer, NativeThread
     from ..render.renderer import load_renderer
@@ -125,13 +126,9 @@ def fit_scene(
     def fit(renderer: Renderer, *, hand_over: bool = True) -> _Fitted:
         outcome = recover_material(
             renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop,
-            hand_over=hand_over,
+            hand_over=hand_over, noted=bool(request.notes),
         )  # fmt: skip
-        result, shown = outcome.result, outcome.result_image
-        if not should_stop():
-            mask, noted = renderer.target_mask(), bool(request.notes)
-            result, shown = judged_result(result, reference, outcome.start_image, shown, mask, view, noted=noted)
-        return _Fitted(result, outcome.start_image, shown, outcome.counted)
+        return _Fitted(outcome.result, outcome.start_image, outcome.result_image, outcome.counted)
 
     variant = load_variant()
     if request.fit.preset == "paper":
@@ -141,15 +138,16 @@ def fit_scene(
         renderer = load(materials, request.fit.parameters)
         fitted = fit(renderer)
         target = request.target.bsdf_id
-        for other in other_classes(materials[target]) if target in materials else ():
-            if should_stop() or not is_worth_another(fitted.result, request.fit.parameters):
-                break
+
+        def fit_from(other: MaterialClass) -> _Fitted:
             names = parameters_of(other, renderer.table.names)
-            try:
-                again = fit(load(materials | {target: changed(materials[target], other)}, names), hand_over=False)
-            except UnrecordableError:
-                continue
-            fitted = _better(fitted, again, other, materials[target])
+            return fit(load(materials | {target: changed(materials[target], other)}, names), hand_over=False)
+
+        def is_wanted(found: _Fitted) -> bool:
+            return not should_stop() and is_worth_another(found.result, request.fit.parameters)
+
+        if target in materials:
+            fitted = _with_other_classes(fitted, materials[target], fit_from, is_wanted)
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
@@ -180,6 +178,31 @@ class _Fitted:
     start_image: Pixels
     result_image: Pixels
     counted: NDArray[np.bool_]
+
+
+def _with_other_classes(
+    fitted: _Fitted,
+    material: Mapping[str, Any],
+    fit_from: Callable[[MaterialClass], _Fitted],
+    is_wanted: Callable[[_Fitted], bool],
+) -> _Fitted:
+    """The fit or a better one of another class, tried while one is wanted; where none is better, the notes say so."""
+    first, no_nearer, refused = fitted.result.recovered, [], []
+    for other in other_classes(material):
+        if not is_wanted(fitted):
+            break
+        try:
+            again = fit_from(other)
+        except UnrecordableError:
+            refused.append(other)
+            continue
+        if again.result.status is not Status.CANCELLED:
+            no_nearer.append(other)
+        fitted = _better(fitted, again, other, material)
+    if fitted.result.recovered is not first:  # the note of the class that was better says enough
+        return fitted
+    notes = (*fitted.result.notes, *tried_notes(no_nearer, refused))
+    return replace(fitted, result=replace(fitted.result, notes=notes))
 
 
 def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapping[str, Any]) -> _Fitted:

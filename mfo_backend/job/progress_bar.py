@@ -6,13 +6,16 @@ from __future__ import annotations
 import os
 import sys
 
-from ..types.event import Event, Progress, StageEnd
+from ..types.event import Event, Progress, StageEnd, Started
 
 _STYLE = "{desc} {percentage:3.0f}%|{bar:24}| {postfix}"
 
 
 class ProgressBar:
-    """A bar where stderr is a terminal, with stage, loss and remaining time; each ended stage leaves a line."""
+    """A bar where stderr is a terminal, with stage, loss and remaining time; each ended stage leaves a line.
+
+    A fit that begins again, from another material, has a bar of its own.
+    """
 
     def __init__(self) -> None:
         self._bar = None
@@ -21,7 +24,9 @@ class ProgressBar:
         """Draw what the event tells; events without a place in the bar do nothing."""
         from tqdm import tqdm  # not at the top: `mfo --help` does not need it
 
-        if isinstance(event, Progress):
+        if isinstance(event, Started):
+            self.close()
+        elif isinstance(event, Progress):
             if self._bar is None:
                 self._bar = tqdm(
                     total=1.0,

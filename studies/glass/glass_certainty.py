@@ -48,7 +48,7 @@ def measure(scene: Any, number: int, arguments: argparse.Namespace) -> dict[str,
     sd = np.concatenate([result.certainty[name].sd for name in table.names])
     levels = [result.certainty[p.name].level for p in table for _ in range(p.size)]
     names = [p.name for p in table for _ in range(p.size)]
-    seen = np.array([level is not Level.NOT_VISIBLE for level in levels])
+    seen = np.array([level not in (Level.NOT_VISIBLE, Level.NOT_TOLD_APART) for level in levels])
     determined = np.array([level is Level.DETERMINED for level in levels])
     return {
         "scene": scene.number,

@@ -15,6 +15,7 @@ from mfo_backend.types.errors import UnrecordableError
 from mfo_backend.types.event import Preview, Started
 from mfo_backend.types.model_gap import ModelGap
 from mfo_backend.types.status import Status
+from mfo_backend.types.verdict import Verdict
 
 from .conftest import SphereRenderer
 
@@ -132,3 +133,28 @@ def test_a_stopped_fit_is_not_judged(recover, truth, monkeypatch):
     assert outcome.result.status is Status.CANCELLED
     assert outcome.result.model_gap is None
     assert outcome.result_halves is None
+    assert outcome.result.judgement is None
+
+
+def test_every_caller_has_the_verdict(recover, truth, monkeypatch):
+    monkeypatch.setattr(module, "RecordedRoute", finding([End("refine", truth)]))
+    assert recover().result.judgement.verdict is Verdict.SAME
+    far = End("refine", np.array([0.5, 0.35, 0.25, 0.5, 0.5]))
+    monkeypatch.setattr(module, "RecordedRoute", finding([far]))
+    different = recover().result
+    assert different.judgement.verdict is Verdict.DIFFERENT
+    assert different.status is Status.DIFFERENT
+
+
+def test_the_gap_is_that_of_the_start_where_the_end_is_dropped(recover, sphere, monkeypatch):
+    """The route takes an end for the better one, and by eye it is visibly worse: values, pictures and gap go back."""
+    far = End("refine", np.array([0.01, 0.9, 0.9, 1.0, 0.0]))
+    monkeypatch.setattr(module, "RecordedRoute", finding([far], choose=lambda images: Choice(0, True)))
+    given = []
+    monkeypatch.setattr(module, "model_gap", lambda *of: given.append(of))
+    outcome = recover()
+    assert outcome.result.recovered == outcome.result.initial
+    assert START_KEPT in outcome.result.message
+    assert outcome.result.errors["mse"][0] == outcome.result.errors["mse"][1]
+    for picture in (outcome.result_image, *outcome.result_halves, *given[0][1]):
+        np.testing.assert_array_equal(picture, sphere.shade(sphere.start).astype(np.float32))

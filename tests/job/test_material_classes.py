@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from mfo_backend.job import fit_scene as module
 from mfo_backend.job.material_classes import (
     changed,
     is_better,
@@ -15,6 +18,9 @@ from mfo_backend.job.material_classes import (
     parameters_of,
     value_of,
 )
+from mfo_backend.types.errors import UnrecordableError
+from mfo_backend.types.result import FitResult
+from mfo_backend.types.status import Status
 from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict
 
 
@@ -82,3 +88,52 @@ def test_only_a_clearly_better_class_takes_the_place_of_the_scenes():
     assert not is_better(judgement(Verdict.DIFFERENT, Cause.MATERIAL, 0.12), first)
     assert not is_better(None, first)
     assert not is_better(judgement(Verdict.SAME, None, 0.01), judgement(Verdict.SAME, None, 0.015))
+
+
+def fitted(visible, verdict=Verdict.DIFFERENT, status=Status.DIFFERENT):
+    result = FitResult(
+        status, "", "blender_principled", {"metallic": 0.0}, {"metallic": 0.4}, {}, (), {"flip": (0.3, visible)},
+        1.0, 2.0, judgement=judgement(verdict, Cause.MATERIAL, visible),
+    )  # fmt: skip
+    picture = np.full((2, 2, 3), visible, np.float32)
+    return module._Fitted(result, picture, picture, np.ones((2, 2), bool))
+
+
+def best_of(ends):
+    """What becomes of a fit whose glass and cut-out fits end so; None stands for a material that no fit holds."""
+
+    def fit_from(other):
+        end = ends[other.name]
+        if end is None:
+            raise UnrecordableError("It has a texture.")
+        return end
+
+    def is_wanted(found):
+        return is_worth_another(found.result, "all")
+
+    return module._with_other_classes(fitted(0.2), material(), fit_from, is_wanted).result
+
+
+def test_what_was_tried_in_vain_is_said():
+    found = best_of({"of glass": fitted(0.19), "cut out": fitted(0.3)})
+    assert found.notes == (
+        "The material of the scene did not match. "
+        "Fits that began again from one that is of glass or cut out came not clearly nearer.",
+    )
+    assert (found.seconds, found.passes) == (3.0, 6.0)
+    assert best_of({"of glass": None, "cut out": fitted(0.3)}).notes == (
+        "The material of the scene did not match. Fits that began again from one that is cut out came not clearly "
+        "nearer. No fit holds one that is of glass.",
+    )
+
+
+def test_the_class_that_is_better_is_the_only_one_named():
+    found = best_of({"of glass": fitted(0.02, Verdict.SAME, Status.CONVERGED), "cut out": None})
+    assert found.notes == (other_classes(material())[0].note,)
+    assert best_of({"of glass": fitted(0.08), "cut out": fitted(0.3)}).notes == found.notes
+
+
+def test_a_fit_that_was_stopped_is_not_called_worse():
+    stopped = fitted(0.3)
+    stopped = replace(stopped, result=replace(stopped.result, status=Status.CANCELLED, judgement=None))
+    assert best_of({"of glass": stopped, "cut out": stopped}).notes == ()

@@ -61,7 +61,7 @@ def promises(rows: Sequence[Row]) -> Table | None:
                 if said["level"] == Level.DETERMINED.value:
                     determined += 1
                     wrong += is_wrongly_determined(missed, said["sd"], parameter)
-                if said["level"] != Level.NOT_VISIBLE.value:
+                if said["level"] in (Level.DETERMINED.value, Level.WEAK.value):
                     shown += missed.size
                     held += inside(missed, said["sd"])
         if shown:

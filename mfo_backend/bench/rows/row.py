@@ -70,6 +70,8 @@ class Row:
         Largest absolute difference of a parameter's components from the truth.
     certainty
         Standard deviations of the components and level, as the fit says them.
+    verdict
+        What the fit says of its picture beside the reference, the word of a `Verdict`; empty where it says nothing.
     """
 
     scenario: str
@@ -107,6 +109,7 @@ class Row:
     truth: dict[str, Value] = field(default_factory=dict)
     recovered: dict[str, Value] = field(default_factory=dict)
     certainty: dict[str, dict[str, Any]] = field(default_factory=dict)
+    verdict: str = ""
     notes: list[str] = field(default_factory=list)
     machine: dict[str, Any] = field(default_factory=dict)
 

@@ -219,6 +219,7 @@ class FitRunner:
                 name: {"sd": list(certainty.sd), "level": certainty.level.value}
                 for name, certainty in result.certainty.items()
             },
+            verdict="" if result.judgement is None else result.judgement.verdict.value,
             notes=list(result.notes),
         )
 
