@@ -53,8 +53,8 @@ class Baker:
         self._probe.send(command, folder=str(place), **self._words, **request)
         return self._asked
 
-    def wait(self, number: int) -> tuple[dict[str, Any], Path]:
-        """Wait for an answer; returns it and the folder its files lie in until `close`.
+    def wait(self, number: int, things: int = 1) -> tuple[dict[str, Any], Path]:
+        """Wait for an answer about so many things; returns it and the folder its files lie in until `close`.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Baker:
         assert self._probe is not None
         while len(self._answers) < number:
             try:
-                self._answers.append(self._probe.receive())
+                self._answers.append(self._probe.receive(things))
             except ProbeError as problem:
                 self._answers.append(BakeError(str(problem)))
         found = self._answers[number - 1]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..export.read_mesh import material_of_slot, slot_count
 from ..versions import active_output
 from .closure_tree import ClosureTree, Leaf, Value
+from .dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from .light_path import SCATTERED, answer_light_paths, light_path_outputs
 from .unwrap import unwrapped
 
@@ -31,22 +32,6 @@ MOST_UV_MAPS = 8  # of a mesh
 FLAT = 2e-3  # largest slope of a normal map that counts as none
 LEFT_OUT = ("Coat Normal", "Tangent")
 SKIPPED = ("Weight", "Normal", *LEFT_OUT)
-# outputs of nodes that look at what is around an object, while a bake is of one object alone
-OF_SURROUNDINGS = {"ShaderNodeAmbientOcclusion": ("Color", "AO"), "ShaderNodeRaycast": ("Is Hit", "Hit Distance")}
-# that depend on where a surface is looked at from
-OF_VIEW = {
-    "ShaderNodeFresnel": ("Fac", "Factor"),
-    "ShaderNodeLayerWeight": ("Fresnel", "Facing"),
-    "ShaderNodeCameraData": ("View Vector", "View Z Depth", "View Distance"),
-    "ShaderNodeNewGeometry": ("Incoming",),
-    "ShaderNodeTexCoord": ("Camera", "Window", "Reflection"),
-}
-# that instances of one object may have each their own of
-OF_PLACE = {
-    "ShaderNodeNewGeometry": ("Position", "Normal"),
-    "ShaderNodeObjectInfo": ("Location", "Random", "Object Index", "Color"),
-    "ShaderNodeParticleInfo": ("Index", "Random", "Age", "Lifetime", "Location", "Size"),
-}
 
 
 def baked_surface(
@@ -68,12 +53,12 @@ def baked_surface(
         tree = material.node_tree
         paths = light_path_outputs(tree)
         groups += answer_light_paths(tree, SCATTERED)
-        view, around = _asked_for(tree, OF_VIEW), _asked_for(tree, OF_SURROUNDINGS)
+        view, around = asked_for(tree, OF_VIEW), asked_for(tree, OF_SURROUNDINGS)
         emits = _emits(tree)
         with _stage(scene, instance, original, depsgraph, slot, material) as stage:
             bake = _Bake(stage, material, folder, size, bool(view))
             answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": around}
-            answer["place"] = _asked_for(tree, OF_PLACE)
+            answer["place"] = asked_for(tree, OF_PLACE)
             if emits:
                 answer["emission"] = bake.file(bake.closure())
             closures = ClosureTree(tree)
@@ -364,14 +349,3 @@ def _emits(tree: bpy.types.NodeTree) -> bool:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and _emits(node.node_tree):
             return True
     return False
-
-
-def _asked_for(tree: bpy.types.NodeTree, outputs: dict[str, tuple[str, ...]]) -> list[str]:
-    """Labels of nodes in `tree` and its groups that something asks for one of these outputs."""
-    found = []
-    for node in tree.nodes:
-        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            found += _asked_for(node.node_tree, outputs)
-        elif any(output.is_linked and output.name in outputs.get(node.bl_idname, ()) for output in node.outputs):
-            found.append(node.bl_label)
-    return sorted(set(found))

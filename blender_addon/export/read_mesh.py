@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..versions import corner_normals
 from .mesh_arrays import CornerMesh
@@ -59,14 +60,45 @@ def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if layer is not None:
         layer.uv.foreach_get("vector", uvs)
+    places = positions.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
     faces_at_edge = np.bincount(_edge_of_corner(mesh), minlength=len(mesh.edges))
     return CornerMesh(
-        positions=positions.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3),
-        normals=corner_normals(mesh)[corners].reshape(-1, 3, 3),
+        positions=places,
+        normals=_shading_normals(mesh, places, corners, vertex_of_corner),
         uvs=uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2),
         slots=slots,
         is_closed=bool((faces_at_edge == 2).all()),
     )
+
+
+def _shading_normals(
+    mesh: bpy.types.Mesh, places: NDArray[np.float32], corners: NDArray[np.int32], vertex_of_corner: NDArray[np.int32]
+) -> NDArray[np.float32]:
+    """Normals as Cycles takes them (measured with Blender 5.0), at three corners a triangle.
+
+    Each triangle of a flat face is flat by itself, also where the face is not plane, unless the mesh has custom
+    normals. Faces that only sharp edges make flat are smooth.
+    """
+    if mesh.normals_domain == "FACE":
+        vertex_normals = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+        mesh.vertex_normals.foreach_get("vector", vertex_normals)
+        normals = vertex_normals.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
+    else:
+        normals = corner_normals(mesh)[corners].reshape(-1, 3, 3)
+    if mesh.has_custom_normals:
+        return normals
+    is_smooth = np.empty(len(places), dtype=np.bool_)
+    mesh.loop_triangles.foreach_get("use_smooth", is_smooth)
+    return np.where(is_smooth[:, None, None], normals, _triangle_normals(places))
+
+
+def _triangle_normals(places: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The normal of each triangle at its three corners; zero where it has no area."""
+    sides = places[:, 1:].astype(np.float64) - places[:, :1]
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
+    return np.repeat(normals[:, None, :], 3, axis=1).astype(np.float32)
 
 
 def _edge_of_corner(mesh: bpy.types.Mesh) -> np.ndarray:

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bake.dependence import turns_with_camera
 from ..versions import active_output, cycles_settings, node_tree_of
 from .audit.object_table import WORLD_CYCLES, WORLD_VISIBILITY
 from .audit.rules import name_settings
@@ -60,6 +61,12 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bake
         return replace(_background(node, exposure), camera=camera)
     except UnsupportedNodeError as problem:
         findings.note(f"World '{world.name}' uses {problem}: Cycles renders it into a panorama for the fit.")
+        turning = turns_with_camera(tree)
+        if turning:
+            findings.note(
+                f"World '{world.name}': {', '.join(turning)} follows the camera; in the fit it follows the camera that "
+                "renders the panorama, so the world is another one than in Cycles."
+            )
         if bakes is not None:
             bakes.ask_world(world, findings)
         return replace(UNKNOWN, camera=camera)

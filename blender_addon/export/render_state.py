@@ -36,15 +36,18 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
             if collection.exclude:
                 continue
             put(collection, "hide_viewport", False)
-            if not collection.collection.hide_render:
-                put(collection.collection, "hide_viewport", False)
+        # instances and geometry nodes show objects and collections that no view layer has
+        for inner in bpy.data.collections:
+            if not inner.hide_render:
+                put(inner, "hide_viewport", False)
         if scene.render.use_simplify:
             put(scene.render, "simplify_subdivision", scene.render.simplify_subdivision_render)
-        for item in scene.objects:
+        in_layer = set(view_layer.objects)
+        for item in bpy.data.objects:
             if item.hide_render:
                 continue
             put(item, "hide_viewport", False)
-            if item.hide_get(view_layer=view_layer):
+            if item in in_layer and item.hide_get(view_layer=view_layer):
                 hidden.append(item)
                 item.hide_set(False, view_layer=view_layer)
             _use_render_settings(item, put)

@@ -145,7 +145,7 @@ class SceneBakes:
     def _put_surfaces(self, data: SceneData, findings: Findings) -> None:
         try:
             number = self._baker.ask("surfaces", surfaces=[asked.request for asked in self._surfaces.values()])
-            answer, folder = self._baker.wait(number)
+            answer, folder = self._baker.wait(number, len(self._surfaces))
             found = answer["surfaces"]
         except BakeError as problem:
             found, folder = [{"status": "failed", "sentence": str(problem)}] * len(self._surfaces), Path()

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import tempfile
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ from .own_blender import own_blender, save_copy
 
 PREFIX = "material_fit_probe_"
 _FOLDER = re.compile(PREFIX + r"(\d+)_.+")  # the process that asks, mkdtemp's letters
+# a surface of 1024 texels takes up to 7 s of one core, a sky of 1024 pixels 5; a big file on a slow machine far more
+ANSWER_SECONDS = 600.0  # the second Blender may take for the opening of the file, or for an answer
+MORE_SECONDS = 120.0  # and for each further thing that a request asks for
 END_SECONDS = 2.0  # the second Blender may take to end when nobody asks any more
 
 
@@ -90,12 +94,15 @@ class Probe:
             self._process.stdin.write(json.dumps({"command": command, **words}) + "\n")
             self._process.stdin.flush()
 
-    def receive(self) -> dict[str, Any]:
-        """The answer to the oldest request that has none yet; errors are those of `ask`."""
+    def receive(self, things: int = 1) -> dict[str, Any]:
+        """The answer to the oldest request that has none yet, about so many things; errors are those of `ask`.
+
+        A Blender that does not answer in a generous time is ended, and that is said.
+        """
         if not self._ready:
-            self._checked(self._next())
+            self._checked(self._next(ANSWER_SECONDS))
             self._ready = True
-        return self._checked(self._next())
+        return self._checked(self._next(ANSWER_SECONDS + MORE_SECONDS * (things - 1)))
 
     def close(self) -> None:
         """End the second Blender and remove its files."""
@@ -132,9 +139,10 @@ class Probe:
             raise ProbeError(answer["sentence"])
         return answer
 
-    def _next(self) -> dict[str, Any]:
+    def _next(self, seconds: float) -> dict[str, Any]:
         """The next answer; other lines are Blender's."""
-        while (line := self._lines.get()) is not None:
+        end = time.monotonic() + seconds
+        while (line := self._line_until(end, seconds)) is not None:
             with contextlib.suppress(ValueError):
                 answer = json.loads(line)
                 if isinstance(answer, dict) and "status" in answer:
@@ -142,6 +150,17 @@ class Probe:
         self._lines.put(None)
         last = next((text for text in reversed(log_tail(self._log).splitlines()) if text.strip()), "its log is empty")
         raise ProbeError(f"The second Blender, which evaluates nodes, has ended: {last.strip()}")
+
+    def _line_until(self, end: float, seconds: float) -> str | None:
+        """The next line of the process; it is ended where none comes until `end`, after `seconds`."""
+        try:
+            return self._lines.get(timeout=max(end - time.monotonic(), 0.0))
+        except queue.Empty:
+            signal_group(self._process.pid, KILL)
+            raise ProbeError(
+                f"The second Blender, which evaluates nodes, has not answered for {seconds / 60.0:.0f} minutes and was "
+                "ended: try again, and if it stays so, give the material or the world fewer nodes or smaller images."
+            ) from None
 
 
 def _remove_abandoned() -> None:

@@ -242,8 +242,9 @@ def load_mitsuba_renderer(
     projective_texture.register()
     cycles_path.register()
     lamp_plugins.register()
-    if light_paths is None and any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter")):
-        light_paths = LightPaths()  # changes nothing but for rays that meet lamps, which Mitsuba's own integrators miss
+    has_lamps = any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter"))
+    if light_paths is None and (has_lamps or _camera_world(document) is not None):
+        light_paths = LightPaths()  # changes nothing but what Mitsuba's own integrators have not: lamps, a second world
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
     with two_threads():
@@ -257,6 +258,11 @@ def load_mitsuba_renderer(
     return MitsubaRenderer(model, material, scene, light_paths)
 
 
+def _camera_world(document: Element) -> Element | None:
+    """The texture that camera rays see behind everything."""
+    return next((t for t in document.findall("texture") if t.get("id") == CAMERA_WORLD), None)
+
+
 def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, float | int]) -> None:
     """Let the integrator, and the materials it blurs, treat indirect light as Cycles does."""
     integrator = document.find("integrator")
@@ -265,7 +271,7 @@ def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, fl
     for name, value in properties.items():
         kind = "integer" if isinstance(value, int) else "float"
         ElementTree.SubElement(integrator, kind, name=name, value=repr(value))
-    camera_world = next((t for t in document.findall("texture") if t.get("id") == CAMERA_WORLD), None)
+    camera_world = _camera_world(document)
     if camera_world is not None:  # what camera rays see behind everything
         document.remove(camera_world)
         camera_world.set("name", CAMERA_WORLD)

@@ -139,6 +139,42 @@ def test_generated_coordinates_are_those_of_the_object_without_its_modifiers(sta
     assert np.sqrt(np.mean((found[first] - (local[first] + 0.5)) ** 2)) < 0.03  # of the copies together it is 0.25
 
 
+@pytest.mark.parametrize(
+    ("modifier", "source", "is_said"),
+    [
+        ("SIMPLE_DEFORM", "TexCoord", True),
+        ("SIMPLE_DEFORM", "TexNoise", True),
+        ("SIMPLE_DEFORM", "VertexColor", False),
+        ("ARRAY", "TexCoord", False),
+    ],
+)
+def test_generated_coordinates_of_a_deformed_mesh_are_said(
+    modifier: str, source: str, is_said: bool, stage: Any
+) -> None:
+    from blender_addon.export.job import check_export
+
+    target, ball, nodes = stage
+    ball.modifiers.new("Bend", modifier)
+    mixed = nodes.new("MixRGB")
+    nodes.tree.links.new(nodes.new(source).outputs[0], mixed.inputs[1])
+    nodes.tree.links.new(mixed.outputs[0], nodes.principled.inputs["Base Color"])
+    said = (
+        "Material 'Ball' of 'Ball': the bake takes Generated coordinates after the mesh is deformed (Bend), Cycles "
+        "before."
+    )
+    assert (said in check_export(bpy.context, target)[1]) == is_said
+
+
+def test_shape_keys_deform_too(stage: Any) -> None:
+    from blender_addon.export.job import check_export
+
+    target, ball, nodes = stage
+    ball.shape_key_add(name="Basis")
+    ball.shape_key_add(name="Grown").value = 1.0
+    nodes.tree.links.new(nodes.new("TexNoise").outputs[0], nodes.principled.inputs["Roughness"])
+    assert any("is deformed (shape keys), Cycles before" in note for note in check_export(bpy.context, target)[1])
+
+
 def test_mix_in_a_group_becomes_a_blend(stage: Any, export: Any) -> None:
     target, _, nodes = stage
     group = bpy.data.node_groups.new("Mix", "ShaderNodeTree")

@@ -140,6 +140,28 @@ def test_render_levels_and_visibility(scene: Any, export: Any, mitsuba: Any) -> 
     assert (hidden[1].hide_viewport, hidden[2].hide_get()) == (True, True)
 
 
+def test_render_levels_and_visibility_of_what_only_instances_show(scene: Any, export: Any, mitsuba: Any) -> None:
+    """The same for objects and collections that no view layer has."""
+    world_color(scene, 1.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    prefab, inner = bpy.data.collections.new("Prefab"), bpy.data.collections.new("Inner")
+    prefab.children.link(inner)
+    parts = [add_quad(f"Part {index}", 0.3, -1.0, None) for index in range(3)]
+    for part, owner in zip(parts, (prefab, prefab, inner), strict=True):
+        bpy.context.collection.objects.unlink(part)
+        owner.objects.link(part)
+    modifier = parts[0].modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels, modifier.render_levels, modifier.subdivision_type = 0, 2, "SIMPLE"
+    parts[1].hide_viewport = inner.hide_viewport = True
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", prefab
+    bpy.context.collection.objects.link(empty)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=6.0)
+    counts = sorted(shape.face_count() for shape in shapes_of(mitsuba, export(target)).values())
+    assert counts == [2, 2, 2, 32]
+    assert (modifier.levels, parts[1].hide_viewport, inner.hide_viewport) == (0, True, True)
+
+
 def test_other_geometry_types(scene: Any, export: Any, mitsuba: Any) -> None:
     world_color(scene, 1.0)
     target = add_quad("Target", 1.0, 0.0, new_material("Target"))
@@ -251,6 +273,32 @@ def test_mirrored_object_shades_as_in_cycles(scene: Any, export: Any, render_cyc
     # silhouettes and the terminator are the only noisy pixels
     assert np.abs(found - expected).mean() < 0.003
     assert np.median(np.abs(found - expected)) < 1e-4
+
+
+@pytest.mark.parametrize("kind", ["flat", "flat beside smooth", "custom normals", "sharp edges"])
+def test_a_face_that_is_not_plane_shades_as_in_cycles(
+    kind: str, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    corners = [(-1, -1, 0), (1, -1, 0.8), (1, 1, 0), (-1, 1, 0.8), (3, -1, 0), (3, 1, 0)]
+    white = diffuse_material("White", (0.8, 0.8, 0.8))
+    bent = add_mesh("Bent", corners, [(0, 1, 2, 3), (1, 4, 5, 2)], white)
+    bent.cycles.shadow_terminator_geometry_offset = 0.0
+    first, second = bent.data.polygons
+    first.use_smooth, second.use_smooth = kind == "sharp edges", kind in ("sharp edges", "flat beside smooth")
+    for edge in bent.data.edges:
+        edge.use_edge_sharp = kind == "sharp edges"
+    if kind == "custom normals":
+        bent.data.normals_split_custom_set([(0.3, 0.0, 1.0)] * 8)
+    target = add_quad("Target", 0.05, 2.0, new_material("Target"))
+    target.location.x = -0.9
+    add_light("SUN", rotation=(0.9, 0.3, 0), energy=3.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    expected, found = render_cycles(), render_mitsuba(export(target))
+    # but for the pixels along the diagonal, and the target
+    assert np.quantile(np.abs(found - expected), 0.8) < 1e-3
+    if kind.startswith("flat"):
+        assert expected.max() > 4.0 * np.median(expected[10:, 10:])  # two planes
 
 
 def test_mitsuba_command_renders(scene: Any, export: Any, tmp_path: Path) -> None:

@@ -83,3 +83,14 @@ def test_what_stays_different_is_said(scene: Any, export: Any) -> None:
         "it takes away may differ.",
         "Cycles removes caustics; the fit does not.",
     )
+
+
+@pytest.mark.parametrize(
+    ("glossy", "total", "is_said"), [(0, 4, True), (1, 4, True), (2, 4, False), (1, 1, False), (0, 0, False)]
+)
+def test_few_glossy_bounces_are_said(scene: Any, export: Any, glossy: int, total: int, is_said: bool) -> None:
+    """Unless the limit of all bounces is as low, where that of glossy ones takes nothing away."""
+    wall = corner(scene)
+    scene.cycles.glossy_bounces, scene.cycles.max_bounces = glossy, total
+    said = [note for note in export(wall).notes if note.startswith(f"The limit of glossy bounces is {glossy}: ")]
+    assert len(said) == is_said

@@ -155,6 +155,27 @@ def test_world_of_other_nodes_is_rendered_into_panoramas(scene: Any, export: Any
     np.testing.assert_allclose(light[1::2], 0.5 * towards + 0.5, atol=0.004)
 
 
+@pytest.mark.parametrize(
+    ("coordinate", "is_said"), [("Window", True), ("Camera", True), ("Generated", False), ("transform", True)]
+)
+def test_a_world_that_follows_the_camera_is_named(coordinate: str, is_said: bool, scene: Any) -> None:
+    from blender_addon.export.job import check_export
+
+    tree, background = world_nodes(scene)
+    source, noise = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexNoise")
+    output = source.outputs["Generated" if coordinate == "transform" else coordinate]
+    if coordinate == "transform":
+        turned = tree.nodes.new("ShaderNodeVectorTransform")
+        turned.convert_from, turned.convert_to = "WORLD", "CAMERA"
+        tree.links.new(output, turned.inputs[0])
+        output = turned.outputs[0]
+    tree.links.new(output, noise.inputs["Vector"])
+    tree.links.new(noise.outputs[0], background.inputs["Color"])
+    add_camera("ORTHO", ortho_scale=2.0)
+    _, notes = check_export(bpy.context, add_quad("Target", 1.0, 0.0, new_material("Target")))
+    assert any("follows the camera that renders the panorama" in note for note in notes) == is_said
+
+
 def test_sun_of_a_sky_becomes_a_lamp(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
     from .test_light_levels import floor, tiles
 

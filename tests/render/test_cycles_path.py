@@ -120,3 +120,16 @@ def test_mitsubas_own_model_goes_without(tmp_path):
         light_paths=ALL,
     )
     assert renderer.light_paths is None
+
+
+@pytest.mark.parametrize("model", ["mitsuba_principled", "blender_principled"])
+def test_every_model_shows_the_camera_its_own_world(tmp_path, model):
+    """Behind the ball the camera sees one world, while another lights it."""
+    squares = "".join(f'<rgb name="color{number}" value="0.1, 0.2, 0.3"/>' for number in (0, 1))
+    seen = f'<texture type="checkerboard" id="camera_world">{squares}</texture>'
+    path = write_scene(tmp_path, SKY + seen, size=16)
+    materials = MATERIALS if model == "blender_principled" else {}
+    renderer = load_renderer(path, "target", model=model, parameters=["base_color"], materials=materials)
+    picture = renderer.image(renderer.start, seed=0, spp=16)
+    np.testing.assert_allclose(picture[0, 0], (0.1, 0.2, 0.3), atol=1e-5)
+    assert picture[8, 8].min() > 0.1

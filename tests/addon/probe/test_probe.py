@@ -62,6 +62,24 @@ def test_a_killed_second_blender_is_said(temporary: Path) -> None:
     assert not left_in(temporary)
 
 
+@pytest.mark.parametrize("says", ["", 'print(\'{"status": "ok"}\', flush=True); '], ids=["opening", "answering"])
+def test_a_second_blender_that_hangs_is_ended_and_said(
+    says: str, temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = f"import time; {says}time.sleep(60)"
+    monkeypatch.setattr("blender_addon.probe.client.own_blender", lambda *_: [sys.executable, "-c", script])
+    monkeypatch.setattr("blender_addon.probe.client.ANSWER_SECONDS", 3.0)
+    start = time.monotonic()
+    with Probe() as probe:
+        with pytest.raises(ProbeError, match=r"has not answered for .* and was ended: try again"):
+            probe.ask("sockets")
+        with pytest.raises(ProbeError, match="has ended"):  # at once
+            probe.ask("sockets")
+        wait_for(lambda: probe._process.poll() is not None)
+    assert time.monotonic() - start < PATIENCE
+    assert not left_in(temporary)
+
+
 def test_a_copy_that_cannot_be_written(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_space(_path: Path) -> None:
         raise OSError(28, "No space left on device")

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the outputs of nodes depend on beside a point of a surface: the view, other objects, the object's own place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import bpy
+
+Outputs = Mapping[str, tuple[str, ...]]  # names of outputs by kind of node
+
+# look at what is around an object, while a bake is of one object alone
+OF_SURROUNDINGS = {"ShaderNodeAmbientOcclusion": ("Color", "AO"), "ShaderNodeRaycast": ("Is Hit", "Hit Distance")}
+# depend on where a surface is looked at from
+OF_VIEW = {
+    "ShaderNodeFresnel": ("Fac", "Factor"),
+    "ShaderNodeLayerWeight": ("Fresnel", "Facing"),
+    "ShaderNodeCameraData": ("View Vector", "View Z Depth", "View Distance"),
+    "ShaderNodeNewGeometry": ("Incoming",),
+    "ShaderNodeTexCoord": ("Camera", "Window", "Reflection"),
+}
+# instances of one object may have each their own of
+OF_PLACE = {
+    "ShaderNodeNewGeometry": ("Position", "Normal"),
+    "ShaderNodeObjectInfo": ("Location", "Random", "Object Index", "Color"),
+    "ShaderNodeParticleInfo": ("Index", "Random", "Age", "Lifetime", "Location", "Size"),
+}
+# a world's that turn with the camera
+OF_CAMERA_TURN = {
+    "ShaderNodeCameraData": ("View Vector", "View Z Depth", "View Distance"),
+    "ShaderNodeTexCoord": ("Camera", "Window"),
+}
+# textures that take Generated coordinates where nothing is linked to Vector
+GENERATED_BY_DEFAULT = frozenset(
+    f"ShaderNodeTex{kind}" for kind in ("Brick", "Checker", "Gabor", "Gradient", "Magic", "Noise", "Voronoi", "Wave")
+)
+# modifiers that move vertices; Generated coordinates stay where those were before (`MeshVertex.undeformed_co`)
+DEFORMING = (
+    *("ARMATURE", "CAST", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM"),
+    *("LAPLACIANSMOOTH", "LATTICE", "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "SHRINKWRAP", "SIMPLE_DEFORM"),
+    *("SMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE"),
+)
+
+
+def asked_for(tree: bpy.types.NodeTree, outputs: Outputs) -> list[str]:
+    """Labels of nodes in `tree` and its groups that something asks for one of these outputs."""
+    return sorted({node.bl_label for node in _nodes(tree) if _is_asked(node, outputs)})
+
+
+def turns_with_camera(tree: bpy.types.NodeTree) -> list[str]:
+    """Labels of nodes in a world's tree whose values depend on which way the camera looks."""
+    found = {node.bl_label for node in _nodes(tree) if _is_asked(node, OF_CAMERA_TURN)}
+    spaces = {
+        node.bl_label
+        for node in _nodes(tree)
+        if node.bl_idname == "ShaderNodeVectorTransform" and "CAMERA" in (node.convert_from, node.convert_to)
+    }
+    return sorted(found | spaces)
+
+
+def deformed_generated(item: bpy.types.Object, tree: bpy.types.NodeTree) -> list[str]:
+    """What deforms `item`, names of modifiers and "shape keys", where nodes of `tree` ask for Generated coordinates."""
+    if not any(_asks_generated(node) for node in _nodes(tree)):
+        return []
+    found = [each.name for each in item.modifiers if each.show_render and each.type in DEFORMING]
+    keys = getattr(item.data, "shape_keys", None)
+    if keys is not None and any(key.value != 0.0 and not key.mute for key in keys.key_blocks[1:]):
+        found.append("shape keys")
+    return found
+
+
+def _nodes(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            yield from _nodes(node.node_tree)
+        else:
+            yield node
+
+
+def _is_asked(node: bpy.types.Node, outputs: Outputs) -> bool:
+    return any(output.is_linked and output.name in outputs.get(node.bl_idname, ()) for output in node.outputs)
+
+
+def _asks_generated(node: bpy.types.Node) -> bool:
+    if node.bl_idname in GENERATED_BY_DEFAULT:
+        return not node.inputs["Vector"].is_linked and any(output.is_linked for output in node.outputs)
+    if node.bl_idname == "ShaderNodeTangent":
+        return node.direction_type == "RADIAL" and node.outputs[0].is_linked
+    return _is_asked(node, {"ShaderNodeTexCoord": ("Generated",)})
