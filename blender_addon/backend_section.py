@@ -57,7 +57,8 @@ def draw_setup(layout: bpy.types.UILayout, *, width: int) -> None:
     if state.name != "READY":
         row = box.row()
         row.scale_y = 1.2
-        row.operator("mfo.install_backend", text="Install Again" if state.has_folder else "Install", icon="IMPORT")
+        again = state.has_folder and state.name != "NOT_INSTALLED"  # the folder may hold a log alone
+        row.operator("mfo.install_backend", text="Install Again" if again else "Install", icon="IMPORT")
     row = box.row(align=True)
     if state.python:
         row.operator("mfo.test_backend", text="Test", icon="FILE_REFRESH")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is fine, what is ignored and what stops a fit, as plain data; looks at no mesh and no pixel, so it is quick.
+"""What is fine, ignored, still to choose, or stops a fit, as plain data; looks at no mesh and no pixel, so it is quick.
 
 The export itself checks more (geometry, lights, visibility): `mfo.check` adds what it says.
 """
@@ -36,7 +36,7 @@ from .picture_header import read_header
 from .properties import SOCKET_ITEMS, crossed_limits
 from .versions import overrides_of
 
-FINE, IGNORED, STOPS = "fine", "ignored", "stops"
+FINE, IGNORED, TO_CHOOSE, STOPS = "fine", "ignored", "to_choose", "stops"
 _FITTED = {name for _, name, *_ in SOCKET_ITEMS}
 
 
@@ -62,9 +62,10 @@ def from_export(findings: Findings) -> tuple[Finding, ...]:
 
 
 def in_order(found: list[Finding]) -> tuple[Finding, ...]:
-    """Each sentence once: what stops the fit, then what is ignored, then what is fine."""
+    """Each sentence once: what stops the fit, what is still to choose, what is ignored, what is fine."""
     once = {finding.sentence: finding for finding in reversed(found)}
-    return tuple(f for level in (STOPS, IGNORED, FINE) for f in reversed(list(once.values())) if f.level == level)
+    levels = (STOPS, TO_CHOOSE, IGNORED, FINE)
+    return tuple(f for level in levels for f in reversed(list(once.values())) if f.level == level)
 
 
 def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:
@@ -135,8 +136,8 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
             found.append(Finding(STOPS, f"The limits of {name} leave nothing: the least must be below the most."))
     linked = [name for name in linked if f"{name} of material" not in said]
     if linked:
-        sentence = f"Linked and therefore not fitted: {', '.join(linked)}."
-        found.append(Finding(IGNORED, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
+        sentence = f"Kept as nodes give it, not fitted: {', '.join(linked)}."
+        found.append(Finding(FINE, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
     return found
 
 
@@ -161,8 +162,12 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
 
 def _reference(scene: bpy.types.Scene) -> list[Finding]:
     settings = scene.mfo
+    is_image = settings.reference_source == "IMAGE"
+    if not (settings.reference_image if is_image else settings.reference_path):
+        kind = "an image of this file" if is_image else "a file"
+        return [Finding(TO_CHOOSE, f"Choose the picture to match: {kind}.")]  # no fault: every scene begins like this
     try:
-        found = _image_reference(settings) if settings.reference_source == "IMAGE" else _file_reference(scene)
+        found = _image_reference(settings.reference_image) if is_image else _file_reference(scene)
     except ExportError as problem:
         return [Finding(STOPS, str(problem), problem.fixes)]
     except OSError as problem:
@@ -193,8 +198,6 @@ class _Picture:
 
 def _file_reference(scene: bpy.types.Scene) -> _Picture:
     settings = scene.mfo
-    if not settings.reference_path:
-        raise ExportError("No reference is chosen: give the picture whose material is to be recovered.")
     path = Path(bpy.path.abspath(settings.reference_path))
     if not path.is_file():
         raise ExportError(f"The reference {path} does not exist: choose another file.")
@@ -211,10 +214,7 @@ def _file_reference(scene: bpy.types.Scene) -> _Picture:
     return _Picture(path.name, (header.width, header.height), words, is_linear, space, said)
 
 
-def _image_reference(settings: bpy.types.PropertyGroup) -> _Picture:
-    image = settings.reference_image
-    if image is None:
-        raise ExportError("No reference is chosen: choose an image of this file, or a picture on disk.")
+def _image_reference(image: bpy.types.Image) -> _Picture:
     try:
         with without_pixels():
             read_pixels(image)

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from .checks import IGNORED, STOPS, Finding, quick_check
+from .checks import IGNORED, STOPS, TO_CHOOSE, Finding, quick_check
 
 DELAY = 0.25  # seconds between a change and its check, so that a drag costs four checks a second at most
 
@@ -62,6 +62,8 @@ def summary() -> tuple[str, str]:
         return "Check", "BLANK1"
     if stops:
         return f"Check: {stops} to mend", "ERROR"
+    if count(TO_CHOOSE):
+        return "Check: no picture yet", "INFO"
     return ("Check: ready", "CHECKMARK") if not ignored else (f"Check: ready, {ignored} ignored", "INFO")
 
 

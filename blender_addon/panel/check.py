@@ -6,11 +6,11 @@ from __future__ import annotations
 import bpy
 
 from .. import preflight, running_job
-from ..checks import FINE, IGNORED, STOPS, Finding
+from ..checks import FINE, IGNORED, STOPS, TO_CHOOSE, Finding
 from ..mending import KINDS
 from .layout import draw_sentence
 
-_ICONS = {STOPS: "ERROR", IGNORED: "INFO", FINE: "CHECKMARK"}
+_ICONS = {STOPS: "ERROR", TO_CHOOSE: "FORWARD", IGNORED: "INFO", FINE: "CHECKMARK"}
 
 
 class Check:

@@ -25,7 +25,7 @@ class Compare:
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
         if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
             layout.label(text=f"Of material {runtime.material}", icon="MATERIAL")
-        draw_pictures(layout, ("reference", "start", "result"), clickable=True)
+        draw_pictures(layout, context, ("reference", "start", "result"), clickable=True)
         column = layout.column(align=True)
         row = column.row(align=True)
         row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
@@ -64,4 +64,4 @@ def _draw_cycles(layout: bpy.types.UILayout, context: bpy.types.Context, runtime
         line.alert = failed
         draw_sentence(line, context, runtime.cycles_text, "ERROR" if failed else "CHECKMARK")
     if previews.icon("cycles"):
-        draw_pictures(column, ("reference", "cycles", "cycles_difference"), clickable=True)
+        draw_pictures(column, context, ("reference", "cycles", "cycles_difference"), clickable=True)

@@ -26,13 +26,16 @@ def letters(context: bpy.types.Context) -> int:
     return max(16, int((context.region.width / scale - 80) / 5.8))  # 5.8 px is an average letter at scale 1
 
 
-def draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...], *, clickable: bool = False) -> None:
+def draw_pictures(
+    layout: bpy.types.UILayout, context: bpy.types.Context, names: tuple[str, ...], *, clickable: bool = False
+) -> None:
     """Pictures side by side; with `clickable` their names are buttons that show them at full size."""
     row = layout.row(align=True)
+    scale = _icon_scale(context, len(names))
     for name in names:
         column = row.column(align=True)
         if previews.icon(name):
-            column.template_icon(icon_value=previews.icon(name), scale=5.0)
+            column.template_icon(icon_value=previews.icon(name), scale=scale)
         label = _LABELS.get(name, name.title())
         if clickable:
             column.operator("mfo.show_pictures", text=label).show = name
@@ -40,6 +43,12 @@ def draw_pictures(layout: bpy.types.UILayout, names: tuple[str, ...], *, clickab
             line = column.row()
             line.alignment = "CENTER"
             line.label(text=label)
+
+
+def _icon_scale(context: bpy.types.Context, pictures: int) -> float:
+    """Height of an icon, in rows of the interface, that is as wide as its share of the region: no empty bands."""
+    width = context.region.width / context.preferences.system.ui_scale - 60  # without margins and tabs
+    return min(max(width / pictures / 20, 2.0), 10.0)  # a row is 20 px at scale 1
 
 
 def draw_messages(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:

@@ -7,6 +7,9 @@ import bpy
 
 from .. import preflight, running_job
 from ..checks import asks_view
+from .layout import letters
+
+_LETTERS_OF_A_ROW = 27  # of a line that holds both answers uncut; a narrower side bar has one below the other
 
 
 class Reference:
@@ -29,7 +32,9 @@ class Reference:
         if asks_view(context.scene):
             question = column.column(align=True)
             question.label(text="How was it made?")
-            question.row(align=True).prop(settings, "reference_view", expand=True)
+            narrow = letters(context) < _LETTERS_OF_A_ROW
+            choice = question.column(align=True) if narrow else question.row(align=True)
+            choice.prop(settings, "reference_view", expand=True)
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

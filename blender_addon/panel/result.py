@@ -68,7 +68,7 @@ def draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection, 
     known = any(row.certainty for row in rows)
     lines = ((title, "Start", "Result", ""), *((row.name, row.start, row.result, row.certainty) for row in rows))
     for name, *cells, certainty in lines:
-        split = grid.split(factor=0.5 if known else 0.46)
+        split = grid.split(factor=0.55 if known else 0.46)
         split.label(text=name, **({"icon": _CERTAINTY.get(certainty, ("BLANK1",))[0]} if known else {}))
         columns = split.split(factor=0.5)  # a row would pack swatches to the left
         for cell in cells:

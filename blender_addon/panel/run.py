@@ -79,7 +79,7 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     column.label(text=runtime.detail)
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:
-        draw_pictures(column, shown)
+        draw_pictures(column, context, shown)
 
 
 def _draw_queue(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -125,7 +125,9 @@ def main(arguments: list[str]) -> int:
     (folder / "index.html").write_text("<!doctype html><title>report</title>")
     partial = cancelled.is_set()
     status = "cancelled" if partial else "stale"
-    sentence = "Cancelled; the best values so far were kept." if partial else "The fit is done."
+    sentence = (
+        "Cancelled; the best values so far were kept." if partial else "The result looks the same as the reference."
+    )
     write_result(folder, "result", status, sentence, request, partial=partial)
     say(event="finished", status=status, sentence=sentence, result="result.json")
     return 4 if partial else 0

@@ -140,7 +140,7 @@ def test_a_mended_shader_keeps_its_colour_and_the_old_node(scene: SimpleNamespac
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("", "No reference is chosen"), ("/nowhere/a.exr", "does not exist"), ("text.txt", "no picture we read"),
+    [("/nowhere/a.exr", "does not exist"), ("text.txt", "no picture we read"),
      ("text.png", "no picture its name promises")],
 )  # fmt: skip
 def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: str, words: str) -> None:
@@ -148,18 +148,35 @@ def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: 
     if name.startswith("text"):
         path.write_text("words")
     check(scene)
-    scene.bpy.context.scene.mfo.reference_path = str(path) if name else ""
+    scene.bpy.context.scene.mfo.reference_path = str(path)
     from blender_addon.checks import quick_check
 
     found = quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer)
     assert any(f.level == "stops" and words in f.sentence for f in found), found
 
 
+def test_a_scene_without_a_reference_is_asked_for_one_and_accused_of_nothing(scene: SimpleNamespace) -> None:
+    from blender_addon import preflight
+
+    context = scene.bpy.context
+    context.scene.mfo.reference_path = ""
+    preflight.reset()
+    preflight.check_now(context.scene, context.view_layer)
+    first = preflight.findings[0]
+    assert (first.level, first.sentence) == ("to_choose", "Choose the picture to match: a file.")
+    assert preflight.summary() == ("Check: no picture yet", "INFO")
+    context.scene.camera = None
+    preflight.check_now(context.scene, context.view_layer)
+    assert [f.level for f in preflight.findings[:2]] == ["stops", "to_choose"]
+    assert preflight.summary() == ("Check: 1 to mend", "ERROR")
+
+
 def test_colours_of_an_image_datablock(scene: SimpleNamespace) -> None:
     bpy = scene.bpy
     settings = bpy.context.scene.mfo
     settings.reference_source = "IMAGE"
-    assert any("No reference" in sentence for sentence in stopping(scene))
+    assert stopping(scene) == {}
+    assert check(scene)[0].sentence == "Choose the picture to match: an image of this file."
     image = settings.reference_image = bpy.data.images.load(scene.reference)
     assert stopping(scene) == {}
     assert any("96 x 64, sRGB, display colours under the view Standard" in f.sentence for f in check(scene))
@@ -169,11 +186,13 @@ def test_colours_of_an_image_datablock(scene: SimpleNamespace) -> None:
     assert stopping(scene) == {}
 
 
-def test_linked_values_are_ignored_not_refused(scene: SimpleNamespace) -> None:
+def test_linked_values_are_kept_not_refused(scene: SimpleNamespace) -> None:
     value = tree(scene).nodes.new("ShaderNodeValue")
     tree(scene).links.new(value.outputs[0], principled(scene).inputs["Roughness"])
     assert stopping(scene) == {}
-    assert any(f.level == "ignored" and f.sentence.endswith("not fitted: Roughness.") for f in check(scene))
+    assert any(
+        f.level == "fine" and f.sentence == "Kept as nodes give it, not fitted: Roughness." for f in check(scene)
+    )
 
 
 def from_library(scene: SimpleNamespace, folder: Path, kind: str, name: str):
