@@ -25,9 +25,9 @@ class MFO_UL_history(bpy.types.UIList):
     ) -> None:
         """Draw one result; the one on the material has a full dot, one that looks the same a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
-        split = layout.split(factor=0.43)  # a day and a time, the longest preset, a number
+        split = layout.split(factor=0.48)  # a day and a time, the longest preset, a number
         split.label(text=item.name[5:16], icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
-        right = split.split(factor=0.69)
+        right = split.split(factor=0.68)
         right.label(text="partial" if item.partial else item.preset, icon=VERDICT_ICONS.get(item.verdict, "BLANK1"))
         right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
 
