@@ -3,7 +3,8 @@
 
 *Other basins.* Under exact lights the race of starts ends as soon as one comes near. With Blender's lobes wrong
 materials come within a thousandth: a coat's highlight stands for the base's, a rougher coat for another, a sheen for
-none. Further solves start from these. They are given up where they promise no less.
+none. With Mitsuba's a flat diffuse lobe stands for the metal's share. Further solves start from these. They are given
+up where they promise no less.
 
 *Metals.* A black dielectric and a dark metal differ in their reflectance at normal incidence alone.
 
@@ -23,7 +24,7 @@ from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable
 from ..search.global_start import OPPOSITE
 from ..squares.problem import Problem, Rival
-from ..tolerances import ANOTHER_MATERIAL, CLEARLY_LOWER, HOPELESS, MODEL_ERROR
+from ..tolerances import ANOTHER_MATERIAL, CLEARLY_LOWER, HOPELESS, MODEL_ERROR, OFF
 from .compare import compare
 from .simplest import exchangeable, exchanged
 
@@ -62,7 +63,9 @@ def _better(solve: SolveBelow, found: Solution, table: ParameterTable) -> Soluti
 
 
 def moved(x: Vector, table: ParameterTable) -> Iterator[Vector]:
-    """Materials that may be taken for `x`, of Blender's lobes only, in the order in which they are worth a trial."""
+    """Materials that may be taken for `x`, in the order in which they are worth a trial."""
+    if {"flatness", "metallic"} <= set(table.names) and _value(x, table, "flatness") > OFF:
+        yield _with(x, table, flatness=0.0, metallic=HALF, specular=HALF)
     if not exchangeable(table):
         return
     yield exchanged(x, table)

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mfo_backend.fit.alike.exchanges import F0_OF_LEVEL, best_basin, metal_exchanged, metal_rivals, width_rivals
+from mfo_backend.fit.alike.exchanges import F0_OF_LEVEL, best_basin, metal_exchanged, metal_rivals, moved, width_rivals
 from mfo_backend.fit.squares.residuals import normal_equations
 from mfo_backend.render.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import SolveLimits, solve_bounded
@@ -20,6 +21,7 @@ PLAIN = ParameterTable(
     [Parameter("base_color", 3, 0.0, 1.0, (0.5,) * 3)]
     + [Parameter(name, 1, 0.02, 1.0, 0.5) for name in ("metallic", "roughness", "specular")]
 )
+FLAT = ParameterTable(Parameter(name, 1, 0.0, 1.0, 0.5) for name in ("base_color", "flatness", "metallic"))
 PIXELS = np.linspace(-3.0, 3.0, 600)
 
 
@@ -88,6 +90,27 @@ def test_what_is_solved_is_left_alone():
         raise AssertionError("nothing to look for")
 
     assert best_basin(never, found, COATED) is found
+
+
+def flat_or_metal(x):
+    """Flatness takes light from the rims; a metal takes it everywhere and gives it back in the middle."""
+    color, flatness, metallic = x
+    diffuse = (1.0 - metallic) * color * (1.0 - 0.5 * flatness * (PIXELS / 3.0) ** 2)
+    return np.repeat((1e-3 + diffuse + metallic * color * np.exp(-0.5 * PIXELS**2))[:, None], 3, 1)
+
+
+def test_a_flat_lobe_that_stands_for_a_metals_share_is_found_out():
+    truth = vector(FLAT, base_color=0.6, flatness=0.0, metallic=0.4)
+    line = Line(flat_or_metal, FLAT, truth)
+    wrong = vector(FLAT, base_color=0.5, flatness=0.6, metallic=0.0)
+    (start,) = moved(wrong, FLAT)
+    np.testing.assert_allclose(start, [0.5, 0.0, 0.5])
+    held = replace(line.solve(wrong), x=wrong, equations=line.equations(wrong))
+    np.testing.assert_allclose(best_basin(line.solve, held, FLAT).x, truth, atol=1e-3)
+
+
+def test_where_nothing_is_flat_no_flat_lobe_stands_for_anything():
+    assert list(moved(vector(FLAT, base_color=0.5, flatness=0.001, metallic=0.0), FLAT)) == []
 
 
 @pytest.mark.parametrize("metallic", [0.3, 0.9])
