@@ -34,7 +34,7 @@ def main(shots: Path) -> None:
         for part in parts:
             strip.paste(part, (left, 0))
             left += part.width + GAP
-        strip.quantize(128).save(OUT / name, optimize=True)
+        strip.save(OUT / name, optimize=True)  # a palette would turn the small swatches grey
 
 
 def _sidebar(path: Path) -> Image.Image:
