@@ -110,7 +110,7 @@ def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeyp
     monkeypatch.setattr(TransmissionFit, "polish", lambda self, start: ends)
     monkeypatch.setattr(TransmissionFit, "choose", lambda self, candidates: 0)  # squares under fireflies cannot tell
     result, _ = fit(renderer, renderer.image(good, seed=5, spp=64))
-    assert result.certainty["roughness"].level is Level.NOT_VISIBLE
+    assert result.certainty["roughness"].level is Level.NOT_TOLD_APART
     assert result.recovered["roughness"] == pytest.approx(0.35 if visible else 0.352)
     assert any("roughness: kept as in the scene" in note for note in result.notes) is not visible
 
