@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import bpy
 
 from .versions import curves_of
@@ -12,28 +14,27 @@ KEYFRAMES, DRIVER = "keyframes", "a driver"
 LEAVE, REPLACE = "leave", "replace"
 
 
-def animation_of(node: bpy.types.Node) -> dict[str, str]:
-    """What animates the sockets of a node, `KEYFRAMES` or `DRIVER`, by socket name; sockets without are not in it."""
-    tree = node.id_data
-    if tree.animation_data is None:
-        return {}
-    driven = {curve.data_path for curve in tree.animation_data.drivers}
-    keyed = {curve.data_path for curve in curves_of(tree)}
-    found = {}
-    for socket in node.inputs:
-        if hasattr(socket, "default_value") and not socket.is_linked:
-            path = socket.path_from_id("default_value")
-            if path in driven or path in keyed:
-                found[socket.name] = DRIVER if path in driven else KEYFRAMES
+def animation_of(sockets: Mapping[str, bpy.types.NodeSocket]) -> dict[str, str]:
+    """What animates sockets, `KEYFRAMES` or `DRIVER`, by their names; those without are not in it."""
+    found, trees = {}, {}
+    for name, socket in sockets.items():
+        tree = socket.id_data
+        if tree.animation_data is None or not hasattr(socket, "default_value") or socket.is_linked:
+            continue
+        if tree not in trees:
+            trees[tree] = ({c.data_path for c in tree.animation_data.drivers}, {c.data_path for c in curves_of(tree)})
+        (driven, keyed), path = trees[tree], socket.path_from_id("default_value")
+        if path in driven or path in keyed:
+            found[name] = DRIVER if path in driven else KEYFRAMES
     return found
 
 
-def animation_notes(node: bpy.types.Node, frame: int) -> tuple[str, ...]:
+def animation_notes(sockets: Mapping[str, bpy.types.NodeSocket], frame: int) -> tuple[str, ...]:
     """What is said before a fit: one sentence for each animated socket."""
     return tuple(
         f"{name} has {what} and is fitted as it is at frame {frame}. An applied value would be lost when the frame "
         f"changes, so it is left out, unless {_remedy(what)} (Animated: Replace, --animated replace)."
-        for name, what in animation_of(node).items()
+        for name, what in animation_of(sockets).items()
     )
 
 

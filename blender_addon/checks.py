@@ -16,7 +16,7 @@ from .animated_sockets import DRIVER, REPLACE, animation_of
 from .export.findings import ExportError, Findings, Fix
 from .export.image_pixels import UnreadableImageError, is_data, read_pixels, without_pixels
 from .export.read_camera import has_camera, note_picture_settings, picture_size
-from .export.read_material import principled_node, read_target
+from .export.read_material import read_target
 from .export.read_scene import MESH_TYPES
 from .export.reference import (
     DISPLAY_SUFFIXES,
@@ -30,6 +30,7 @@ from .export.reference_colour import other_space
 from .export.reference_view import SCENE, mixed_by, needs_table, output_view
 from .export.render_state import instanced_objects, rendered_objects
 from .export.shader_graph import source_of
+from .export.target_shader import target_shader
 from .export.turned_picture import turn_notes
 from .local_copy import unwritable
 from .picture_header import read_header
@@ -82,7 +83,7 @@ def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fin
     with without_pixels():
         read_target(material, target.name, slot, findings)
     found = list(from_export(findings))
-    if material is None or principled_node(material) is None:
+    if material is None or target_shader(material) is None:
         return found
     if unwritable(material):
         found.append(Finding(STOPS, unwritable(material), (Fix("make_local"),)))
@@ -97,12 +98,13 @@ def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fin
 
 
 def _animation(scene: bpy.types.Scene, material: bpy.types.Material) -> list[Finding]:
-    node = principled_node(material)
-    assert node is not None
+    target = target_shader(material)
+    assert target is not None
     found = []
-    for name, what in animation_of(node).items():
-        if name not in _FITTED:
+    for fitted, what in animation_of(target.sockets).items():
+        if fitted not in _FITTED:
             continue
+        name = target.own_name(fitted)
         if scene.mfo.animated == REPLACE:
             done = "the driver" if what == DRIVER else "the value at this frame"
             found.append(Finding(FINE, f"{name} has {what}: an apply replaces {done}."))
@@ -121,20 +123,21 @@ def _others_with(material: bpy.types.Material, target: bpy.types.Object, scene: 
 
 
 def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str) -> list[Finding]:
-    node = principled_node(material)
-    assert node is not None
-    linked = [s.name for s in node.inputs if s.name in _FITTED and source_of(s) is not None]
+    target = target_shader(material)
+    assert target is not None
+    sockets = {name: socket for name, socket in target.sockets.items() if name in _FITTED}
+    linked = [name for name, socket in sockets.items() if source_of(socket) is not None]
     settings = scene.mfo
-    found = [Finding(FINE, f"'{material.name}' has a Principled BSDF.")]
+    found = [Finding(FINE, f"'{material.name}' has a {target.node.bl_label}.")]
     if settings.parameter_set == "chosen" and settings.model == "blender_principled":
-        chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets}
+        chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets and name in sockets}
         if not chosen - set(linked):
             fix = (Fix("all_parameters"),)
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
         for name in crossed_limits(settings):
             found.append(Finding(STOPS, f"The limits of {name} leave nothing: the least must be below the most."))
-    linked = [name for name in linked if f"{name} of material" not in said]
+    linked = [target.own_name(name) for name in linked if f"{target.own_name(name)} of material" not in said]
     if linked:
         sentence = f"Kept as nodes give it, not fitted: {', '.join(linked)}."
         found.append(Finding(FINE, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
@@ -248,4 +251,4 @@ def _refused(check: Callable[..., object], *arguments: object) -> list[Finding]:
 
 def _can_be_fitted(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
     has_faces = item.type in MESH_TYPES and item.name in view_layer.objects
-    return has_faces and principled_node(item.active_material) is not None
+    return has_faces and target_shader(item.active_material) is not None

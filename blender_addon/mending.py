@@ -14,13 +14,13 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from .animated_sockets import REPLACE, remove_driver
 from .export.image_pixels import UnreadableImageError, read_pixels
 from .export.png_file import write_png
-from .export.read_material import principled_node
 from .export.shader_graph import surface_of
+from .export.target_shader import make_own, target_shader
 from .export.turned_picture import turned
 from .local_copy import LocalCopyError, make_local
 from .picture_header import read_header
 from .preferences import new_job_folder
-from .versions import PRINCIPLED, active_output, node_tree_of, nodes_enabled
+from .versions import PRINCIPLED, active_output, nodes_enabled
 
 # sockets of other shaders that mean the same on a Principled BSDF
 _CARRIED = {"Color": "Base Color", "Base Color": "Base Color", "Roughness": "Roughness", "IOR": "IOR"}
@@ -151,7 +151,7 @@ def _new_material(context: bpy.types.Context, _argument: str) -> None:
     if not target.material_slots:
         target.data.materials.append(None)
     target.active_material = material
-    if principled_node(material) is None:
+    if target_shader(material) is None:
         _principled(context, "")
 
 
@@ -174,11 +174,20 @@ def _principled(context: bpy.types.Context, _argument: str) -> None:
 
 def _unlink(context: bpy.types.Context, name: str) -> None:
     material = _material(context)
-    node, tree = principled_node(material), node_tree_of(material)
-    if node is None or tree is None or name not in node.inputs:
+    target = target_shader(material)
+    if target is None or name not in target.own_names:
         raise MendingError(f"Material '{material.name}' has no socket {name} any more: check again.")
-    for link in list(node.inputs[name].links):
-        tree.links.remove(link)
+    socket = _own_socket(material, target.own_names[name])
+    for link in list(socket.links):
+        socket.id_data.links.remove(link)
+
+
+def _own_socket(material: bpy.types.Material, name: str) -> bpy.types.NodeSocket:
+    """Where the value `name` is set, in groups that are the material's own from now on."""
+    make_own(material, [name])
+    target = target_shader(material)
+    assert target is not None  # as before the copies
+    return target.sockets[name]
 
 
 def _make_local(context: bpy.types.Context, _argument: str) -> None:
@@ -199,10 +208,11 @@ def _single_user(context: bpy.types.Context, _argument: str) -> None:
 
 
 def _remove_driver(context: bpy.types.Context, name: str) -> None:
-    node = principled_node(_material(context))
-    if node is None or name not in node.inputs:
+    material = _material(context)
+    target = target_shader(material)
+    if target is None or name not in target.own_names:
         raise MendingError(f"There is no socket {name} any more: check again.")
-    remove_driver(node.inputs[name])
+    remove_driver(_own_socket(material, target.own_names[name]))
 
 
 def _replace_animation(context: bpy.types.Context, _argument: str) -> None:

@@ -10,7 +10,7 @@ import mathutils  # pyright: ignore[reportMissingImports]
 import numpy as np
 from numpy.typing import NDArray
 
-PRINCIPLED = "ShaderNodeBsdfPrincipled"
+PRINCIPLED, DIFFUSE = "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfDiffuse"
 # options of a path that may begin with "//": Blender 4.5 and later draw it in red without, older ones refuse the word
 RELATIVE_PATH: set[str] = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
@@ -158,6 +158,11 @@ def can_denoise() -> bool:
 def is_modal_operator_running() -> bool:
     """Whether a drag or another modal operator runs in some window; never, where Blender does not tell."""
     return any(getattr(window, "modal_operators", ()) for window in bpy.context.window_manager.windows)
+
+
+def has_diffuse_roughness() -> bool:
+    """Whether a Diffuse BSDF with roughness is the Oren-Nayar lobe of the Principled BSDF (4.2 has an older one)."""
+    return bpy.app.version >= (4, 3, 0)
 
 
 def is_module() -> bool:

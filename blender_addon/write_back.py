@@ -12,30 +12,30 @@ import numpy as np
 
 from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_of, key_here, left_note, remove_driver
 from .export.principled_mapping import mitsuba_to_sockets
-from .export.shader_graph import surface_of
+from .export.target_shader import TargetShader, make_own, target_shader
 from .job_result import JobResult, Value
 from .local_copy import unwritable
-from .versions import PRINCIPLED, node_tree_of, working_space_to_rec709
+from .versions import working_space_to_rec709
 
 
 class WriteBackError(Exception):
     """The values cannot be applied; the message is one sentence for the user."""
 
 
-def principled_node(material: bpy.types.Material) -> bpy.types.ShaderNode:
-    """The Principled node that the Cycles output of `material` shows.
+def fitted_shader(material: bpy.types.Material) -> TargetShader:
+    """The Principled or Diffuse node that the Cycles output of `material` shows.
 
     Raises
     ------
     WriteBackError
         If there is none.
     """
-    node = surface_of(node_tree_of(material))
-    if node is not None and node.bl_idname == PRINCIPLED:
-        return node
-    raise WriteBackError(
-        f"Material {material.name!r} has no Principled BSDF on its output: connect one and apply again."
-    )
+    target = target_shader(material)
+    if target is None:
+        raise WriteBackError(
+            f"Material {material.name!r} has no Principled BSDF on its output: connect one and apply again."
+        )
+    return target
 
 
 def result_to_sockets(result: JobResult) -> dict[str, Value]:
@@ -76,34 +76,37 @@ def apply_values(
     Raises
     ------
     WriteBackError
-        If the material is read-only, has no Principled node, or a value is none that its socket can hold.
+        If the material is read-only, has no shader that is fitted, or a value is none that its socket can hold.
     """
     if unwritable(material):
         raise WriteBackError(unwritable(material))
-    node, kept = principled_node(material), material.mfo
-    notes, changes, moved = [], [], animation_of(node)
+    target, kept = fitted_shader(material), material.mfo
+    notes, changes, moved = [], {}, animation_of(target.sockets)
     for name, value in values.items():
-        socket = node.inputs.get(name)
+        socket = target.sockets.get(name)
         if socket is None:
             notes.append(f"{name} does not exist in this Blender version and was skipped.")
         elif socket.is_linked:
-            notes.append(f"{name} has a link and was left as it is.")
+            notes.append(f"{target.own_name(name)} has a link and was left as it is.")
         elif name in moved and animated != REPLACE:
-            notes.append(left_note(name, moved[name]))
+            notes.append(left_note(target.own_name(name), moved[name]))
         else:
-            changes.append((socket, _fitting(socket, value)))
+            changes[name] = _fitting(socket, value)
     if kept.shows_original:
         toggle_values(material)  # so that what is kept as the original stays apart from what was applied
-    for socket, value in changes:
-        if socket.name not in kept.originals:
-            keep_value(kept.originals, socket.name, socket.default_value)
-        if moved.get(socket.name) == DRIVER:
+    notes += make_own(material, changes)
+    sockets = fitted_shader(material).sockets
+    for name, value in changes.items():
+        socket = sockets[name]
+        if name not in kept.originals:
+            keep_value(kept.originals, name, socket.default_value)
+        if moved.get(name) == DRIVER:
             remove_driver(socket)
             notes.append(f"The driver of {socket.name} was removed.")
-        _set(socket, value, moved)
-        if moved.get(socket.name) == KEYFRAMES:
+        _set(socket, value, moved.get(name))
+        if moved.get(name) == KEYFRAMES:
             notes.append(f"{socket.name} got a key at the current frame; its other keys stay.")
-        keep_value(kept.applied, socket.name, socket.default_value)
+        keep_value(kept.applied, name, socket.default_value)
     kept.job_folder = str(folder)
     return notes
 
@@ -113,20 +116,20 @@ def toggle_values(material: bpy.types.Material) -> list[str]:
 
     Returns what could not be set.
     """
-    kept, node = material.mfo, principled_node(material)
+    kept, sockets = material.mfo, fitted_shader(material).sockets
     left, entered = (kept.originals, kept.applied) if kept.shows_original else (kept.applied, kept.originals)
     for value in left:
-        socket = node.inputs.get(value.name)
+        socket = sockets.get(value.name)
         if socket is not None and value.size == len(_numbers(socket)):
             keep_value(left, value.name, socket.default_value)
     kept.shows_original = not kept.shows_original
-    return _restore(node, entered)
+    return _restore(material, entered)
 
 
 def revert_values(material: bpy.types.Material) -> list[str]:
     """Give the sockets the values they had before the first `apply_values`; returns what could not be set."""
     kept = material.mfo
-    notes = [] if kept.shows_original else _restore(principled_node(material), kept.originals)
+    notes = [] if kept.shows_original else _restore(material, kept.originals)
     kept.originals.clear()
     kept.applied.clear()
     kept.job_folder, kept.shows_original = "", False
@@ -147,23 +150,26 @@ def kept_value(entry: bpy.types.PropertyGroup) -> Value:
     return entry.value[0] if entry.size == 1 else tuple(entry.value[: entry.size])
 
 
-def _restore(node: bpy.types.ShaderNode, values: bpy.types.bpy_prop_collection) -> list[str]:
-    notes, moved = [], animation_of(node)
+def _restore(material: bpy.types.Material, values: bpy.types.bpy_prop_collection) -> list[str]:
+    fitted_shader(material)
+    notes = make_own(material, [entry.name for entry in values])  # shared again, by a copy of the material
+    sockets = fitted_shader(material).sockets
+    moved = animation_of(sockets)
     for entry in values:
-        socket = node.inputs.get(entry.name)
+        socket = sockets.get(entry.name)
         if socket is None:
             notes.append(f"{entry.name} does not exist any more and was skipped.")
         elif entry.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
             notes.append(f"{entry.name} was kept as {entry.size} numbers and could not be set.")
         else:
-            _set(socket, kept_value(entry), moved)
+            _set(socket, kept_value(entry), moved.get(entry.name))
     return notes
 
 
-def _set(socket: bpy.types.NodeSocket, value: Value, animation: Mapping[str, str]) -> None:
+def _set(socket: bpy.types.NodeSocket, value: Value, animation: str | None) -> None:
     """Set a socket's value and, where it has keyframes, put a key, without which the next frame takes it away."""
     socket.default_value = value
-    if animation.get(socket.name) == KEYFRAMES and not key_here(socket):
+    if animation == KEYFRAMES and not key_here(socket):
         raise WriteBackError(f"No key can be put for {socket.name}: its action cannot be changed, make it local first.")
 
 

@@ -12,12 +12,13 @@ _Groups = tuple[bpy.types.Node, ...]
 _Place = tuple[int, ...]  # pointers: the same node in two places of a group is two
 
 
-def graph_problem(socket: bpy.types.NodeSocket, *, is_copied: bool) -> str | None:
+def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copied: bool) -> str | None:
     """What is wrong with the nodes that feed `socket`, said as what it is linked to; None if nothing is.
 
-    `is_copied` says that a copy of the file is evaluated, which does not hold pixels that are not saved.
+    `groups` are the group nodes it lies in, and `is_copied` says that a copy of the file is evaluated, which does not
+    hold pixels that are not saved.
     """
-    return _problem_upstream(socket, (), (), set(), is_copied)
+    return _problem_upstream(socket, groups, (), set(), is_copied)
 
 
 def _problem_upstream(
@@ -50,7 +51,7 @@ def _feeding(
 ) -> Iterator[tuple[bpy.types.NodeSocket, _Groups]]:
     """The sockets that an output depends on, and the groups they are in."""
     if node.bl_idname == GROUP:
-        inner = None if node.node_tree is None else _group_output(node.node_tree)
+        inner = None if node.node_tree is None else group_output(node.node_tree)
         yield from ((s, (*groups, node)) for s in (inner.inputs if inner else ()) if s.identifier == output.identifier)
     elif node.bl_idname == GROUP_INPUT:
         outer = groups[-1].inputs if groups else ()
@@ -59,7 +60,8 @@ def _feeding(
         yield from ((s, groups) for s in node.inputs)
 
 
-def _group_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+def group_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """The node of a group whose inputs are what the group gives."""
     outputs = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
     return next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
 
@@ -74,7 +76,7 @@ def _problem(node: bpy.types.Node, is_copied: bool) -> str | None:
     if node.bl_idname == GROUP:
         if node.node_tree is None:
             return f"the group '{node.name}' without nodes"
-        if _group_output(node.node_tree) is None:
+        if group_output(node.node_tree) is None:
             return f"the group '{node.node_tree.name}' without an output"
     image = getattr(node, "image", None) if node.bl_idname.startswith("ShaderNodeTex") else None
     if image is not None:

@@ -19,13 +19,13 @@ from .job_folder import GENERATOR, new_job_folder
 from .material_model import Material
 from .node_graph import FOLDER as GRAPH_FOLDER
 from .node_graph import evaluate_graph, probe_for
-from .read_material import principled_node
 from .read_scene import read_scene
 from .reference import Reference, read_reference
 from .reference_view import SCENE, output_view
 from .scene_bakes import SceneBakes
 from .scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
 from .scene_file import SceneFiles, scene_files
+from .target_shader import TargetShader, target_shader
 
 SCHEMA_VERSION = 1
 
@@ -71,7 +71,11 @@ def export_job(
         assert data is not None
         if unwritable(obj.active_material):
             findings.note(f"The values cannot be applied as it is. {unwritable(obj.active_material)}")
-        for said in animation_notes(principled_node(obj.active_material), context.scene.frame_current):
+        target = target_shader(obj.active_material)
+        assert target is not None
+        fit = _fit_of(target, data.materials[TARGET_BSDF], fit)
+        named = {target.own_name(name): socket for name, socket in target.sockets.items()}
+        for said in animation_notes(named, context.scene.frame_current):
             findings.note(said)
         tell(0.4)
         size = (data.camera.width, data.camera.height)
@@ -112,6 +116,24 @@ def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findin
     if data is not None:
         scene_files(data, findings)
     return findings
+
+
+def _fit_of(target: TargetShader, material: Material, fit: dict[str, Any]) -> dict[str, Any]:
+    """The fit of what the target's node has: of a Diffuse BSDF its two values."""
+    if not target.is_diffuse:
+        return fit
+    if fit.get("model", "blender_principled") != "blender_principled":
+        raise ExportError("A Diffuse BSDF is fitted with the model blender_principled alone: choose that.")
+    names = {name.lower().replace(" ", "_"): name for name in target.places}
+    free = [name for name, socket in names.items() if not material.sockets[socket].linked]
+    wanted = fit.get("parameters", "all")
+    chosen = free if isinstance(wanted, str) else [name for name in wanted if name in names]
+    if not chosen:
+        raise ExportError(
+            "A Diffuse BSDF has Color (base_color) and Roughness (diffuse_roughness) alone, and none of them is left "
+            "to fit: choose one that has no link."
+        )
+    return fit | {"parameters": chosen}
 
 
 def _request(

@@ -15,7 +15,8 @@ import bpy
 from ..probe.client import Probe, ProbeError
 from .findings import ExportError, Findings
 from .material_model import Material
-from .read_material import principled_node, read_target
+from .read_material import read_target
+from .target_shader import target_shader
 
 FOLDER = "graph"
 # Subpixels along a pixel, and samples of each. Pictures of the truth differ from Cycles' by a FLIP of 0.062 at one
@@ -53,7 +54,7 @@ def probe_for(obj: bpy.types.Object | None) -> Iterator[Probe | None]:
     """
     slot, slots = (0, ()) if obj is None else (obj.active_material_index, obj.material_slots)
     material = slots[slot].material if slot < len(slots) else None
-    if obj is None or material is None or principled_node(material) is None:
+    if obj is None or material is None or target_shader(material) is None:
         yield None
         return
     described = read_target(material, obj.name, slot, Findings())
@@ -83,17 +84,18 @@ def evaluate_graph(
         If Cycles cannot evaluate the graph.
     """
     slot = obj.active_material_index
-    node = principled_node(obj.material_slots[slot].material)
-    assert node is not None
+    target = target_shader(obj.material_slots[slot].material)
+    assert target is not None
+    names = {target.own_name(name): name for name in names_by_graph(material)}
     answer = probe.ask(
         "sockets",
-        scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=slot, node=[node.name],
-        sockets=names_by_graph(material), scale=SCALE, samples=SAMPLES, folder=str(probe.folder),
+        scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=slot, node=target.path,
+        sockets=list(names), scale=SCALE, samples=SAMPLES, folder=str(probe.folder),
     )  # fmt: skip
-    files = {name: probe.folder / file for name, file in answer["files"].items()}
+    files = {names[own]: probe.folder / file for own, file in answer["files"].items()}
     sockets = dict(material.sockets)
     for name, file in files.items():
-        mean = answer["means"][name]
+        mean = answer["means"][target.own_name(name)]
         sockets[name] = replace(sockets[name], value=mean if len(mean) > 1 else mean[0], seen=file)
     positions = probe.folder / answer["positions"]
     return replace(material, sockets=sockets), NodeGraph(answer["camera"], positions, (positions, *files.values()))

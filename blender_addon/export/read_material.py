@@ -5,7 +5,14 @@ from __future__ import annotations
 
 import bpy
 
-from ..versions import PRINCIPLED, active_output, cycles_settings, default_surface_is_principled, node_tree_of
+from ..versions import (
+    PRINCIPLED,
+    active_output,
+    cycles_settings,
+    default_surface_is_principled,
+    has_diffuse_roughness,
+    node_tree_of,
+)
 from .audit.rules import name_settings
 from .audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from .color_space import to_rec709
@@ -14,8 +21,8 @@ from .graph_findings import graph_problem
 from .image_pixels import without_pixels
 from .material_model import Material, Socket, grey
 from .shader_graph import MissingPictureError, UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
+from .target_shader import DIRECTIONS, Place, TargetShader, target_shader
 
-NORMAL_SOCKETS = ("Normal", "Coat Normal", "Tangent")
 SKIPPED_SOCKETS = ("Weight",)
 # sockets without an effect in the fit, whatever is linked to them
 UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
@@ -27,6 +34,15 @@ DEFAULT_SOCKETS = {
     "Roughness": Socket(0.5),
     "IOR": Socket(1.5),
     "Specular IOR Level": Socket(0.5),
+}
+# what of a Principled BSDF makes it a Diffuse BSDF (Roughness has no effect then), and keeps it opaque
+WITHOUT_SPECULAR = {
+    "Metallic": 0.0,
+    "Roughness": 1.0,
+    "IOR": 1.5,
+    "Specular IOR Level": 0.0,
+    "Alpha": 1.0,
+    "Transmission Weight": 0.0,
 }
 # shaders of other objects with a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
 SIMPLE_SHADERS = {
@@ -44,33 +60,76 @@ SIMPLE_SHADERS = {
 }
 
 
-def principled_node(material: bpy.types.Material | None) -> bpy.types.Node | None:
-    """Return the Principled node linked to the output that Cycles uses, or None."""
-    if material is None:
-        return None
-    node = surface_of(node_tree_of(material))
-    return node if node is not None and node.bl_idname == PRINCIPLED else None
-
-
 def read_target(material: bpy.types.Material | None, owner: str, slot: int, findings: Findings) -> Material | None:
     """Return the material to fit, or None with an error in `findings`."""
     if material is None:
         findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
                        Fix("new_material"))  # fmt: skip
         return None
-    node = principled_node(material)
+    target = target_shader(material)
     muted = next((each.name for each in _nodes(material) if each.bl_idname == PRINCIPLED and each.mute), None)
-    if node is None and muted is not None:
+    if target is None and muted is not None:
         findings.error(f"Node '{muted}' of material '{material.name}' is muted: press M over it in the Shader Editor.")
         return None
-    if node is None:
+    if target is None:
         findings.error(
-            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one directly.",
+            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one, directly "
+            "or in a group.",
             Fix("principled"),
         )
         return None
     note_volume(material, findings)
-    return _read_principled(material, node, True, findings)
+    shared = target.shared_group([name for name, place in target.places.items() if not place.socket.is_linked])
+    if shared is not None:
+        findings.note(
+            f"The group '{shared.name}' of material '{material.name}' is used elsewhere too: an apply gives the "
+            "material a copy of its own."
+        )
+    return _read_diffuse(material, target, findings) if target.is_diffuse else _read_fitted(material, target, findings)
+
+
+def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
+    sockets = {}
+    for name, place in target.places.items():
+        if name in DIRECTIONS:
+            sockets[name] = _read_direction(name, place, material.name, findings)
+        elif name not in SKIPPED_SOCKETS:
+            sockets[name] = _read(name, place, material.name, name not in UNUSED_SOCKETS, findings)
+            if name in EMISSION_SOCKETS and sockets[name].by_graph:
+                findings.note(f"Material '{material.name}': what is linked to {name} counts with its average.")
+    method = getattr(target.node, "subsurface_method", "RANDOM_WALK")
+    found = Material(material.name, "principled", sockets, target.node.distribution, method)
+    _note_default_tangent(found, findings)
+    return found
+
+
+def _read_diffuse(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
+    """A Diffuse BSDF as the Principled BSDF that it is exactly: no specular, and nothing else free."""
+    sockets = {
+        name: _read(target.own_name(name), place, material.name, True, findings)
+        for name, place in target.places.items()
+    }
+    rough = sockets["Diffuse Roughness"]
+    if not has_diffuse_roughness():
+        sockets["Diffuse Roughness"] = Socket(0.0, True)
+        if rough.linked or rough.value > 0.0:
+            findings.note(f"Material '{material.name}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.")
+    findings.note(
+        f"Material '{material.name}' has a Diffuse BSDF, fitted as a Principled BSDF without specular: Base Color is "
+        "its Color, Diffuse Roughness its Roughness."
+    )
+    held = {name: Socket(value, True) for name, value in WITHOUT_SPECULAR.items()}
+    normal = _read_direction("Normal", Place(target.node.inputs["Normal"], target.groups), material.name, findings)
+    return Material(material.name, "principled", {**held, **sockets, "Normal": normal})
+
+
+def _read_direction(name: str, place: Place, material: str, findings: Findings) -> Socket:
+    """What is linked to Normal, Coat Normal or Tangent of the target; Cycles evaluates it."""
+    socket, source = place.socket, source_of(place.socket)
+    by_graph = source is not None and not (name == "Tangent" and _is_uv_tangent(source.node))
+    if by_graph:
+        _refuse(name, place, material, findings, is_copied=True)
+    return Socket(plain_value(socket), source is not None, by_graph=by_graph)
 
 
 def _nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
@@ -92,7 +151,7 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     if node is None:
         return Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
     if node.bl_idname == PRINCIPLED:
-        return _read_principled(material, node, False, findings)
+        return _read_principled(material, node, findings)
     if node.bl_idname not in SIMPLE_SHADERS:
         findings.note(
             f"Material '{material.name}' of '{owner}' starts with the node '{node.name}' ({node.bl_label}), which is "
@@ -102,7 +161,7 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     model, renamed, constants = SIMPLE_SHADERS[node.bl_idname]
     sockets = {name: Socket(value) for name, value in constants.items()}
     for name, theirs in renamed.items():
-        sockets[name] = _read(node.inputs[theirs], material.name, False, findings)
+        sockets[name] = _read(theirs, Place(node.inputs[theirs], ()), material.name, False, findings)
     if model == "null" and list(node.inputs["Color"].default_value)[:3] != [1.0, 1.0, 1.0]:
         findings.note(f"Material '{material.name}': {node.bl_label} is taken for white.")
     if model == "principled" or (model == "diffuse" and node.inputs["Roughness"].default_value > 0.0):
@@ -120,7 +179,7 @@ def needs_bake(material: bpy.types.Material | None) -> bool:
     names = SIMPLE_SHADERS[node.bl_idname][1].values() if node.bl_idname != PRINCIPLED else None
     with without_pixels():
         for socket in node.inputs:
-            if socket.name in NORMAL_SOCKETS:
+            if socket.name in DIRECTIONS:
                 if socket.name == "Normal" and source_of(socket) is not None:
                     return True
             elif names is None or socket.name in names:
@@ -131,26 +190,19 @@ def needs_bake(material: bpy.types.Material | None) -> bool:
     return False
 
 
-def _read_principled(
-    material: bpy.types.Material, node: bpy.types.Node, is_target: bool, findings: Findings
-) -> Material:
+def _read_principled(material: bpy.types.Material, node: bpy.types.Node, findings: Findings) -> Material:
+    """A Principled BSDF that is not fitted."""
     sockets: dict[str, Socket] = {}
     for socket in node.inputs:
         if socket.name in SKIPPED_SOCKETS:
             continue
-        if socket.name in NORMAL_SOCKETS:
+        if socket.name in DIRECTIONS:
             source = source_of(socket)
-            uv_tangent = source is not None and socket.name == "Tangent" and _is_uv_tangent(source.node)
-            by_graph = is_target and source is not None and not uv_tangent
-            if by_graph:
-                _refuse(socket, material.name, findings, is_copied=True)
-            sockets[socket.name] = Socket(plain_value(socket), source is not None, by_graph=by_graph)
-            if source is not None and not uv_tangent and not is_target:
+            sockets[socket.name] = Socket(plain_value(socket), source is not None)
+            if source is not None and not (socket.name == "Tangent" and _is_uv_tangent(source.node)):
                 findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
             continue
-        sockets[socket.name] = _read(socket, material.name, is_target and socket.name not in UNUSED_SOCKETS, findings)
-        if socket.name in EMISSION_SOCKETS and sockets[socket.name].by_graph:
-            findings.note(f"Material '{material.name}': what is linked to {socket.name} counts with its average.")
+        sockets[socket.name] = _read(socket.name, Place(socket, ()), material.name, False, findings)
     method = getattr(node, "subsurface_method", "RANDOM_WALK")
     found = Material(material.name, "principled", sockets, node.distribution, method)
     found.transparent_shadows = getattr(material, "use_transparent_shadow", True)
@@ -172,32 +224,32 @@ def _is_uv_tangent(node: bpy.types.Node) -> bool:
     return node.bl_idname == "ShaderNodeTangent" and node.direction_type == "UV_MAP" and not node.uv_map
 
 
-def _read(socket: bpy.types.NodeSocket, material: str, is_target: bool, findings: Findings) -> Socket:
+def _read(name: str, place: Place, material: str, is_target: bool, findings: Findings) -> Socket:
     try:
-        read = read_socket(socket)
+        read = read_socket(place.socket)
         if is_target:
-            _refuse(socket, material, findings, is_copied=False)
+            _refuse(name, place, material, findings, is_copied=False)
         return read
     except UnsupportedNodeError as problem:
         if is_target:
-            _refuse(socket, material, findings, is_copied=True)
+            _refuse(name, place, material, findings, is_copied=True)
         if isinstance(problem, MissingPictureError) and not is_target:
-            findings.error(f"{socket.name} of material '{material}' is magenta in Cycles: it is linked to {problem}.")
+            findings.error(f"{name} of material '{material}' is magenta in Cycles: it is linked to {problem}.")
         elif not is_target:
             findings.note(
-                f"{socket.name} of material '{material}' is linked to {problem}, which cannot be exported; the "
+                f"{name} of material '{material}' is linked to {problem}, which cannot be exported; the "
                 "socket's own value is used."
             )
-        return Socket(plain_value(socket), True, by_graph=is_target)
+        return Socket(plain_value(place.socket), True, by_graph=is_target)
 
 
-def _refuse(socket: bpy.types.NodeSocket, material: str, findings: Findings, *, is_copied: bool) -> None:
+def _refuse(name: str, place: Place, material: str, findings: Findings, *, is_copied: bool) -> None:
     """An error where Cycles could not evaluate what feeds a socket of the target."""
-    problem = graph_problem(socket, is_copied=is_copied)
+    problem = graph_problem(place.socket, groups=place.groups, is_copied=is_copied)
     if problem is not None:
         findings.error(
-            f"{socket.name} of material '{material}' is linked to {problem}: mend or unlink it.",
-            Fix("unlink", socket.name),
+            f"{name} of material '{material}' is linked to {problem}: mend or unlink it.",
+            Fix("unlink", name),
         )
 
 

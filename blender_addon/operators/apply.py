@@ -13,7 +13,7 @@ from .. import running_job, shown_result
 from ..job_result import JobResult, JobResultError, must_ask, read_job_result
 from ..local_copy import unwritable
 from ..preflight import redraw
-from ..write_back import WriteBackError, apply_values, principled_node, result_to_sockets, revert_values, toggle_values
+from ..write_back import WriteBackError, apply_values, fitted_shader, result_to_sockets, revert_values, toggle_values
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -165,7 +165,7 @@ def applied_material(context: bpy.types.Context, name: str) -> bpy.types.Materia
         raise WriteBackError(f"Nothing was applied to material {material.name!r}, so nothing can be reverted.")
     if unwritable(material):
         raise WriteBackError(unwritable(material))
-    principled_node(material)
+    fitted_shader(material)
     return material
 
 

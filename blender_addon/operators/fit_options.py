@@ -14,13 +14,13 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from .. import fit_queue, running_job
 from ..backend_python import BackendPythonError
 from ..export.job import ExportError, export_job
-from ..export.read_material import principled_node as find_principled
 from ..export.reference_view import REFERENCE_VIEWS
+from ..export.target_shader import target_shader
 from ..fit_queue import PreparedFit
 from ..local_copy import unwritable
 from ..preferences import chosen_python, new_job_folder
 from ..properties import chosen_of, crossed_limits
-from ..write_back import WriteBackError, principled_node
+from ..write_back import WriteBackError, fitted_shader
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -158,11 +158,11 @@ def target_of(context: bpy.types.Context, name: str) -> bpy.types.Object:
 
 
 def selected_targets(context: bpy.types.Context, most: int = 1000) -> list[bpy.types.Object]:
-    """One selected object for each active material with a Principled BSDF, at most `most`."""
+    """One selected object for each active material with a shader that is fitted, at most `most`."""
     chosen: dict[int, bpy.types.Object] = {}
     for obj in context.selected_objects:
         material = obj.active_material
-        if find_principled(material) is not None:
+        if target_shader(material) is not None:
             chosen.setdefault(material.session_uid, obj)
         if len(chosen) == most:
             break
@@ -174,7 +174,7 @@ def _active_material(obj: bpy.types.Object) -> bpy.types.Material:
     if material is None:
         raise FitError(f"Object {obj.name!r} has no material in its active slot: give it one with a Principled BSDF.")
     try:
-        principled_node(material)
+        fitted_shader(material)
     except WriteBackError as error:
         raise FitError(str(error)) from error
     return material

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from .. import running_job
-from ..export.read_material import principled_node
+from ..export.target_shader import TargetShader, target_shader
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
 
 
@@ -28,21 +28,22 @@ class Parameters:
             return
         column = layout.column(align=True)
         if settings.model == "blender_principled":
-            node = principled_node(context.object.active_material if context.object else None)
+            target = target_shader(context.object.active_material if context.object else None)
             for key, name, *_ in SOCKET_ITEMS:
-                _draw_value(column, settings, key, name, node)
+                _draw_value(column, settings, key, name, target)
         else:
             for key, name, *_ in PARAMETER_ITEMS:
                 column.prop_enum(settings, chosen_of(settings.model), key, text=name)
 
 
 def _draw_value(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, key: str, name: str, node: bpy.types.Node | None
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, key: str, name: str, target: TargetShader | None
 ) -> None:
     """A box that unlocks the value, its name, and the value itself to set where the fit starts."""
-    socket = node.inputs.get(name) if node is not None else None
-    if node is not None and socket is None:
-        return  # not in this version of Blender
+    socket = target.sockets.get(name) if target is not None else None
+    if target is not None and socket is None:
+        return  # not in this version of Blender, or not of this node
+    name = target.own_name(name) if target is not None else name
     split = layout.split(factor=0.6, align=True)
     is_linked = socket is not None and socket.is_linked
     icon = "LINKED" if is_linked else "CHECKBOX_HLT" if key in settings.sockets else "LOCKED"

@@ -7,7 +7,7 @@ import bpy
 
 from .. import previews, shown_result
 from ..animated_sockets import animation_of
-from ..export.read_material import principled_node
+from ..export.target_shader import target_shader
 from ..job_result import must_ask
 from .layout import draw_sentence
 
@@ -46,8 +46,8 @@ class Result:
         applied = material is not None and bool(material.mfo.originals)
         shows_own = material is not None and applied and material.mfo.shows_original
         text = ("A: own values" if shows_own else "B: recovered values") if applied else "A/B"
-        node = principled_node(material) if material is not None else None
-        if node is not None and animation_of(node):
+        target = target_shader(material)
+        if target is not None and animation_of(target.sockets):
             layout.label(text="Animated values", icon="ANIM")
             row = layout.row()
             row.prop(context.scene.mfo, "animated", expand=True)

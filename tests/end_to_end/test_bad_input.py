@@ -21,7 +21,7 @@ BROKEN_SCENES = {
     "no material": (f"{HEAD}.data.materials.clear()", ("material", "Suzanne")),
     "no principled": (
         f"t = {HEAD}.active_material.node_tree\n"
-        "t.nodes.remove(t.nodes['Principled BSDF'])\nd = t.nodes.new('ShaderNodeBsdfDiffuse')\n"
+        "t.nodes.remove(t.nodes['Principled BSDF'])\nd = t.nodes.new('ShaderNodeBsdfGlossy')\n"
         "t.links.new(d.outputs[0], t.nodes['Material Output'].inputs[0])",
         ("Principled", "Head"),
     ),

@@ -20,7 +20,8 @@ if __name__ == "__main__":
 from blender_addon.export.findings import Findings
 from blender_addon.export.material_elements import bsdf_element
 from blender_addon.export.node_graph import names_by_graph
-from blender_addon.export.read_material import principled_node, read_context, read_target
+from blender_addon.export.read_material import read_context, read_target
+from blender_addon.export.target_shader import target_shader
 from mfo_backend.material.principled_parameters import PARAMETER_OF_SOCKET
 
 # With these no lobe is off, so that every other socket has an effect
@@ -43,8 +44,9 @@ def silent_sockets() -> list[str]:
     material = bpy.data.materials.new("Walk")
     if material.node_tree is None:
         material.use_nodes = True
-    node = principled_node(material)
-    assert node is not None
+    target = target_shader(material)
+    assert target is not None
+    node = target.node
     for name, value in PRESENT.items():
         node.inputs[name].default_value = value
     node.subsurface_method = "RANDOM_WALK_SKIN"  # the one that looks at Subsurface IOR

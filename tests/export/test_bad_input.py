@@ -12,7 +12,7 @@ import pytest
 
 from blender_addon.export.job import ExportError, check_export, export_job
 
-from .scenes import add_camera, add_mesh, add_quad, diffuse_material, new_material, world_color
+from .scenes import add_camera, add_mesh, add_quad, diffuse_material, emission_material, new_material, world_color
 
 
 def no_camera(scene: Any, target: Any) -> None:
@@ -40,7 +40,7 @@ def empty_slot(scene: Any, target: Any) -> None:
 
 
 def no_principled(scene: Any, target: Any) -> None:
-    target.data.materials[0] = diffuse_material("Plain", (1, 1, 1))
+    target.data.materials[0] = emission_material("Plain", (1, 1, 1))
 
 
 def slot_without_faces(scene: Any, target: Any) -> None:
@@ -83,7 +83,8 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     flat_camera: "Camera 'Camera' has a scale of zero: give it and its parents a scale other than zero.",
     no_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
     empty_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
-    no_principled: "Material 'Plain' has no Principled BSDF linked to Surface of its output: link one directly.",
+    no_principled: "Material 'Plain' has no Principled BSDF linked to Surface of its output: link one, directly or in "
+    "a group.",
     slot_without_faces: "No face of 'Target' uses its active material slot 2: choose another.",
     outside: "The camera does not see 'Target': move it into the frame.",
     behind: "The camera does not see 'Target': move it into the frame.",

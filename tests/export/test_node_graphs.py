@@ -130,13 +130,19 @@ def test_the_recorded_picture_is_cycles(
     scene: Any, export: Any, render_cycles: Any, mitsuba: Any, build: Any, values: Any, most: float
 ) -> None:
     """Level and root mean square difference of pixels inside the ball, as a share of its mean."""
-    from mfo_backend.render.recorded_scene import RecordedScene
-    from mfo_backend.render.renderer import load_renderer
-
     lit_scene(scene)
     material = new_material("Target", **values)
     build(material.node_tree, principled(material))
-    target = ball(material)
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
+    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < most
+
+
+def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
+    """Pixels inside the target, by the recorded paths of the exported job and by Cycles."""
+    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.renderer import load_renderer
+
     wanted = render_cycles()
     report = export(target, reference=None)
     (report.folder / "request.json").write_text(
@@ -145,17 +151,16 @@ def test_the_recorded_picture_is_cycles(
     )  # fmt: skip
     folder = JobFolder.open(report.folder)
     request = read_request(folder)
+    parameters = request.fit.parameters if isinstance(request.fit.parameters, tuple) else ["ior"]
     renderer = load_renderer(
-        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=["ior"],
+        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=parameters,
         materials=request_materials(folder, request), light_paths=request.light_paths,
     )  # fmt: skip
     recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
     paths = recorded.record(renderer.start, grid=4, seed=0, near=True)
     groups = paths.pixel_groups(paths.interior)
     found = np.asarray(recorded.pictures(paths, groups)(renderer.start))[:, :, 0]
-    truth = wanted.reshape(-1, 3)[groups.pixels]
-    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
-    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < most
+    return found, wanted.reshape(-1, 3)[groups.pixels]
 
 
 def test_nothing_is_left_in_the_temporary_folder() -> None:
