@@ -47,7 +47,9 @@ def baked_surface(
     space. Normals are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
     """
     original = instance.object.original
-    material = material_of_slot(instance.object, slot).original.copy()
+    shown = material_of_slot(instance.object, slot)
+    assert shown is not None  # a surface without material needs no bake
+    material = shown.original.copy()
     groups: list[bpy.types.NodeTree] = []
     try:
         tree = material.node_tree

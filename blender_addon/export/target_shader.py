@@ -117,6 +117,7 @@ def make_own(material: bpy.types.Material, names: Collection[str]) -> list[str]:
     if target is None or first is None:
         return []
     name, tree = first.name, node_tree_of(material)
+    assert tree is not None  # it holds the target
     for step in target.path[: target.depth_of(names)]:
         group = tree.nodes[step]
         if _is_shared(group.node_tree):  # by now also what lies in a group that was just copied

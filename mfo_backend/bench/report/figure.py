@@ -7,7 +7,7 @@ Matplotlib is no dependency of a fit: only who draws needs it (the extra `bench`
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...types.errors import SetupError
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Okabe and Ito's palette without its yellow and black, which vanish on one of the grounds, and two greys
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7a7a7a", "#a65628")
 GREY = "#8a8f94"
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.size": 9,
     "font.family": "sans-serif",
     **dict.fromkeys(("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), GREY),

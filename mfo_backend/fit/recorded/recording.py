@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...render.primary_rays import TILE
 from ...render.recorded_image import RECALLED, RecordedImage
 from ...render.recorded_paths import LaneGroups, RecordedPaths
-from ...render.recorded_scene import RecordedScene
+from ...render.recorded_scene import MOST_LANES, RecordedScene
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..plans import RecordedPlan
@@ -95,14 +95,14 @@ class Setting:
         near: bool = True,
         samples: int = SAMPLES,
         thinned: bool = False,
-        **more: float,
+        enough: float = MOST_LANES,
     ) -> Recording:
         """Record the light at the material `x`; see `RecordedScene.record`.
 
         A recording takes most of the memory of a fit: let the one before go first.
         """
         paths = self.scene.record(
-            x, grid=grid, seed=Stream.RECORDINGS.seed(self.seed, number), near=near, samples=samples, **more
+            x, grid=grid, seed=Stream.RECORDINGS.seed(self.seed, number), near=near, samples=samples, enough=enough
         )
         return Recording(self, paths, number, thinned)
 
