@@ -23,6 +23,8 @@ from .microfacet import density, reflection, smith_lambda
 
 BLENDER_5_0 = CyclesModel()
 
+Half = tuple[Any, Any]  # the half vector and its cosine with the view
+
 
 def blender_principled(
     parameters: Mapping[str, Any], wi: Any, wo: Any, lobes: Lobes = ALL_LOBES, model: CyclesModel = BLENDER_5_0
@@ -52,12 +54,12 @@ def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     if layers.normals is not None:
         return _evaluate_bumped(layers, layers.normals, wo, reachable_only)
     wi = layers.wi
-    up = _above(wo)
-    value = _microfacets(layers, wo)
+    up, half = _above(wo), _half(wi, wo)
+    value = _microfacets(layers, up, half)
     if layers.coat is not None:
-        value += _coat(layers, wi, up)
+        value += _coat(layers, wi, up, half)
     if layers.glass is not None:
-        value += _glass_reflection(layers, wo)
+        value += _glass_reflection(layers, up, half)
     value += _diffuse(layers, wi, up)
     value = dr.select((wo.z > 0) & (wi.z > 0), value, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
@@ -69,14 +71,15 @@ def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_
     """The same with a normal for each group of lobes; the layers' frame is that of the microfacets."""
     wi = layers.wi
     own = dr.kind_of(wi)(0, 0, 1)
-    value = _microfacets(layers, wo)
+    up, half = _above(wo), _half(wi, wo)
+    value = _microfacets(layers, up, half)
     if layers.glass is not None:
-        value += _glass_reflection(layers, wo)
+        value += _glass_reflection(layers, up, half)
     value = dr.select(normals.lit(own, wo) & (wi.z > 0), value, 0)
     if layers.coat is not None:
         wi_coat, wo_coat = about(normals.coat, wi), about(normals.coat, wo)
         seen = normals.lit(normals.coat, wo) & (wi_coat.z > 0)
-        value += dr.select(seen, _coat(layers, wi_coat, _above(wo_coat)), 0)
+        value += dr.select(seen, _coat(layers, wi_coat, _above(wo_coat), _half(wi_coat, wo_coat)), 0)
     diffuse = _diffuse(layers, about(normals.diffuse, wi), _above(about(normals.diffuse, wo)))
     value += dr.select(normals.lit(normals.diffuse, wo), diffuse * normals.terminator(wo), 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
@@ -88,36 +91,36 @@ def _above(wo: Any) -> Any:
     return dr.kind_of(wo)(wo.x, wo.y, dr.maximum(wo.z, 1e-7))
 
 
-def _half(wi: Any, wo: Any) -> tuple[Any, Any]:
+def _half(wi: Any, wo: Any) -> Half:
     """The half vector and its cosine with `wi`."""
     h = dr.normalize(wi + dr.kind_of(wi)(wo.x, wo.y, dr.abs(wo.z)))
     return h, dr.minimum(dr.dot(wi, h), 1)
 
 
-def _microfacets(layers: Layers, wo: Any) -> Any:
+def _microfacets(layers: Layers, wo: Any, half: Half) -> Any:
     """Metal and specular."""
     if layers.metal is None and layers.specular is None:
         return 0
-    h, c = _half(layers.wi, wo)
+    h, c = half
     fresnel: Any = 0
     if layers.metal is not None and layers.metal_fresnel is not None:
         fresnel += layers.metal * layers.metal_fresnel(c)
     if layers.specular is not None and layers.specular_fresnel is not None:
         fresnel += layers.specular * layers.specular_fresnel(c)
-    return fresnel * reflection(layers.wi, _above(wo), h, layers.ax, layers.ay)
+    return fresnel * reflection(layers.wi, wo, h, layers.ax, layers.ay)
 
 
-def _coat(layers: Layers, wi: Any, wo: Any) -> Any:
-    h, c = _half(wi, wo)
+def _coat(layers: Layers, wi: Any, wo: Any, half: Half) -> Any:
+    h, c = half
     lobe = reflection(wi, wo, h, layers.coat_alpha, layers.coat_alpha)
     return layers.coat * (lobe * dielectric(c, layers.coat_ior))
 
 
-def _glass_reflection(layers: Layers, wo: Any) -> Any:
+def _glass_reflection(layers: Layers, wo: Any, half: Half) -> Any:
     if layers.glass_fresnel is None:
         return 0
-    h, c = _half(layers.wi, wo)
-    lobe = reflection(layers.wi, _above(wo), h, layers.glass_alpha, layers.glass_alpha)
+    h, c = half
+    lobe = reflection(layers.wi, wo, h, layers.glass_alpha, layers.glass_alpha)
     return layers.glass * layers.glass_fresnel(c) * lobe
 
 
