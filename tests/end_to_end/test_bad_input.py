@@ -27,10 +27,12 @@ BROKEN_SCENES = {
     ),
     "behind the camera": (f"{HEAD}.location = (0, -40, 0)", ("camera", "Suzanne")),
     "no light": ("bpy.context.scene.world = None", ("light",)),
-    "unsupported node": (
-        f"t = {HEAD}.active_material.node_tree\nn = t.nodes.new('ShaderNodeTexNoise')\n"
+    "group without output": (
+        f"t = {HEAD}.active_material.node_tree\ng = bpy.data.node_groups.new('Wear', 'ShaderNodeTree')\n"
+        "g.interface.new_socket('Value', in_out='OUTPUT', socket_type='NodeSocketFloat')\n"
+        "n = t.nodes.new('ShaderNodeGroup')\nn.node_tree = g\n"
         "t.links.new(n.outputs[0], t.nodes['Principled BSDF'].inputs['Roughness'])",
-        ("Roughness", "Noise"),
+        ("Roughness", "group"),
     ),
 }
 SAVE = "\nbpy.ops.wm.save_as_mainfile(filepath=argv[1], copy=True)"

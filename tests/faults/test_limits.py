@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from mfo_backend.types.status import Status
+
 from ..stability.test_extremes import SKY
 from .limits import PERMISSIONS_BIND, close, job, run
 
@@ -36,7 +38,8 @@ def test_recording_that_does_not_fit_is_one_sentence(tmp_path: Path) -> None:
 
 def test_enough_memory_is_not_refused(tmp_path: Path) -> None:
     row = run("", job(tmp_path, 16), limit=900 << 20)
-    assert (row["exit"], row["result"]) == (0, "complete"), row["sentence"]
+    assert row["exit"] in (0, Status.DIFFERENT.exit_code), row["sentence"]  # a picture that no material makes
+    assert row["result"] == "complete"
 
 
 @pytest.mark.skipif(not PERMISSIONS_BIND, reason="root, and setpriv is not installed")
