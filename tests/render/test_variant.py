@@ -68,6 +68,6 @@ def test_says_that_mitsuba_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_layers_above_import_no_renderer() -> None:
-    program = "import sys, mfo_backend.fit.recover_material; print('mitsuba' in sys.modules or 'drjit' in sys.modules)"
+    program = "import sys, mfo_backend.fit.paper.fit; print('mitsuba' in sys.modules or 'drjit' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.strip() == "False"
