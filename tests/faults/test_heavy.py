@@ -10,10 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from mfo_backend.types.status import Status
+
 from .heavy import PIXELS, SEGMENTS, large_pictures, many_triangles
 from .write_page import RECORDS
 
 HEAVY = "MFO_HEAVY" in os.environ
+DONE = (0, Status.DIFFERENT.exit_code)  # no material makes pictures of noise, and a result says so
 WITHOUT_BPY = importlib.util.find_spec("bpy") is None
 
 pytestmark = [
@@ -25,14 +28,14 @@ pytestmark = [
 
 def test_large_pictures_end_with_a_result(tmp_path: Path) -> None:
     for row in large_pictures(tmp_path, PIXELS if HEAVY else 64):
-        assert row["exit"] == 0, row
+        assert row["exit"] in DONE, row
 
 
 @pytest.mark.skipif(WITHOUT_BPY, reason="the bpy module is not installed")
 def test_many_triangles_are_exported_and_fitted(tmp_path: Path) -> None:
     export, fit = many_triangles(tmp_path, SEGMENTS if HEAVY else 20, 32)
     assert export["exit"] == 0, export
-    assert fit["exit"] == 0, fit
+    assert fit["exit"] in DONE, fit
 
 
 def test_the_record_says_a_result_or_a_sentence() -> None:
