@@ -99,6 +99,7 @@ def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: F
                 findings.note(f"Material '{material.name}': what is linked to {name} counts with its average.")
     method = getattr(target.node, "subsurface_method", "RANDOM_WALK")
     found = Material(material.name, "principled", sockets, target.node.distribution, method)
+    found.transparent_shadows = material.use_transparent_shadow
     _note_default_tangent(found, findings)
     return found
 
@@ -205,7 +206,7 @@ def _read_principled(material: bpy.types.Material, node: bpy.types.Node, finding
         sockets[socket.name] = _read(socket.name, Place(socket, ()), material.name, False, findings)
     method = getattr(node, "subsurface_method", "RANDOM_WALK")
     found = Material(material.name, "principled", sockets, node.distribution, method)
-    found.transparent_shadows = getattr(material, "use_transparent_shadow", True)
+    found.transparent_shadows = material.use_transparent_shadow
     _note_default_tangent(found, findings)
     return found
 

@@ -23,7 +23,7 @@ def test_recovered_values_stay_inside(scene: Scene, blend: Callable[..., Done], 
     request["fit"] |= {"max_iterations": 3, "spp": 4}
     (job / "request.json").write_text(json.dumps(request), "utf-8")
     done = run_mfo("run", job, "--progress", "none")
-    assert done.code == 0, done.stderr
+    assert done.code in (0, 5), done.stderr  # the limits keep it from the truth, and it may say that it does not match
     result = json.loads((job / "result.json").read_text("utf-8"))
     assert limits[0] <= result["recovered"]["roughness"] <= limits[1]
     assert result["bounds"]["roughness"] == limits
