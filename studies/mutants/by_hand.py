@@ -26,7 +26,7 @@ WRONG = [
     # a colour's alpha becomes 1 with Apply
     ("blender_addon/write_back.py", "return (*map(float, color), held[3])", "return (*map(float, color), 1.0)"),
     # Revert leads to what an earlier fit applied
-    ("blender_addon/write_back.py", "if socket.name not in kept.originals:", "if True:"),
+    ("blender_addon/write_back.py", "if name not in kept.originals:", "if True:"),
     # the end of a line that was too long counts as a line of its own
     (
         "blender_addon/progress_lines.py",
