@@ -20,7 +20,7 @@ from ..versions import (
 )
 from .audit.object_table import OBJECT_CYCLES
 from .audit.rules import name_settings
-from .audit.scene_table import LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
+from .audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from .bent_normals import share_of_bent_normals
 from .coincident import shared_faces
 from .findings import Findings, Fix
@@ -120,7 +120,8 @@ def read_scene(
 
 def _name_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, findings: Findings) -> None:
     """Report what the scene's settings do to a picture and the fit does not."""
-    name_settings(SCENE_CYCLES, cycles_settings(scene), scene.name, findings)
+    idle = () if scene.render.use_simplify else BY_SIMPLIFY
+    name_settings(SCENE_CYCLES, cycles_settings(scene), scene.name, findings, idle)
     name_settings(RENDER, scene.render, scene.name, findings)
     name_settings(VIEW_LAYER, view_layer, view_layer.name, findings)
     for collection in layer_collections(view_layer):

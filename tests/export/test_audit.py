@@ -46,6 +46,7 @@ def ball(scene: Any) -> Any:
         (lambda s: setattr(s.world.cycles_visibility, "glossy", False), "hidden from glossy rays"),
         (lambda s: setattr(s.world.cycles, "max_bounces", 1), "limit of bounces"),
         (lambda s: setattr(s.render, "use_stamp", True), "Burn Into Image"),
+        (lambda s: limit_textures(s, simplify=True), "size of textures"),
     ],
 )
 def test_what_is_set_is_said(change: Any, words: str, scene: Any, export: Any) -> None:
@@ -53,3 +54,14 @@ def test_what_is_set_is_said(change: Any, words: str, scene: Any, export: Any) -
     assert not export(item, "plain").notes
     change(scene)
     assert any(words in note for note in export(item).notes)
+
+
+def limit_textures(scene: Any, *, simplify: bool) -> None:
+    scene.render.use_simplify, scene.cycles.texture_limit_render = simplify, "128"
+    scene.cycles.use_camera_cull = True
+
+
+def test_what_simplify_does_is_silent_without_simplify(scene: Any, export: Any) -> None:
+    item = ball(scene)
+    limit_textures(scene, simplify=False)
+    assert not export(item).notes

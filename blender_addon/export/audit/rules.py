@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,11 +46,14 @@ class Owner:
         return frozenset((*self.exported.split(), *self.no_effect.split(), *self.named))
 
 
-def name_settings(table: Owner, owner: Any, name: str, findings: Findings) -> None:
-    """Report each named property of `owner` (None: nothing) that this Blender has and that is not neutral."""
+def name_settings(table: Owner, owner: Any, name: str, findings: Findings, idle: Container[str] = ()) -> None:
+    """Report each named property of `owner` (None: nothing) that this Blender has and that is not neutral.
+
+    Those in `idle` change nothing in this scene.
+    """
     for key, rule in table.named.items():
         value = getattr(owner, key, rule.neutral)
-        if value == rule.neutral:
+        if value == rule.neutral or key in idle:
             continue
         report = findings.error if rule.stops else findings.note
         report(rule.sentence.format(owner=name))

@@ -61,13 +61,17 @@ SCENE_CYCLES = Owner(
             "OFF", "Simplify limits the size of textures in Cycles; the fit has them at full size."
         ),
         "texture_resolution_render": Named(
-            100, "Simplify reduces the resolution of textures in Cycles; the fit has them at full size."
+            1.0, "Simplify reduces the resolution of textures in Cycles; the fit has them at full size."
         ),
+        # measured in 5.2: off, the default, is the picture of 5.0 (RMS 1e-5); on changes it (RMS 0.07)
         "use_pixel_jitter": Named(
-            True, "Pixel Jitter is off: Cycles takes the middle of each pixel alone; the fit the whole of it."
+            False, "Use Pixel Jitter, a debugging switch of Cycles, is on: it changes Cycles' picture and not the fit's."
         ),
     },
 )
+
+# of `SCENE_CYCLES`: without Simplify in the render settings they change nothing
+BY_SIMPLIFY = frozenset({"use_camera_cull", "use_distance_cull", "texture_limit_render", "texture_resolution_render"})
 
 RENDER = Owner(
     exported="engine film_transparent pixel_aspect_x pixel_aspect_y resolution_percentage resolution_x resolution_y "
