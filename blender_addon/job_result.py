@@ -14,6 +14,8 @@ SCHEMA_VERSION = 1
 LARGEST_FILE = 1 << 26  # bytes; the curves of a long fit take 1 MB
 LARGEST_NUMBER = 3.4e38  # of the float32 that a socket holds
 Value = float | tuple[float, ...]
+_SIGMAS = 2.0  # standard deviations to each side, 95 of 100 of a normal distribution
+_UNSURE = ("not_visible", "not_told_apart", "doubtful")  # levels whose spread is not the whole of what is unknown
 
 
 class JobResultError(Exception):
@@ -46,6 +48,24 @@ class JobResult:
     verdict: str = ""
     certainty_words: Mapping[str, str] = field(default_factory=dict)
     image: tuple[int, int] = (0, 0)  # width and height of the job's pictures
+    spread: Mapping[str, float] = field(default_factory=dict)  # standard deviation, of a colour's least sure channel
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # what the fit could have chosen
+
+    def likely(self, name: str, value: float) -> tuple[float, float] | None:
+        """The range that holds a value in 95 of 100 cases, None where it is not known."""
+        if name not in self.spread or name not in self.bounds:
+            return None
+        low, high = self.bounds[name]
+        return max(low, value - _SIGMAS * self.spread[name]), min(high, value + _SIGMAS * self.spread[name])
+
+    def sureness(self, name: str) -> float:
+        """How much of what the fit could have chosen the picture rules out, 0 to 1; negative where it is not known."""
+        if self.certainty.get(name) in _UNSURE:
+            return 0.0
+        if name not in self.spread or name not in self.bounds:
+            return -1.0
+        low, high = self.bounds[name]
+        return min(max(1.0 - 2.0 * _SIGMAS * self.spread[name] / max(high - low, 1e-9), 0.0), 1.0)
 
 
 def must_ask(verdict: str) -> bool:
@@ -88,6 +108,8 @@ def read_job_result(folder: Path) -> JobResult:
             notes=tuple(map(str, result.get("notes", ()))),
             seconds=float(result.get("seconds", 0.0)),
             weak_combinations=tuple(str(c["sentence"]) for c in result.get("weak_combinations", ())),
+            spread={str(k): _spread(c["sd"]) for k, c in result.get("certainty", {}).items() if c.get("sd")},
+            bounds={str(k): (float(a), float(b)) for k, (a, b) in (result.get("bounds") or {}).items()},
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -111,6 +133,11 @@ def _read_json(path: Path) -> dict[str, Any]:
             f"{path} has schema_version {version!r} and this add-on reads {SCHEMA_VERSION}: run the fit again."
         )
     return data
+
+
+def _spread(deviations: list[Any]) -> float:
+    """The largest of a value's standard deviations; JSON has null for what is infinite."""
+    return max(math.inf if sd is None else float(sd) for sd in deviations)
 
 
 def _value(data: Any) -> Value:

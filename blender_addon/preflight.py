@@ -12,7 +12,9 @@ from .checks import IGNORED, STOPS, TO_CHOOSE, Finding, quick_check
 DELAY = 0.25  # seconds between a change and its check, so that a drag costs four checks a second at most
 
 findings: tuple[Finding, ...] = ()  # what the panel lists
+mended: tuple[Finding, ...] = ()  # what buttons have mended since the list last changed otherwise
 is_thorough = False  # they come from a whole export, by `mfo.check`
+_before: tuple[Finding, ...] = ()  # the list that the first of those buttons was pressed in
 _quick: tuple[Finding, ...] = ()  # the last quick check, without what an export said
 _seen: Any = None  # what the scene looked like then
 _checked = False
@@ -32,17 +34,35 @@ def request() -> None:
 
 def check_now(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     """Make the quick check; what an export said stays as long as the quick check says the same as before."""
-    global findings, is_thorough, _quick, _seen, _checked
+    global findings, is_thorough, mended, _before, _quick, _seen, _checked
     found = quick_check(scene, view_layer)
     _seen, _checked = _look(scene, view_layer), True
     if found != _quick:
         findings, is_thorough, _quick = found, False, found
+        mended = _before = ()
 
 
 def show_thorough(found: tuple[Finding, ...]) -> None:
     """Show the lines of a whole export instead; call `check_now` before."""
-    global findings, is_thorough
+    global findings, is_thorough, mended, _before
     findings, is_thorough = found, True
+    mended = _before = ()
+
+
+def check_mended(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+    """Make the quick check after a button has mended something; its line stays in place, so that no other moves."""
+    global mended, _before
+    before = rows()
+    check_now(scene, view_layer)
+    said = {finding.sentence for finding in findings}
+    mended = tuple(finding for finding in before if finding.fixes and finding.sentence not in said)
+    _before = before
+
+
+def rows() -> tuple[Finding, ...]:
+    """The lines in the order the panel has them: what was mended where it stood, anything new at the end."""
+    kept = [finding for finding in _before if finding in mended or finding in findings]
+    return (*kept, *(finding for finding in findings if finding not in kept))
 
 
 def by_export() -> tuple[Finding, ...]:
@@ -60,17 +80,17 @@ def summary() -> tuple[str, str]:
     stops, ignored = count(STOPS), count(IGNORED)
     if not _checked:
         return "Check", "BLANK1"
+    if count(TO_CHOOSE) and not stops:
+        return "Choose a picture", "INFO"
     if stops:
-        return f"Check: {stops} to mend", "ERROR"
-    if count(TO_CHOOSE):
-        return "Check: no picture yet", "INFO"
-    return ("Check: ready", "CHECKMARK") if not ignored else (f"Check: ready, {ignored} ignored", "INFO")
+        return f"{stops} problem{'s' * (stops > 1)} to fix", "ERROR"
+    return ("Ready", "CHECKMARK") if not ignored else (f"Ready, {ignored} note{'s' * (ignored > 1)}", "CHECKMARK")
 
 
 def reset() -> None:
     """Forget everything and stop the timer."""
-    global findings, is_thorough, _quick, _seen, _checked
-    findings, is_thorough, _quick, _seen, _checked = (), False, (), None, False
+    global findings, is_thorough, mended, _before, _quick, _seen, _checked
+    findings, is_thorough, mended, _before, _quick, _seen, _checked = (), False, (), (), (), None, False
     if bpy.app.timers.is_registered(_run):
         bpy.app.timers.unregister(_run)
 

@@ -110,7 +110,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         description="Which values may change; sockets with a link never do",
         items=(
             ("all", "All", "Everything the picture can show"),
-            ("reduced", "Reduced", "Base colour, roughness, metallic and specular"),
+            ("reduced", "Basic", "Base colour, roughness, metallic and specular"),
             ("chosen", "Chosen", "Choose below"),
         ),
     )
@@ -181,7 +181,8 @@ class MFO_PG_row(bpy.types.PropertyGroup):
     start: StringProperty()
     result: StringProperty()
     certainty: StringProperty()  # level in result.json, empty where unknown
-    words: StringProperty()  # of that level
+    words: StringProperty()  # of that level, and the likely range
+    sureness: FloatProperty(default=-1.0)  # 0 to 1, negative where unknown
 
 
 def _split_moved(runtime: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

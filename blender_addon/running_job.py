@@ -29,6 +29,8 @@ from .write_back import WriteBackError
 
 TICK = 0.15  # seconds between two looks at the process
 PATIENCE = 60  # looks at a modal operator before a result goes into its history without an undo step
+_FIRST_STAGES = ("scan", "start")  # they look for a place to begin; every other stage refines
+_FIRST_GUESS = 0.05  # share from which on the time left is more than a guess
 _GOOD = {"converged", "stale", "unchanged", "max_iterations"}
 _ENDED = _GOOD | {"different"}  # the fit came to its end, whatever it found
 
@@ -196,9 +198,6 @@ def _handle(job: RunningJob, event: Event) -> None:
             _show_preview(job, "current", event["path"])
             if "difference" in event:
                 _show_preview(job, "difference", event["difference"])
-        elif event["event"] == "stage_end":
-            line = "{stage}: {loss_start:.3g} to {loss_best:.3g}, {iterations} iterations ({status})"
-            add_message(runtime, line.format_map(event), "DOT")
     except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
         return  # a newer backend says less or more than we know; its result is what counts
     redraw()
@@ -211,10 +210,11 @@ def _show_preview(job: RunningJob, name: str, relative: str) -> None:
 
 
 def progress_text(event: Event) -> str:
-    """Stage, percent and time left of a progress event, short enough for a progress bar."""
-    text = f"Stage {event['stage_index'] + 1}/{event['stage_count']} · {event['fraction']:.0%}"
+    """What is done, percent and time left of a progress event, short enough for a progress bar."""
+    text = f"{'Exploring' if event['stage'] in _FIRST_STAGES else 'Refining'} · {event['fraction']:.0%}"
     left = event.get("remaining_seconds")
-    return text if left is None else f"{text} · {_duration(float(left))} left"
+    known = left is not None and float(event["fraction"]) >= _FIRST_GUESS
+    return f"{text} · {_duration(float(left))} left" if known else text
 
 
 def _finish(job: RunningJob, outcome: Outcome) -> None:

@@ -10,7 +10,7 @@ from .job_result import JobResult, Value
 from .write_back import result_to_sockets, socket_to_parameter
 
 PICTURES = ("reference", "start", "result", "difference", "curve", "cycles", "cycles_difference")
-_ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
+_ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP"}  # others are for the report
 VERDICT_ICONS = {"same": "CHECKMARK", "close": "QUESTION", "different": "ERROR"}  # others have no verdict
 _KEPT = ("split",)  # settings of the view, not of a fit
 
@@ -33,11 +33,11 @@ def show(found: JobResult, uid: int) -> None:
     runtime.verdict = found.verdict
     runtime.has_result, runtime.job_folder, runtime.material = True, str(found.folder), found.material_name
     for name, (before, after) in found.errors.items():
-        _add_row(runtime.errors, _ERROR_LABELS.get(name, name), before, after)
+        if name in _ERROR_LABELS:
+            _add_row(runtime.errors, _ERROR_LABELS[name], before, after)
     for name, value in sockets.items():
         _add_row(runtime.values, name, found.sockets_start.get(name), value)
-        runtime.values[-1].words = found.certainty_words.get(socket_to_parameter(name), "")
-        runtime.values[-1].certainty = found.certainty.get(socket_to_parameter(name), "")
+        _say_how_sure(runtime.values[-1], found, socket_to_parameter(name), value)
     for note in found.notes:
         if note not in runtime.messages:
             add_message(runtime, note, "INFO")
@@ -66,6 +66,17 @@ def add_message(runtime: bpy.types.PropertyGroup, text: str, icon: str) -> None:
     """Add one line to the panel's notes."""
     message = runtime.messages.add()
     message.name, message.icon = text, icon
+
+
+def _say_how_sure(row: bpy.types.PropertyGroup, found: JobResult, parameter: str, value: Value) -> None:
+    row.certainty = found.certainty.get(parameter, "")
+    row.words = found.certainty_words.get(parameter, "")
+    if found.model != "blender_principled":
+        return  # its parameters have other units than the sockets
+    row.sureness = found.sureness(parameter)
+    likely = found.likely(parameter, value) if isinstance(value, float) else None
+    if likely is not None:
+        row.words = f"{row.words}; likely {likely[0]:.3g} to {likely[1]:.3g}".removeprefix("; ")
 
 
 def _add_row(rows: bpy.types.bpy_prop_collection, label: str, before: Value | None, after: Value) -> None:

@@ -69,7 +69,7 @@ class MFO_OT_mend(bpy.types.Operator):
         except (MendingError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        preflight.check_now(context.scene, context.view_layer)
+        preflight.check_mended(context.scene, context.view_layer)
         running_job.redraw()
         return {"FINISHED"}
 

@@ -8,6 +8,7 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from .. import fit_queue, running_job, shown_result
+from ..backend_section import needs_setup
 from .check import thorough_check
 from .fit_options import FitError, FitOptions, selected_targets, target_of
 
@@ -30,6 +31,9 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         """In windows only with an object and a material; anything else is said by name when it starts."""
         if running_job.current is not None and bpy.app.background:
             cls.poll_message_set("A fit is running; cancel it first")
+            return False
+        if not bpy.app.background and needs_setup():
+            cls.poll_message_set("The backend is not installed yet: press Install below")
             return False
         if not bpy.app.background and context.object is None:
             cls.poll_message_set("Select the object whose material is to be fitted")

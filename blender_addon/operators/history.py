@@ -133,7 +133,7 @@ class MFO_OT_open_job(bpy.types.Operator):
     """Open the folder of a finished fit: show it here and add it to the history of its material"""
 
     bl_idname = "mfo.open_job"
-    bl_label = "Open Job Folder"
+    bl_label = "Load Result"
     bl_options = {"REGISTER", "UNDO"}
 
     directory: StringProperty(name="Job Folder", subtype="DIR_PATH", options=_SCRIPT)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`mfo.show_pictures` and `mfo.open_report`."""
+"""`mfo.show_pictures`, `mfo.open_report` and `mfo.copy_values`."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -89,6 +90,45 @@ class MFO_OT_open_report(_JobOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MFO_OT_copy_values(bpy.types.Operator):
+    """Copy the recovered values as text, one a line"""
+
+    bl_idname = "mfo.copy_values"
+    bl_label = "Copy Values"
+    bl_options = {"REGISTER"}
+
+    name: StringProperty(name="Name", description="Of one value; empty: all", options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only with a result."""
+        if not context.window_manager.mfo_runtime.has_result:
+            cls.poll_message_set("There is no result yet; run a fit")
+            return False
+        return True
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        """Of one value what it was, is, and how sure."""
+        row = context.window_manager.mfo_runtime.values.get(properties.name)
+        if row is None:
+            return "Copy all recovered values as text"
+        said = f"{row.name}: {row.start or 'unknown'} before, {row.result} recovered"
+        return f"{said} ({row.words})" if row.words else said
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Put the lines on the clipboard."""
+        rows = [row for row in context.window_manager.mfo_runtime.values if self.name in ("", row.name)]
+        context.window_manager.clipboard = values_as_text(rows)
+        self.report({"INFO"}, f"Copied {len(rows)} value{'s' * (len(rows) != 1)}.")
+        return {"FINISHED"}
+
+
+def values_as_text(rows: Iterable[bpy.types.PropertyGroup]) -> str:
+    """Recovered values as lines of text, colours as hex codes of sRGB."""
+    return "\n".join(f"{row.name}: {row.result}" for row in rows)
+
+
 def _image_editors(context: bpy.types.Context) -> list[bpy.types.Area]:
     """All Image Editors that are open; that of a new window where there is none, and none in background mode."""
     windows = context.window_manager.windows
@@ -112,4 +152,4 @@ def job_folder_of(context: bpy.types.Context) -> str:
     return material.mfo.job_folder if material else ""
 
 
-CLASSES = (MFO_OT_show_pictures, MFO_OT_open_report)
+CLASSES = (MFO_OT_show_pictures, MFO_OT_open_report, MFO_OT_copy_values)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The check before a run: what stops it, what is ignored, what is fine, each problem with its remedies."""
+"""The check before a run: what stops it and what it changes, with its remedies; the rest is folded."""
 
 from __future__ import annotations
 
@@ -29,16 +29,18 @@ class Check:
         return running_job.current is None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list and the button that reads the whole scene."""
+        """Draw what is to do, the folded rest and the button that reads the whole scene."""
         layout = self.layout  # type: ignore[attr-defined]
-        folded = preflight.by_export()
+        by_export = preflight.by_export()
+        rows = preflight.rows()
+        folded = [f for f in rows if f in by_export or (f.level == FINE and not f.fixes)]
         column = layout.column()
-        for finding in preflight.findings:
+        for finding in rows:
             if finding not in folded:
                 _draw_finding(column, context, finding)
         if folded:
-            header, body = layout.panel("mfo_left_out", default_closed=True)
-            header.label(text=f"Left out by the export ({len(folded)})", icon="INFO")
+            header, body = layout.panel("mfo_details", default_closed=True)
+            header.label(text="What Was Checked")
             for finding in folded if body else ():
                 _draw_finding(body, context, finding)
         text = "Check Everything Again" if preflight.is_thorough else "Check Everything"
@@ -46,11 +48,17 @@ class Check:
 
 
 def _draw_finding(layout: bpy.types.UILayout, context: bpy.types.Context, finding: Finding) -> None:
+    """A sentence and its buttons; what was mended keeps its place and its size, so that nothing moves."""
+    is_mended = finding in preflight.mended
     column = layout.column(align=True)
-    column.alert = finding.level == STOPS
-    draw_sentence(column, context, finding.sentence, _ICONS[finding.level])
+    column.alert = finding.level == STOPS and not is_mended
+    column.active = not is_mended
+    draw_sentence(column, context, finding.sentence, "CHECKMARK" if is_mended else _ICONS[finding.level])
     if finding.fixes:
         buttons = layout.column(align=True)
+        buttons.enabled = not is_mended
         for fix in finding.fixes:
-            button = buttons.operator("mfo.mend", text=KINDS[fix.kind].label.format(fix.argument), icon="TOOL_SETTINGS")
+            label = KINDS[fix.kind].label.format(fix.argument)
+            icon = "CHECKMARK" if is_mended else "TOOL_SETTINGS"
+            button = buttons.operator("mfo.mend", text=label, icon=icon)
             button.kind, button.argument = fix.kind, fix.argument

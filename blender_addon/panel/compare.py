@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the result beside the reference, the errors, the curve, the check in Cycles."""
+"""Pictures of the result beside the reference, the check in Cycles, and folded what few ask for."""
 
 from __future__ import annotations
 
 import bpy
 
-from .. import comparison, cycles_check, previews
-from .layout import draw_messages, draw_pictures, draw_sentence
-from .result import draw_table
+from .. import comparison, cycles_check, previews, shown_result
+from .layout import draw_messages, draw_numbers, draw_pictures, draw_sentence
 
 
 class Compare:
@@ -21,7 +20,7 @@ class Compare:
         return context.window_manager.mfo_runtime.has_result
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw pictures, buttons and numbers."""
+        """Draw pictures and buttons."""
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
         if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
             layout.label(text=f"Of material {runtime.material}", icon="MATERIAL")
@@ -32,22 +31,26 @@ class Compare:
         row.operator("mfo.show_pictures", text="Split", icon="ARROW_LEFTRIGHT").show = "split"
         if comparison.has_split():
             column.prop(runtime, "split", slider=True)
-        draw_table(layout, runtime.errors, "Error")
         _draw_cycles(layout, context, runtime)
         row = layout.row(align=True)
         row.operator("mfo.open_report", text="Report", icon="URL")
-        row.operator("mfo.open_job", text="Open Job", icon="FILE_FOLDER")
-        if previews.icon("curve"):
-            header, body = layout.panel("mfo_curve", default_closed=True)
-            header.label(text="Error over Time", icon="GRAPH")
-            if body:
-                body.template_icon(icon_value=previews.icon("curve"), scale=10.0)
-                body.operator("mfo.show_pictures", text="Full Size", icon="FULLSCREEN_ENTER").show = "curve"
-        if runtime.messages:
-            header, body = layout.panel("mfo_notes", default_closed=True)
-            header.label(text=f"Notes ({len(runtime.messages)})", icon="INFO")
-            if body:
-                draw_messages(body, context, runtime)
+        row.operator("mfo.open_job", text="Load Result", icon="FILE_FOLDER")
+        header, body = layout.panel("mfo_numbers", default_closed=True)
+        header.label(text="Details")
+        if body:
+            _draw_details(body, context, runtime)
+
+
+def _draw_details(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
+    """Errors, the curve, which values could be traded, and the notes."""
+    draw_numbers(layout, runtime.errors)
+    if previews.icon("curve"):
+        layout.template_icon(icon_value=previews.icon("curve"), scale=10.0)
+        layout.operator("mfo.show_pictures", text="Error over Time", icon="FULLSCREEN_ENTER").show = "curve"
+    found = shown_result.result
+    for sentence in found.weak_combinations if found is not None else ():
+        draw_sentence(layout, context, sentence, "QUESTION")
+    draw_messages(layout, context, runtime)
 
 
 def _draw_cycles(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:

@@ -25,10 +25,12 @@ class MFO_UL_history(bpy.types.UIList):
     ) -> None:
         """Draw one result; the one on the material has a full dot, one that looks the same a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
-        split = layout.split(factor=0.48)  # a day and a time, the longest preset, a number
+        split = layout.split(factor=0.45)  # a day and a time, the longest preset, a number
         split.label(text=item.name[5:16], icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
-        right = split.split(factor=0.68)
-        right.label(text="partial" if item.partial else item.preset, icon=VERDICT_ICONS.get(item.verdict, "BLANK1"))
+        right = split.split(factor=0.71)
+        right.label(
+            text="partial" if item.partial else item.preset.title(), icon=VERDICT_ICONS.get(item.verdict, "BLANK1")
+        )
         right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
 
 
@@ -48,6 +50,6 @@ class History:
         layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
         layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
         row = layout.row(align=True)
-        row.operator("mfo.apply_past", text="Apply", icon="PASTEDOWN")
+        row.operator("mfo.apply_past", text="Restore", icon="LOOP_BACK")
         row.operator("mfo.show_past", text="Show", icon="IMAGE_DATA")
         row.operator("mfo.remove_past", text="", icon="TRASH")

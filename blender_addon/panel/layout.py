@@ -51,6 +51,19 @@ def _icon_scale(context: bpy.types.Context, pictures: int) -> float:
     return min(max(width / pictures / 20, 2.0), 10.0)  # a row is 20 px at scale 1
 
 
+def draw_numbers(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection) -> None:
+    """Errors at the start and of the result."""
+    if not rows:
+        return
+    grid = layout.box().column(align=True)
+    for name, *numbers in (("Error", "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
+        split = grid.split(factor=0.46)
+        split.label(text=name)
+        columns = split.split(factor=0.5)
+        for number in numbers:
+            columns.label(text=number)
+
+
 def draw_messages(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
     """The notes of a fit."""
     column = layout.column(align=True)

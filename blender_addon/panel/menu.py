@@ -19,7 +19,7 @@ class MFO_MT_material_fit(bpy.types.Menu):
             ("mfo.check", "mfo.render_reference"),
             ("mfo.fit", "mfo.fit_selected", "mfo.cancel"),
             ("mfo.show_pictures", "mfo.check_in_cycles", "mfo.cancel_cycles", "mfo.open_report", "mfo.open_job"),
-            ("mfo.apply", "mfo.toggle", "mfo.revert"),
+            ("mfo.apply", "mfo.toggle", "mfo.revert", "mfo.copy_values"),
             ("mfo.apply_past", "mfo.show_past", "mfo.remove_past"),
             ("mfo.install_backend", "mfo.cancel_install", "mfo.test_backend", "mfo.remove_backend"),
             ("mfo.open_install_log",),

@@ -13,7 +13,15 @@ from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
 class Parameters:
     """What is fitted, and what stays locked."""
 
-    bl_label = "Values to Fit"
+    bl_label = ""
+    bl_options = frozenset({"DEFAULT_CLOSED"})  # most fit all of them
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        """Say in the heading which values may change."""
+        settings = context.scene.mfo
+        named = settings.bl_rna.properties["parameter_set"].enum_items[settings.parameter_set].name
+        words = bpy.app.translations.pgettext_iface("Values to Fit")
+        self.layout.label(text=f"{words}: {bpy.app.translations.pgettext_iface(named)}")  # type: ignore[attr-defined]
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:

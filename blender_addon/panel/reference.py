@@ -24,6 +24,7 @@ class Reference:
         _draw_target(layout, context)
         column = layout.column()
         column.enabled = running_job.current is None
+        column.label(text="Picture to match")
         column.row().prop(settings, "reference_source", expand=True)
         if settings.reference_source == "FILE":
             column.prop(settings, "reference_path", text="")

@@ -1,24 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply, Revert and A/B, and the recovered values with how sure each is."""
+"""Apply, Revert and A/B, and the recovered values, each with a bar that says how sure it is."""
 
 from __future__ import annotations
 
 import bpy
 
-from .. import previews, shown_result
+from .. import previews
 from ..animated_sockets import animation_of
 from ..export.target_shader import target_shader
 from ..job_result import must_ask
-from .layout import draw_sentence
+from .layout import draw_sentence, letters
 
-# levels of result.json: icon before the value, and its meaning in the legend
-_CERTAINTY = {
-    "determined": ("RADIOBUT_ON", "determined by the picture"),
-    "weak": ("QUESTION", "weakly determined"),
-    "not_visible": ("HIDE_ON", "not visible, kept as it was"),
-    "not_told_apart": ("ARROW_LEFTRIGHT", "not told apart from others"),
-    "doubtful": ("ERROR", "doubtful: no match"),
-}
+_LETTERS_OF_THREE = 26  # of a line with name, start and result; a narrower side bar has no start
+_KEPT = "not_visible"  # level of what stays as it was
 
 
 class Result:
@@ -37,46 +31,70 @@ class Result:
         """Draw the buttons and the table of values."""
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
         material = context.object.active_material if context.object else None
+        target = target_shader(material)
+        if target is not None and animation_of(target.sockets):
+            layout.label(text="Animated values", icon="ANIM")
+            layout.row().prop(context.scene.mfo, "animated", expand=True)
         column = layout.column(align=True)
         row = column.row(align=True)
         row.scale_y = 1.4
         asked = must_ask(runtime.verdict) and runtime.asked == runtime.job_folder
         row.operator("mfo.apply", text="Apply Anyway" if asked else "Apply", icon="PASTEDOWN")
-        row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         applied = material is not None and bool(material.mfo.originals)
         shows_own = material is not None and applied and material.mfo.shows_original
         text = ("A: own values" if shows_own else "B: recovered values") if applied else "A/B"
-        target = target_shader(material)
-        if target is not None and animation_of(target.sockets):
-            layout.label(text="Animated values", icon="ANIM")
-            row = layout.row()
-            row.prop(context.scene.mfo, "animated", expand=True)
-        column.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
+        row = column.row(align=True)
+        row.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
+        row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         if runtime.has_result:
-            draw_table(layout, runtime.values, "Value")
-            found = shown_result.result
-            for sentence in found.weak_combinations if found is not None else ():
-                draw_sentence(layout, context, sentence, "QUESTION")
+            _draw_values(layout, context, runtime.values)
 
 
-def draw_table(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection, title: str) -> None:
-    """Names with the numbers or colours of the start and the result, and a legend of how sure they are."""
-    if not rows:
-        return
+def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: bpy.types.bpy_prop_collection) -> None:
+    """Names, starts and results; what the picture does not show is one sentence."""
+    kept = [row.name for row in rows if row.certainty == _KEPT]
+    has_start = letters(context) >= _LETTERS_OF_THREE
     box = layout.box()
     grid = box.column(align=True)
-    known = any(row.certainty for row in rows)
-    lines = ((title, "Start", "Result", ""), *((row.name, row.start, row.result, row.certainty) for row in rows))
-    for name, *cells, certainty in lines:
-        split = grid.split(factor=0.55 if known else 0.46)
-        split.label(text=name, **({"icon": _CERTAINTY.get(certainty, ("BLANK1",))[0]} if known else {}))
-        columns = split.split(factor=0.5)  # a row would pack swatches to the left
-        for cell in cells:
-            swatch = previews.icon(cell)  # colours have one, and no room for their hex code beside it
-            columns.label(text="" if swatch else cell, icon_value=swatch)
-    if known:
-        legend = box.column(align=True)
-        legend.scale_y = 0.8
-        for level in dict.fromkeys(row.certainty for row in rows if row.certainty in _CERTAINTY):
-            icon, words = _CERTAINTY[level]
-            legend.label(text=words, icon=icon)
+    name, start, result = _cells(grid, has_start)
+    name.operator("mfo.copy_values", text="Copy Values", icon="COPYDOWN", emboss=False)
+    if start is not None:
+        start.label(text="Start")
+    result.label(text="Result")
+    for row in rows:
+        if row.certainty == _KEPT:
+            continue
+        name, start, result = _cells(grid, has_start)
+        icon = "ERROR" if row.certainty == "doubtful" else "NONE"
+        name.operator("mfo.copy_values", text=row.name, icon=icon, emboss=False).name = row.name
+        if start is not None:
+            _draw_value(start, row.start, -1.0)
+        _draw_value(result, row.result, row.sureness)
+    if any(row.sureness >= 0.0 for row in rows):
+        draw_sentence(box, context, "Bar: how sure the value is.", "INFO")
+    if kept:
+        draw_sentence(box, context, f"Not visible in the picture, kept: {', '.join(kept)}.", "HIDE_ON")
+
+
+def _cells(
+    grid: bpy.types.UILayout, has_start: bool
+) -> tuple[bpy.types.UILayout, bpy.types.UILayout | None, bpy.types.UILayout]:
+    """Layouts for the name, the start and the result of one line."""
+    split = grid.split(factor=0.56 if has_start else 0.66)
+    name = split.row()
+    name.alignment = "LEFT"
+    if not has_start:
+        return name, None, split.row(align=True)
+    columns = split.split(factor=0.46)
+    return name, columns.row(align=True), columns.row(align=True)
+
+
+def _draw_value(cell: bpy.types.UILayout, shown: str, sureness: float) -> None:
+    """A number or a swatch, over a bar where it is known how sure it is."""
+    swatch = previews.icon(shown)
+    if sureness < 0.0:
+        cell.label(text="" if swatch else shown, icon_value=swatch)
+        return
+    if swatch:
+        cell.label(text="", icon_value=swatch)
+    cell.progress(factor=sureness, type="BAR", text="" if swatch else shown)

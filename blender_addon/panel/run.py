@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from .. import fit_queue, previews, running_job, shown_result
-from ..backend_section import draw_setup, has_trouble, needs_setup
+from ..backend_section import draw_setup, has_trouble
 from ..job_result import must_ask
 from ..operators.fit_options import selected_targets
 from .layout import draw_pictures, draw_sentence, letters
@@ -20,6 +20,9 @@ class Run:
     def draw(self, context: bpy.types.Context) -> None:
         """Draw settings and button, or the progress."""
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
+        if running_job.current is not None:
+            _draw_progress(layout, context)
+        _draw_buttons(layout, context)
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         column.prop(settings, "preset")
@@ -29,17 +32,10 @@ class Run:
             body.prop(settings, "model")
             body.prop(settings, "range")
             body.prop(settings, "max_iterations")
-        if running_job.current is not None:
-            _draw_progress(layout, context)
-        elif needs_setup():
-            draw_setup(layout, width=letters(context))
-            _draw_end(layout, context)  # a result of an earlier day needs no backend
-            return
-        _draw_buttons(layout, context)
         _draw_queue(layout, context)
         if has_trouble():
             draw_setup(layout, width=letters(context))
-        _draw_end(layout, context)
+        _draw_end(layout, context)  # a result of an earlier day needs no backend
 
 
 def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -76,7 +72,6 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     row.operator("mfo.cancel", text="", icon="X")
     if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
         column.label(text=f"Of material {runtime.material}", icon="MATERIAL")
-    column.label(text=runtime.detail)
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:
         draw_pictures(column, context, shown)

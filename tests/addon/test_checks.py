@@ -170,11 +170,34 @@ def test_a_scene_without_a_reference_is_asked_for_one_and_accused_of_nothing(sce
     preflight.check_now(context.scene, context.view_layer)
     first = preflight.findings[0]
     assert (first.level, first.sentence) == ("to_choose", "Choose the picture to match: a file.")
-    assert preflight.summary() == ("Check: no picture yet", "INFO")
+    assert preflight.summary() == ("Choose a picture", "INFO")
     context.scene.camera = None
     preflight.check_now(context.scene, context.view_layer)
     assert [f.level for f in preflight.findings[:2]] == ["stops", "to_choose"]
-    assert preflight.summary() == ("Check: 1 to mend", "ERROR")
+    assert preflight.summary() == ("1 problem to fix", "ERROR")
+
+
+def test_what_was_mended_keeps_its_line(scene: SimpleNamespace) -> None:
+    """A press moves no other button, however many lines it takes away."""
+    from blender_addon import preflight
+
+    bpy = scene.bpy
+    bpy.context.scene.mfo.reference_path = scene.reference
+    bpy.context.scene.render.use_border, bpy.context.scene.camera = True, None
+    preflight.reset()
+    preflight.check_now(bpy.context.scene, bpy.context.view_layer)
+    before = [finding.sentence for finding in preflight.rows()]
+    camera = next(o.name for o in bpy.data.objects if o.type == "CAMERA")
+    bpy.ops.mfo.mend(kind="camera", argument=camera)
+    assert [finding.fixes[0].kind for finding in preflight.mended] == ["camera"]
+    assert before[0] == preflight.rows()[0].sentence == preflight.mended[0].sentence
+    bpy.ops.mfo.mend(kind="whole_frame")
+    assert [finding.fixes[0].kind for finding in preflight.mended] == ["camera", "whole_frame"]
+    assert preflight.summary()[0].startswith("Ready")
+    bpy.context.scene.mfo.reference_path = ""
+    preflight.check_now(bpy.context.scene, bpy.context.view_layer)
+    assert preflight.mended == ()
+    assert preflight.rows() == preflight.findings
 
 
 def test_colours_of_an_image_datablock(scene: SimpleNamespace) -> None:

@@ -194,13 +194,44 @@ def step_until(scene: SimpleNamespace, done) -> None:
         time.sleep(0.01)
 
 
+def test_how_sure_a_value_is(tmp_path: Path) -> None:
+    """Two standard deviations to each side, within what the fit could have chosen; null stands for infinity."""
+    from blender_addon.job_result import read_job_result
+
+    (tmp_path / "request.json").write_text(json.dumps({"schema_version": 1, "target": {}}))
+    levels = {"roughness": ([0.05], "weak"), "metallic": ([0.1], "doubtful"), "sheen_weight": ([None], "weak")}
+    certainty = {name: {"sd": sd, "level": level} for name, (sd, level) in levels.items()}
+    certainty["ior"] = {"sd": [0.1], "level": "weak"}
+    result = {
+        "schema_version": 1, "status": "converged", "model": "blender_principled", "recovered": {"roughness": 0.1},
+        "certainty": certainty, "bounds": {name: [0.05, 1.05] for name in levels},
+    }  # fmt: skip
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    found = read_job_result(tmp_path)
+    assert found.likely("roughness", 0.1) == pytest.approx((0.05, 0.2))
+    assert found.likely("sheen_weight", 0.5) == (0.05, 1.05)
+    assert found.likely("ior", 1.5) is None
+    names = ("roughness", "metallic", "sheen_weight", "ior")
+    assert [found.sureness(name) for name in names] == pytest.approx([0.8, 0.0, 0.0, -1.0])
+
+
+def test_values_are_copied_as_text(scene: SimpleNamespace) -> None:
+    from blender_addon.operators.pictures import values_as_text
+
+    assert not scene.bpy.ops.mfo.copy_values.poll()
+    fit(scene)
+    assert scene.bpy.ops.mfo.copy_values() == {"FINISHED"}
+    text = values_as_text(runtime(scene).values)
+    assert text.splitlines() == ["Base Color: #8BBF48", "Metallic: 0.125", "Roughness: 0.312"]
+
+
 def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("blender_addon.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
     monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
     assert fit(scene, wait=False) == {"FINISHED"}
     assert not scene.bpy.ops.mfo.fit.poll()
     step_until(scene, lambda: runtime(scene).fraction > 0)
-    assert "Stage 1/2" in runtime(scene).progress_text
+    assert runtime(scene).progress_text.startswith("Refining · ")
     assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
     assert not scene.bpy.ops.mfo.cancel.poll()
     step_until(scene, lambda: runtime(scene).state != "CANCELLING")

@@ -65,7 +65,8 @@ SCENE_CYCLES = Owner(
         ),
         # measured in 5.2: off, the default, is the picture of 5.0 (RMS 1e-5); on changes it (RMS 0.07)
         "use_pixel_jitter": Named(
-            False, "Use Pixel Jitter, a debugging switch of Cycles, is on: it changes Cycles' picture and not the fit's."
+            False,
+            "Use Pixel Jitter, a debugging switch of Cycles, is on: it changes Cycles' picture and not the fit's.",
         ),
     },
 )
