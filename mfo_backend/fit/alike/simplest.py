@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...material.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable
 from ..squares.problem import Problem, Refined, Rival
@@ -76,22 +77,41 @@ class OtherEnds:
     def _without_lobes(self, found: SimplestEnd) -> SimplestEnd:
         """Without the lobes that `found` has and the user's material lacks, where no more than chance is against it.
 
+        All of them together, else one after another: a metal may be asked for and its tint not.
+        """
+        lobes = [n for n in values_off(self._table, self._user) if self._is_new(n, found)]
+        simpler = self._without(found, lobes) if lobes else None
+        if simpler is not None or len(lobes) < 2:
+            return simpler or found
+        for name in lobes:
+            if self._is_new(name, found):
+                found = self._without(found, [name]) or found
+        return found
+
+    def _is_new(self, name: str, found: SimplestEnd) -> bool:
+        """Whether `found` has this lobe; a detail of a lobe that is off is none."""
+        x, table = found.end.x, self._table
+        amount = AMOUNT_OF.get(name)
+        if amount in table.names and is_off(amount, x, table):
+            return False
+        return name not in found.off and not is_plain(name, x, table)
+
+    def _without(self, found: SimplestEnd, lobes: list[str]) -> SimplestEnd | None:
+        """`found` without these lobes; None where more than chance is against it.
+
         Each of them counts three standard deviations against a material: what it would need to come in alone.
         """
-        x, table = found.end.x, self._table
-        lobes = [n for n in values_off(table, self._user) if n not in found.off and not is_plain(n, x, table)]
-        if not lobes:
-            return found
+        x = found.end.x
         off, price = (*found.off, *lobes), SIGNIFICANT * len(lobes)
-        box = box_holding(table, self._user, off)
+        box = box_holding(self._table, self._user, off)
         starts = [np.clip(start, *box) for start in self._without_coat(x, lobes)]
         end = self._attempt(found.end, min(starts, key=lambda start: self._few.equations(start).cost), box)
         if end is None:
-            return found
+            return None
         it = compare(self._all, x, end.x)
         against = it.more / it.inflation - price
         if against > 0.0:
-            return found
+            return None
         share = float(1.0 / (1.0 + np.exp(-0.5 * against)))  # of all materials with these lobes
         others = [Rival(rival.x, share * rival.share) for rival in found.rivals]
         rest = share - sum(rival.share for rival in others)
@@ -103,18 +123,17 @@ class OtherEnds:
             yield coat_to_base(x, self._table)
 
     def _attempt(self, found: Solution, start: Vector, box: Box) -> Solution | None:
-        """The end of another solve on all tiles, first tried on some of them; None where it is hopeless."""
-        if self._few is not self._all:
-            trial = self._solve_below(self._few, found, start, box)
-            if trial is None:
-                return None
-            start = trial.x
-        return self._solve_below(self._all, found, start, box)
+        """The end of another solve on all tiles, first tried on some of them; None where it is hopeless.
 
-    def _solve_below(self, problem: Problem, found: Solution, start: Vector, box: Box) -> Solution | None:
-        most = problem.equations(found.x).cost * (1.0 + HOPELESS / problem.independent)
-        end = self._solve(problem, start, EVALUATIONS, box=box, wanted=most)
-        return end if end.equations.cost <= most else None
+        What is hopeless follows from the scatter between tiles: a few of them with fireflies may cost any chi squared.
+        """
+        for problem in (self._all,) if self._few is self._all else (self._few, self._all):
+            end = self._solve(problem, start, EVALUATIONS, box=box, wanted=np.inf)
+            it = compare(problem, found.x, end.x)
+            if not it.more / it.inflation <= HOPELESS:
+                return None
+            start = end.x
+        return end
 
 
 def exchanged(x: Vector, table: ParameterTable) -> Vector:

@@ -26,6 +26,7 @@ from ..squares.residuals import (
     MakeResidual,
     MakeWeighted,
     RelativeResidual,
+    WeightedDisplayedResidual,
     WeightedResidual,
     log_residual,
 )
@@ -104,7 +105,7 @@ class RecordedRoute:
         else:
             end = refine_exact(setting, started, _censored(log_residual, task))
         del started  # and with it the first recording
-        weighted = setting.sampled and not isinstance(task.view, BakedView)
+        weighted = setting.sampled
         kept = keep_values(end, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
         later, notes, counts = self._perceptual(end, kept, others)
         notes = [*scene.needs.notes, *kept.notes, *notes]
@@ -174,10 +175,11 @@ def _censored(make: MakeResidual, task: FitTask) -> MakeResidual:
     return lambda target: CensoredResidual(make(target), target, limit)
 
 
-def _weighted(task: FitTask) -> MakeWeighted | None:
-    """Residuals in standard deviations of the noise; None for a view that is no formula."""
-    if isinstance(task.view, BakedView):
-        return None
+def _weighted(task: FitTask) -> MakeWeighted:
+    """Residuals in standard deviations of the noise."""
+    view = task.view
+    if not task.linear and isinstance(view, BakedView):
+        return lambda target, weight: WeightedDisplayedResidual(view, target, weight)
     return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), task)(target)
 
 

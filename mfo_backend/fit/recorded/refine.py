@@ -70,12 +70,10 @@ def refine_exact(setting: Setting, started: Started, make: MakeResidual) -> OnRe
     return _with_width_rivals(OnRecording(Refined(found.x, problem, problem, rivals=rivals), recording))
 
 
-def refine_sampled(
-    setting: Setting, basins: Sequence[Vector], make: MakeResidual, weigh: MakeWeighted | None
-) -> OnRecording:
+def refine_sampled(setting: Setting, basins: Sequence[Vector], make: MakeResidual, weigh: MakeWeighted) -> OnRecording:
     """The end where light is sampled, on a new and finer recording near it.
 
-    There, residuals count in standard deviations of the reference's noise by `weigh` if given. Solutions in other
+    There, residuals count in standard deviations of the reference's noise by `weigh`. Solutions in other
     basins, all but the first of `basins`, are tried again: they may have cost more by the noise of the first recording
     alone.
     """
@@ -99,7 +97,7 @@ def refine_sampled(
                 recording = setting.record(x, grid, number + 1)
                 stage.picture = recording.preview
                 found = _problems(recording, x, make, weigh, solve_all=True)
-        refined = _last_steps(setting, stage, found.refined, weighted=weigh is not None)
+        refined = _last_steps(setting, stage, found.refined)
         stage.vector = refined.x
     return _with_width_rivals(replace(found, refined=refined))
 
@@ -109,7 +107,7 @@ def _recorded_near(
     stage: Stage,
     start: Vector,
     make: MakeResidual,
-    weigh: MakeWeighted | None,
+    weigh: MakeWeighted,
     number: int,
 ) -> tuple[Recording, Vector, int]:
     """A recording made anew until it is near the solution on some of its tiles, that solution, and its grid.
@@ -136,7 +134,7 @@ def _recorded_near(
 
 
 def _problems(
-    recording: Recording, x: Vector, make: MakeResidual, weigh: MakeWeighted | None, *, solve_all: bool = False
+    recording: Recording, x: Vector, make: MakeResidual, weigh: MakeWeighted, *, solve_all: bool = False
 ) -> OnRecording:
     """All tiles of the last stage and some of them; `weigh` weighs by the noise that the model `x` leaves.
 
@@ -145,21 +143,17 @@ def _problems(
     plan = recording.setting.plan
     side, groups = plan.side_last, recording.tiles(plan.side_last)
     some = np.arange(0, len(groups), max(len(groups) // plan.first_tiles, 1))
-    weighing, fewer, noise = make, make, None
-    if weigh is not None:
-        pixels = recording.pixels_and_tiles(x, groups) if solve_all else recording.pixels(x)
-        noise = recording.noise(pixels, side)
-        weighing, fewer = (recording.weighing(n, side, weigh) for n in (noise, noise.take(some)))
+    pixels = recording.pixels_and_tiles(x, groups) if solve_all else recording.pixels(x)
+    noise = recording.noise(pixels, side)
+    weighing, fewer = (recording.weighing(n, side, weigh) for n in (noise, noise.take(some)))
     problem = recording.problem(groups, weighing, near=x)
     few = problem if len(some) == len(groups) else recording.problem(groups.take(some), fewer, near=x)
     return OnRecording(Refined(x, problem, few), recording, noise)
 
 
-def _last_steps(setting: Setting, stage: Stage, refined: Refined, *, weighted: bool) -> Refined:
-    """The solution on all tiles; where residuals are in deviations of the noise, without lobes nobody asks for."""
+def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
+    """The solution on all tiles without lobes nobody asks for."""
     x, problem, table = refined.x, refined.all, setting.table
-    if not weighted:
-        return replace(refined, x=solve(setting, problem, x, EVALUATIONS, stage=stage).x)
     found, off = solve_without_unneeded(
         lambda start, box: solve(setting, problem, start, EVALUATIONS, stage=stage, box=box),
         problem.equations(x), problem.independent, x, setting.user, table,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...metrics.baked_view import BakedView
 from ...metrics.response import ChannelResponse, Logarithmic, Response
 from ...solve.bounded_least_squares import NormalEquations
-from ..tolerances import DIM_FLOOR
+from ..tolerances import DIM_FLOOR, MODEL_ERROR
 
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
@@ -96,12 +96,16 @@ class WeightedResidual:
 
     def __call__(self, image: Rows) -> tuple[Rows, Rows]:
         """See `Residual`."""
-        values = (image - self._reference) * self._weight
-        size = np.maximum(np.abs(values), self.LIMIT)
-        bounded = self.LIMIT * np.sqrt(1.0 + 2.0 * np.log(size / self.LIMIT))
-        far = size > self.LIMIT
-        slope = np.where(far, self._weight * (self.LIMIT**2 / (size * bounded)), self._weight)
-        return np.where(far, np.copysign(bounded, values), values), slope
+        values, change = _bounded((image - self._reference) * self._weight, self.LIMIT)
+        return values, self._weight * change
+
+
+def _bounded(values: Rows, limit: float) -> tuple[Rows, Rows]:
+    """Values that grow only like the root of a logarithm beyond a limit, and their derivative by the values given."""
+    size = np.maximum(np.abs(values), limit)
+    bounded = limit * np.sqrt(1.0 + 2.0 * np.log(size / limit))
+    far = size > limit
+    return np.where(far, np.copysign(bounded, values), values), np.where(far, limit**2 / (size * bounded), 1.0)
 
 
 class CensoredResidual:
@@ -201,3 +205,23 @@ class DisplayedResidual:
         values[agrees] = 0
         jacobian[agrees] = 0
         return values, jacobian
+
+
+class WeightedDisplayedResidual:
+    """A `DisplayedResidual` in standard deviations of the noise, bounded like `WeightedResidual`.
+
+    `weight` (g, 3) is one over the deviation of the noise in radiance. What a display shows of that noise follows from
+    the view's slopes at the reference; it is `MODEL_ERROR` at least, for a level of 8 bits is as much.
+    """
+
+    def __init__(self, view: BakedView, reference: Rows, weight: Rows) -> None:
+        self._shown = DisplayedResidual(view, reference)
+        slopes = view.display_jacobian(reference)[1]
+        noise = np.sqrt(np.square(slopes / weight[:, None, :]).sum(axis=-1))
+        self._weight = (1.0 / np.hypot(noise, MODEL_ERROR)).astype(np.float32)
+
+    def __call__(self, image: Rows) -> tuple[Rows, Rows]:
+        """See `Residual`; the derivative is (g, 3 outputs, 3 channels)."""
+        values, jacobian = self._shown(image)
+        values, change = _bounded(values * self._weight, WeightedResidual.LIMIT)
+        return values, jacobian * (self._weight * change)[..., None]

@@ -6,6 +6,7 @@ The picture is a line of pixels with two Gaussian highlights on a diffuse level:
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +18,7 @@ from mfo_backend.fit.alike.simplest import OtherEnds, SimplestEnd, coat_to_base,
 from mfo_backend.fit.certainty.covariance import with_rivals
 from mfo_backend.fit.squares.problem import Refined, Rival
 from mfo_backend.fit.squares.residuals import normal_equations
+from mfo_backend.fit.tolerances import HOPELESS
 from mfo_backend.render.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import SolveLimits, solve_bounded
 from mfo_backend.types.parameter import Parameter, ParameterTable
@@ -49,9 +51,11 @@ def table_of(x):
 class Line:
     """The least-squares problem of a noisy picture of `truth`."""
 
-    def __init__(self, truth, seed=0):
+    def __init__(self, truth, seed=0, fireflies=0.0):
         data = np.repeat(picture(truth)[:, None], 3, 1)
         data = data + NOISE * np.random.default_rng(seed).normal(size=data.shape)
+        middle = len(PIXELS) // 2
+        data[middle : middle + 2] += fireflies * NOISE
         self.residual = lambda image: ((image - data) / NOISE, np.full_like(data, 1.0 / NOISE))
         self.equations = normal_equations(table_of, self.residual)
         self.evaluate = SimpleNamespace(samples=lambda x: TwoSamples(table_of(x), None))
@@ -107,6 +111,27 @@ def test_a_coat_that_the_picture_shows_stays():
     assert last.end.x[3] > 0.2
     assert last.end.equations.cost <= found.equations.cost * 1.01
     assert last.off == ()
+
+
+def test_two_fireflies_do_not_ask_for_a_coat():
+    """Their chi squared is five times what is hopeless; as it comes from two pixels it says next to nothing."""
+    line = Line(WITHOUT, fireflies=40.0)
+    narrow = TABLE.pack(dict(zip(NAMES, (0.6, 0.4, 0.15, 0.9, 0.02), strict=True)))
+    found = solve(line, narrow, 40, box=(TABLE.lower, TABLE.upper))
+    assert found.x[3] > 0.3
+    last = OtherEnds(Refined(found.x, line, line), solve, NO_COAT, TABLE).simplest(SimplestEnd(found, ()))
+    assert last.end.equations.cost / found.equations.cost - 1.0 > 5.0 * HOPELESS / line.independent
+    assert last.off == ("coat_weight",)
+
+
+def test_a_lobe_goes_alone_where_another_one_has_to_stay(monkeypatch):
+    def without(self, found, lobes):
+        return None if "specular_ior_level" in lobes else replace(found, off=(*found.off, *lobes))
+
+    monkeypatch.setattr(OtherEnds, "_without", without)
+    neither = TABLE.pack(dict(zip(NAMES, (0.5, 0.0, 0.5, 0.0, 0.2), strict=True)))
+    _, last = simplest_from(BOTH, BOTH, neither)
+    assert last.off == ("coat_weight",)
 
 
 def test_materials_without_a_coat_are_not_looked_at_again():

@@ -15,7 +15,8 @@ from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.event import Preview, Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
-from tests.render.scenes import POINT, SKY, write_scene
+from tests.metrics.view_tables import baked, filmic
+from tests.render.scenes import AREA, POINT, SKY, write_scene
 
 REDUCED = ["base_color", "roughness", "metallic", "specular"]
 TRUTHS = [
@@ -204,6 +205,29 @@ def test_a_clipped_display_picture_is_fitted_below_its_white(tmp_path):
     outcome, _ = fit(renderer, shown, encoding=Encoding.SRGB, display=view)
     result = renderer.image(renderer.table.pack(outcome.result.recovered), seed=5, spp=256)
     assert np.abs(view.display(result) - shown)[mask].mean() < 0.004  # one step of an 8-bit picture
+
+
+def test_under_a_view_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp_path):
+    """Without the noise of what the view shows the fit ended with a coat of 1 and a roughness of 1."""
+    names = ("base_color", "roughness", "specular_ior_level", "coat_weight", "coat_roughness")
+    truth = dict(zip(names, ((0.3, 0.2, 0.1), 0.35, 0.5, 0.0, 0.1), strict=True))
+    renderer = load_renderer(
+        write_scene(tmp_path, AREA + SKY, size=40),
+        "target",
+        model="blender_principled",
+        parameters=names,
+        materials={"target_bsdf": {"name": "Paint", "distribution": "MULTI_GGX", "sockets": {}}},
+    )
+    start = {"base_color": (0.5, 0.5, 0.5), "roughness": 0.2, "specular_ior_level": 0.3}
+    renderer.start = renderer.table.pack(truth | start)
+    view = baked(filmic)
+    linear = renderer.image(renderer.table.pack(truth), seed=5, spp=64)
+    shown = np.round(view.display(linear) * 255.0) / np.float32(255.0)
+    outcome, _ = fit(renderer, shown.astype(np.float32), encoding=Encoding.SRGB, display=view)
+    found = outcome.result.recovered
+    assert found["coat_weight"] == 0.0
+    assert found["roughness"] == pytest.approx(truth["roughness"], abs=0.06)
+    np.testing.assert_allclose(found["base_color"], truth["base_color"], atol=0.02)
 
 
 def test_a_value_the_picture_does_not_show_stays_the_users(tmp_path):

@@ -12,6 +12,7 @@ from mfo_backend.fit.squares.residuals import (
     OneSidedResidual,
     RelativeResidual,
     ResponseResidual,
+    WeightedDisplayedResidual,
     WeightedResidual,
     log_residual,
     normal_equations,
@@ -159,3 +160,27 @@ def test_mean_of_partly_clipped_pixels_is_a_lower_bound():
         assert values[0, 0] == 0
         assert not np.any(slope[0, 0])
         assert (all_values[:, 0] > 0).all()
+
+
+def test_what_a_view_shows_of_noise_counts_in_its_standard_deviations():
+    rng = np.random.default_rng(3)
+    light = np.exp2(rng.uniform(-3, 0, (4000, 3)))
+    deviation = 0.05 * light
+    residual = WeightedDisplayedResidual(baked(filmic), light, (1.0 / deviation).astype(np.float32))
+    values, slope = residual(light + deviation * rng.standard_normal(light.shape))
+    assert 0.92 < values.std() < 1.0  # the least that counts takes a little away
+    step = 1e-5 * light
+    expected = residual(light + step * np.eye(3)[1])[0] - residual(light - step * np.eye(3)[1])[0]
+    centre = residual(light)[1][:, :, 1]
+    np.testing.assert_allclose(centre, expected / (2.0 * step[:, 1:2]), rtol=1e-3, atol=1e-3)
+    # a firefly counts no more than in light
+    far, far_slope = residual(8.0 * light)
+    assert np.abs(far).max() < 16.0
+    assert np.abs(far_slope).max() < np.abs(slope).max()
+
+
+def test_without_noise_a_view_s_residual_counts_levels_of_eight_bits():
+    light = np.full((1, 3), 0.4)
+    residual = WeightedDisplayedResidual(STANDARD, light, np.full((1, 3), 1e9, np.float32))
+    shown = STANDARD.display(light) + 0.004
+    np.testing.assert_allclose(residual(STANDARD.linear(shown))[0], 2.0, rtol=1e-2)
