@@ -169,6 +169,8 @@ def _request(
     if picture is not None and picture.view is not None:
         request["view"]["lut"] = picture.view.request()
     request["light_paths"] = data.settings.light_paths
+    if data.settings.exposure > 0.0:
+        request["film_exposure"] = data.settings.exposure
     request["materials"] = {
         identifier: _material(material, files)
         for identifier, material in data.materials.items()

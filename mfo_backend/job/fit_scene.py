@@ -20,6 +20,7 @@ from ..types.status import Status
 from .job_folder import JobFolder
 from .material_classes import (
     MaterialClass,
+    brightest_glow,
     changed,
     is_better,
     is_worth_another,
@@ -27,6 +28,7 @@ from .material_classes import (
     parameters_of,
     tried_notes,
     value_of,
+    with_values_of,
 )
 from .request import Request, request_to_json
 
@@ -147,7 +149,9 @@ def fit_scene(
             return not should_stop() and is_worth_another(found.result, request.fit.parameters)
 
         if target in materials:
-            fitted = _with_other_classes(fitted, materials[target], fit_from, is_wanted)
+            glow = brightest_glow(reference, view, fitted.counted) / request.film_exposure
+            classes = other_classes(materials[target], glow)
+            fitted = _with_other_classes(fitted, materials[target], classes, fit_from, is_wanted)
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
@@ -183,12 +187,13 @@ class _Fitted:
 def _with_other_classes(
     fitted: _Fitted,
     material: Mapping[str, Any],
+    classes: Sequence[MaterialClass],
     fit_from: Callable[[MaterialClass], _Fitted],
     is_wanted: Callable[[_Fitted], bool],
 ) -> _Fitted:
-    """The fit or a better one of another class, tried while one is wanted; where none is better, the notes say so."""
+    """The fit or a better one of other `classes`, tried while one is wanted; where none is better, the notes say so."""
     first, no_nearer, refused = fitted.result.recovered, [], []
-    for other in other_classes(material):
+    for other in classes:
         if not is_wanted(fitted):
             break
         try:
@@ -209,8 +214,9 @@ def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapp
     """The first fit, or that of another class where it is clearly better; the user's values are its start, too."""
     before, after = first.result, again.result
     seconds, passes = before.seconds + after.seconds, before.passes + after.passes
-    if before.judgement is None or not is_better(after.judgement, before.judgement):
+    if before.judgement is None or not is_better(after.judgement, before.judgement, other):
         return replace(first, result=replace(before, seconds=seconds, passes=passes))
+    after = with_values_of(other, after, material)
     result = replace(
         after,
         initial={name: before.initial.get(name, value_of(material, name)) for name in after.recovered},
@@ -223,10 +229,11 @@ def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapp
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
-    """The request's materials with textures by absolute path and the Blender version they come from."""
+    """The request's materials with textures by absolute path, the Blender version and the film's exposure."""
     materials = request_to_json(request)["materials"]
     for material in materials.values():
         material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
+        material["film_exposure"] = request.film_exposure
         for name, socket in material["sockets"].items():
             if socket.get("texture"):
                 socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))

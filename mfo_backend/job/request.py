@@ -23,7 +23,7 @@ LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size
 WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
-    *("graph", "fit", "notes"),
+    *("film_exposure", "graph", "fit", "notes"),
 )
 
 
@@ -95,6 +95,7 @@ class Request:
     view: DisplayView | None = None
     view_table: ViewTable | None = None
     light_paths: LightPaths | None = None
+    film_exposure: float = 1.0  # what all radiance of the scene file is multiplied with
     materials: Mapping[str, Material] = field(default_factory=dict)
     graph: NodeGraph | None = None
     fit: FitSettings = field(default_factory=FitSettings)
@@ -161,6 +162,7 @@ def request_from_json(data: Any) -> Request:
         view=_view(top.raw("view", None)),
         view_table=_view_table(top.raw("view", None)),
         light_paths=_light_paths(top.raw("light_paths", None)),
+        film_exposure=top.number("film_exposure", 1e-6, 1e6, 1.0),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
         graph=_graph(top.raw("graph", None)),
         fit=_fit(top.raw("fit", {})),
@@ -193,6 +195,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "reference": {"path": request.reference, "encoding": request.encoding.value},
         "view": view,
         "light_paths": asdict(request.light_paths) if request.light_paths is not None else None,
+        "film_exposure": request.film_exposure,
         "materials": materials,
         "graph": asdict(request.graph) if request.graph is not None else None,
         "fit": asdict(request.fit),

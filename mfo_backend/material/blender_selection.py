@@ -28,9 +28,10 @@ AMOUNT_OF = {
     "sheen_tint": "sheen_weight",
     "thin_film_ior": "thin_film_thickness",
     "anisotropic_rotation": "anisotropic",
+    "emission_color": "emission_strength",
 }
-# Emission belongs to an emitter beside the BSDF, so that no renderer differentiates it here
-FIXED = ("emission_color", "emission_strength")
+# It multiplies the emission's colour, so that one of them is enough
+FIXED = ("emission_strength",)
 
 
 def select_blender_parameters(
@@ -63,11 +64,12 @@ def select_blender_parameters(
     table = BLENDER_PRINCIPLED.select(selection)
     for name in table.names:
         if name in FIXED:
-            raise BadInputError(f"Parameter {name!r} cannot be fitted: emission is a light; choose among {names}.")
+            raise BadInputError(
+                f"Parameter {name!r} cannot be fitted: it multiplies 'emission_color', fit that; choose among {names}."
+            )
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")
         if name in AMOUNT_OF and AMOUNT_OF[name] not in {*present, *linked, *table.names}:
-            raise BadInputError(
-                f"Parameter {name!r} has no effect while {AMOUNT_OF[name]!r} is 0: add {AMOUNT_OF[name]!r}."
-            )
+            cure = "give it a value in the scene" if AMOUNT_OF[name] in FIXED else f"add {AMOUNT_OF[name]!r}"
+            raise BadInputError(f"Parameter {name!r} has no effect while {AMOUNT_OF[name]!r} is 0: {cure}.")
     return table

@@ -9,13 +9,16 @@ from pathlib import PurePosixPath
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..material.blender_selection import select_blender_parameters
 from ..material.principled_dict import blender_principled_dict, socket_value
 from ..material.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ..scene.scene_xml import Element, Target
-from ..types.errors import BadInputError
+from ..types.errors import BadInputError, UnrecordableError
 from ..types.parameter import Value
-from .prepared_material import Materials, PreparedMaterial
+from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
 
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
@@ -26,8 +29,8 @@ def prepare_blender_principled(
 ) -> PreparedMaterial:
     """Replace every BSDF that `materials` describes by sockets, wrappers included; the target's opens `selection`.
 
-    Entries of `materials` are those of request.json; `blender_version` may be added to each, and the `texture` of a
-    socket is an absolute path.
+    Entries of `materials` are those of request.json; `blender_version` and `film_exposure` may be added to each, and
+    the `texture` of a socket is an absolute path.
 
     Raises
     ------
@@ -53,7 +56,7 @@ def prepare_blender_principled(
         bsdf_id = bsdf.get("id", "")
         if bsdf_id not in materials:
             continue
-        free = table.names if bsdf_id == target.bsdf_id else ()
+        free = [name for name in table.names if name != EMISSION] if bsdf_id == target.bsdf_id else ()
         described = dict(materials[bsdf_id]["sockets"]) | (opened if free else {})
         properties = blender_principled_dict(
             described,
@@ -64,9 +67,27 @@ def prepare_blender_principled(
         )
         _rewrite(bsdf, bsdf_id, properties, textures)
     outer = target.outer
-    return PreparedMaterial(
-        table, start, Target(target.shape_id, target.bsdf_id, outer, outer), {name: name for name in table.names}
-    )
+    key_ends, factors = {name: name for name in table.names}, {}
+    if EMISSION in table.names:
+        strength = float(np.ravel(_constants(sockets)["emission_strength"])[0])
+        factors[EMISSION] = strength * materials[target.bsdf_id].get("film_exposure", 1.0)
+        key_ends[EMISSION] = RADIANCE_KEY
+        _open_emission(scene, target.shape_id, factors[EMISSION] * start[table.slice_of(EMISSION)])
+    return PreparedMaterial(table, start, Target(target.shape_id, target.bsdf_id, outer, outer), key_ends, factors)
+
+
+def _open_emission(scene: Element, shape_id: str, radiance: NDArray[np.float64]) -> None:
+    """Give the shape an area emitter of this radiance instead of any other."""
+    shapes = {shape.get("id"): shape for shape in scene.iter("shape")}
+    if f"{shape_id}_back" in shapes:
+        raise UnrecordableError(
+            "The target is open and glows on both sides: the emission of one side alone can be fitted."
+        )
+    shape = shapes[shape_id]
+    for emitter in shape.findall("emitter"):
+        shape.remove(emitter)
+    emitter = ElementTree.SubElement(shape, "emitter", type="area")
+    ElementTree.SubElement(emitter, "rgb", name="radiance", value=", ".join(repr(float(v)) for v in radiance))
 
 
 def _constants(sockets: Mapping[str, Mapping[str, Any]]) -> dict[str, Value]:

@@ -22,7 +22,7 @@ from ..types.parameter import Vector
 from .material_model import material_model
 from .pass_counter import PassCounter
 from .plugins import check_plugins
-from .prepared_material import Materials, PreparedMaterial
+from .prepared_material import RADIANCE_KEY, Materials, PreparedMaterial
 from .variant import load_variant
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -54,6 +54,7 @@ class MitsubaRenderer:
         self._sensor = scene.sensors()[0]
         self._params = mi.traverse(scene)
         self._keys = _keys_of(list(self._params.keys()), material)
+        self.factors = material.factors
         self._params.keep(list(self._keys.values()))
         self._mask: NDArray[np.bool_] | None = None
         self._of_pixels: PixelPictures | None = None
@@ -191,7 +192,9 @@ class MitsubaRenderer:
             dr.enable_grad(theta)
         for name, key in self._keys.items():
             entries = range(*self.table.slice_of(name).indices(self.table.length))
+            factor = self.factors.get(name, 1.0)
             values = [dr.gather(mi.Float, theta, mi.UInt32(i)) for i in entries]
+            values = values if factor == 1.0 else [value * dr.opaque(mi.Float, factor) for value in values]
             self._params[key] = mi.Color3f(*values) if len(values) == 3 else values[0]
         self._params.update()
         return theta
@@ -285,7 +288,8 @@ def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[st
     """The `mi.traverse` key of every parameter; wrappers such as `twosided` add a part in the middle."""
     keys = {}
     for name, end in material.key_ends.items():
-        found = [key for key in available if key.startswith(f"{material.target.bsdf_id}.") and key.endswith(f".{end}")]
+        owner = material.target.shape_id if end == RADIANCE_KEY else material.target.bsdf_id
+        found = [key for key in available if key.startswith(f"{owner}.") and key.endswith(f".{end}")]
         if len(found) != 1:
             raise BadInputError(f"Material {material.target.bsdf_id!r} has {len(found)} parameters {end!r}, not one.")
         keys[name] = found[0]

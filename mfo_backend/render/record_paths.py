@@ -25,7 +25,7 @@ from .lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from .pixel_cells import PixelCells
 from .primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from .proposal import DefensiveProposal
-from .recorded_background import recorded_background
+from .recorded_background import add_radiance, recorded_background
 from .recorded_paths import RecordedPaths
 from .smooth_facets import ShadowTerminator, seen_side
 from .traced_radiance import traced_radiance
@@ -45,7 +45,8 @@ class RecordSettings:
     limits. `pixels` (height, width) are the only ones looked at; where they hold all that see the target, nothing is
     missed. With `highlights` more rays start where lights of no extent are mirrored. Every camera ray meets the lights
     with extent in as many independent `samples`, or in samples of the same directions if they are `alike`. The first
-    `direct_samples` leave light over other surfaces out and need no other kernels than a recording with it.
+    `direct_samples` leave light over other surfaces out and need no other kernels than a recording with it. With
+    `free_emission` the target's own emission is kept apart from the constant picture.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -63,6 +64,7 @@ class RecordSettings:
     samples: int = 1
     alike: bool = False
     direct_samples: int = 0
+    free_emission: bool = False
 
 
 @dataclass
@@ -126,7 +128,8 @@ def record_paths(
         position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() else None
+        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.free_emission else None
+        glowing = dr.select(mi.Frame3f.cos_theta(si.wi) > 0.0, filter_weight, 0.0) if settings.free_emission else None
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
@@ -157,12 +160,11 @@ def record_paths(
             depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
         )  # fmt: skip
         if glow is not None:
-            pixel = rays.pixel[np.array(position)]
-            flat = constant.reshape(-1, 3)
-            dr.eval(glow)
-            for channel in range(3):
-                flat[:, channel] += np.bincount(pixel, glow[channel].numpy(), len(flat))
+            add_radiance(constant, rays.pixel[np.array(position)], glow)
         merged = _merge(lanes, settings, rays, covered, coverage, constant)
+        if glowing is not None:
+            own = add_radiance(np.zeros_like(constant), rays.pixel[np.array(position)], mi.Color3f(glowing))
+            merged = replace(merged, own_emission=own)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged

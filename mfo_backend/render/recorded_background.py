@@ -37,7 +37,7 @@ def recorded_background(
     `met` is what the rays meet, `covered` counts as they do; paths are of up to `depth`.
     """
     width, height = (int(v) for v in scene.sensors()[0].film().crop_size())
-    image = np.zeros((width * height, 3), np.float32)
+    image = np.zeros((height, width, 3), np.float32)
     looked_at = np.zeros(len(rays.pixel), bool)
     looked_at[covered] = True
     position = rays.position(dr.arange(mi.UInt32, len(rays)))
@@ -48,11 +48,7 @@ def recorded_background(
     dr.eval(traced, rest)
 
     def add(index: mi.UInt32, radiance: mi.Color3f) -> None:
-        value = mi.Color3f(radiance) * rays.weight(index)
-        dr.eval(value)  # component by component: converting the whole array bakes its width into a new kernel
-        flat = rays.pixel[np.array(rays.position(index))]
-        for channel in range(3):
-            image[:, channel] += np.bincount(flat, value[channel].numpy(), width * height)
+        add_radiance(image, rays.pixel[np.array(rays.position(index))], mi.Color3f(radiance) * rays.weight(index))
 
     index = dr.compress(traced)
     if dr.width(index) > 0:
@@ -69,4 +65,13 @@ def recorded_background(
             add(index, seen_world(camera_world, -beyond.wi))
         elif environment is not None:
             add(index, environment.eval(beyond))
-    return image.reshape(height, width, 3)
+    return image
+
+
+def add_radiance(image: NDArray[np.float32], pixel: NDArray[np.int64], radiance: mi.Color3f) -> NDArray[np.float32]:
+    """Add to a picture (height, width, 3) what rays of these flat pixels carry, weighed by the filter; returns it."""
+    flat = image.reshape(-1, 3)
+    dr.eval(radiance)  # component by component: converting the whole array bakes its width into a new kernel
+    for channel in range(3):
+        flat[:, channel] += np.bincount(pixel, radiance[channel].numpy(), len(flat))
+    return image

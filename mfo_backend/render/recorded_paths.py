@@ -166,7 +166,9 @@ class RecordedPaths:
         Share of each covered pixel's filter weight that lies on the target.
     constant
         What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
-        seen in covered pixels, the target's own emission; 0 elsewhere.
+        seen in covered pixels, the target's own emission unless that is free; 0 elsewhere.
+    own_emission
+        The picture of the target's own emission of radiance 1, (height, width, 3), where that is free.
     held
         Values that a texture gives the material, by name: one number or colour for each lane.
     """
@@ -180,6 +182,7 @@ class RecordedPaths:
     coverage: NDArray[np.float32]
     constant: Pixels
     held: Mapping[str, Any] = field(default_factory=dict)
+    own_emission: Pixels | None = None
 
     @property
     def lanes(self) -> int:

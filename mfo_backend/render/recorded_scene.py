@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,6 +27,7 @@ from .memory import require_memory
 from .mitsuba_renderer import MitsubaRenderer
 from .packed_lanes import LaneReader, Lanes
 from .pass_counter import with_derivatives
+from .prepared_material import EMISSION
 from .primary_rays import tile_order
 from .proposal import DefensiveProposal
 from .record_paths import RecordSettings, record_paths
@@ -155,6 +157,7 @@ class RecordedScene:
             pixels=pixels,
             highlights=highlights,
             samples=samples,
+            free_emission=EMISSION in self.renderer.table.names,
         )
         self.renderer.counter.add(1.0)
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
@@ -211,12 +214,12 @@ class RecordedScene:
 
         It remembers two: solutions are compared in pairs.
         """
-        constant = groups.average(paths.constant)
+        constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.counter.add(cost)
-            return TwoSamples.of(self._image(vector, lanes, groups), constant)
+            return glow(vector, TwoSamples.of(self._image(vector, lanes, groups), constant))
 
         return RecordedImage(at, 2)
 
@@ -226,16 +229,37 @@ class RecordedScene:
 
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """The function from a vector to image and Jacobian of the groups, background included."""
-        constant = groups.average(paths.constant)
+        constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         cost = with_derivatives(self._share(groups), self.renderer.table.length)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             samples = self.jacobian(vector, lanes(), groups)
             self.renderer.counter.add(cost)
-            return TwoSamples.of(samples, constant)
+            return glow(vector, TwoSamples.of(samples, constant))
 
         return RecordedImage(at, recalled)
+
+    def _own_emission(
+        self, paths: RecordedPaths, groups: LaneGroups
+    ) -> Callable[[NDArray[np.float64], TwoSamples], TwoSamples]:
+        """What adds the target's own light at a vector to its picture and derivatives, where the emission is free.
+
+        The light that it throws on other surfaces, and they on it, is that of the material it was recorded for.
+        """
+        if paths.own_emission is None:
+            return lambda vector, samples: samples
+        entries = self.renderer.table.slice_of(EMISSION)
+        unit = groups.average(paths.own_emission) * np.float32(self.renderer.factors[EMISSION])
+
+        def added(vector: NDArray[np.float64], samples: TwoSamples) -> TwoSamples:
+            samples.mean[:, :, 0] += unit * vector[entries].astype(np.float32)
+            if samples.mean.shape[2] > 1:
+                for channel, entry in enumerate(range(entries.start, entries.stop)):
+                    samples.mean[:, channel, 1 + entry] += unit[:, channel]
+            return samples
+
+        return added
 
     def _share(self, groups: LaneGroups) -> float:
         """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""

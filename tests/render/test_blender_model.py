@@ -63,7 +63,7 @@ def test_the_whole_set_leaves_out_linked_and_invisible_parameters(tmp_path: Path
     [
         (("roughness",), {}, "Material 'glaze' has no sockets for model 'blender_principled' (given: none)"),
         (("metallic",), None, "'metallic' is linked to a texture"),
-        (("emission_strength",), None, "cannot be fitted: emission"),
+        (("emission_strength",), None, "it multiplies 'emission_color'"),
         ("most", None, "Unknown parameter set 'most'"),
         (("gloss",), None, "Unknown parameter 'gloss'"),
     ],

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...render.mitsuba_renderer import MitsubaRenderer
+from ...render.prepared_material import EMISSION
 from ...types.certainty import Certainty, Level
+from ...types.errors import UnrecordableError
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..certainty.covariance import certainties
@@ -46,7 +48,7 @@ class TracedRoute:
     Raises
     ------
     UnrecordableError
-        If the model has no traced version.
+        If the model has no traced version, or the emission is to be fitted.
     BadInputError
         If one of the settings' losses is not defined for the reference.
     """
@@ -59,6 +61,8 @@ class TracedRoute:
     ) -> None:
         from ...render.traced_paths import TracedPaths
 
+        if EMISSION in renderer.table.names:
+            raise UnrecordableError("Stages on whole light paths hold the emission as it is.")
         settings, encoding = task.settings, task.reference.encoding
         self._task, self._renderer, self._plan = task, renderer, plan
         self._paths = TracedPaths(renderer)
