@@ -49,9 +49,9 @@ BPY_PACKAGES = [
 # `test --quick`: the folders and files whose tests neither fit a material nor start or import Blender
 QUICK = [
     *(f"tests/{folder}" for folder in ("types", "scene", "solve", "metrics", "report", "tools")),
-    *(f"tests/material/test_{name}.py" for name in ("tables", "grid_table", "properties", "dual")),
+    *("tests/material/arrays", "tests/material/principled/test_properties.py"),
     *("tests/bench/rows", "tests/bench/report", "tests/bench/judge"),
-    *("tests/job/test_request.py", "tests/job/test_worker_process.py"),
+    *("tests/job/folder/test_request.py", "tests/job/run/test_worker_process.py"),
     *("tests/test_import_arrows.py", "tests/test_repository.py"),
 ]
 

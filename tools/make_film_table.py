@@ -58,7 +58,7 @@ def coefficients(films: dict[str, Array], angle: float, metal: bool) -> tuple[Ar
     order, the path difference in nanometres, and where no interface reflects everything."""
     import drjit as dr
 
-    from mfo_backend.material.thin_film import airy_sum, dielectric_interface, metal_interface
+    from mfo_backend.material.lobes.thin_film import airy_sum, dielectric_interface, metal_interface
 
     number = dr.llvm.ad.Float64
     film, substrate = number(films["film"]), number(films["substrate"])
@@ -89,7 +89,7 @@ def main() -> None:
     from scipy import sparse
 
     mi.set_variant("llvm_ad_rgb")
-    from mfo_backend.material.colour_interference import LONGEST_PATH_NM, fourier_table
+    from mfo_backend.material.lobes.colour_interference import LONGEST_PATH_NM, fourier_table
 
     wavelength = np.arange(360.0, 831.0, 5.0)
     curves: Any = mi.cie1931_xyz(mi.Float(wavelength))  # type: ignore[arg-type]

@@ -5,7 +5,7 @@
 
 Cycles holds Monte Carlo estimates of these integrals with errors of about 5e-4, fifty times our tolerance, so a fresh
 integration would not reproduce its pictures. Each entry follows instead from two or three noise-free pixels
-(`cycles_probe.py`) by the formulas below. `tests/material/test_tables.py` integrates the definitions independently.
+(`cycles_probe.py`) by the formulas below. `tests/material/arrays/test_tables.py` integrates the definitions on its own.
 
 Entries whose node no material can reach (a roughness of 0 is a mirror, a view at the horizon) are extrapolated from
 inside their cell, where Cycles interpolates linearly: exact again.

@@ -125,7 +125,7 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
 
 
 def _terminator(shape: Shape) -> list[Element]:
-    """What the backend reads about shadows of smooth facets (`mfo_backend/render/smooth_facets.py`)."""
+    """What the backend reads about shadows of smooth facets (`mfo_backend/render/transport/smooth_facets.py`)."""
     numbers = {
         "shadow_geometry_offset": shape.terminator.geometry_offset,
         "shadow_shading_offset": shape.terminator.shading_offset,

@@ -13,7 +13,7 @@ from typing import TextIO
 
 from .. import __version__
 from .. import one_blas_thread as one_blas_thread
-from ..render.cache_folder import use_kernel_cache
+from ..render.machine.cache_folder import use_kernel_cache
 from ..types.errors import MfoError
 from ..types.status import Status
 
@@ -85,10 +85,10 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     chosen = next((word for word in words if not word.startswith("-")), None)
     for name, summary in COMMANDS.items():
-        if not Path(__file__).with_name(f"{name}.py").is_file():
+        if not (Path(__file__).parent / "commands" / f"{name}.py").is_file():
             continue
         if name == chosen:
-            importlib.import_module(f"{__package__}.{name}").add_parser(subparsers)
+            importlib.import_module(f"{__package__}.commands.{name}").add_parser(subparsers)
         else:
             subparsers.add_parser(name, help=summary)
     return parser

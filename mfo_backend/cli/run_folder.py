@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..job.fit_scene import Fitter
-from ..job.progress import EventWriter
-from ..job.run_job import run_job
-from ..job.stop import StopSignal
+from ..job.output.progress import EventWriter
+from ..job.run.fit_scene import Fitter
+from ..job.run.run_job import run_job
+from ..job.run.stop import StopSignal
 from ..types.status import Status
 
 

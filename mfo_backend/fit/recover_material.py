@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
-from ..metrics.tone_mapping import View
-from ..render.mitsuba_renderer import MitsubaRenderer
-from ..render.renderer import Interrupted, Renderer
+from ..metrics.display.tone_mapping import View
+from ..render.pictures.mitsuba_renderer import MitsubaRenderer
+from ..render.pictures.renderer import Interrupted, Renderer
 from ..types.errors import UnrecordableError
 from ..types.event import Listener, Preview, Started
 from ..types.image import Image, Pixels

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from ..metrics.loss_names import SQUARED_KINDS, check_loss_name, is_squared, loss_in_range
+from ..metrics.losses.loss_names import SQUARED_KINDS, check_loss_name, is_squared, loss_in_range
 from ..solve.stopping import StoppingRules
 from ..types.errors import BadInputError
 from ..types.image import Encoding

@@ -7,7 +7,7 @@ A number that one file alone needs, and that decides nothing about a result, lie
 
 from __future__ import annotations
 
-from ..metrics.response import DIM_FLOOR as DIM_FLOOR
+from ..metrics.responses.response import DIM_FLOOR as DIM_FLOOR
 
 # ---- noise
 

@@ -15,7 +15,7 @@ import mitsuba as mi
 
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable, Value
-from . import dual as dr
+from .arrays import dual as dr
 from .mitsuba_parameters import MITSUBA_PRINCIPLED
 
 Scalar = Any  # mi.Float or a Python float; a float of exactly 0 leaves its lobe out of the kernel

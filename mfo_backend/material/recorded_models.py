@@ -8,13 +8,13 @@ from typing import Any, Protocol
 
 from ..types.errors import UnrecordableError
 from ..types.parameter import ParameterTable, Value
-from .blender_principled import BLENDER_5_0, blender_principled
-from .bumped_normals import BUMPED_NORMALS
+from .arrays.grid_table import loaded_buffers
 from .cycles_model import CyclesModel
-from .grid_table import loaded_buffers
-from .lobes import needed_lobes
 from .mitsuba_principled import MitsubaPrincipled
-from .principled_parameters import BLENDER_PRINCIPLED
+from .principled.blender_principled import BLENDER_5_0, blender_principled
+from .principled.bumped_normals import BUMPED_NORMALS
+from .principled.needed_lobes import needed_lobes
+from .principled.principled_parameters import BLENDER_PRINCIPLED
 
 # (values by name, wi, wo) -> BSDF times cosine; directions in the shading frame, a value of exactly 0.0 is a lobe left
 # out

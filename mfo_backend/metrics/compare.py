@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types.image import Encoding, Image
-from .colour import linear_from_srgb
-from .flip_error import flip_error, hdr_flip_error, shown
-from .itp import de_itp_map
-from .loss import DISPLAY_NITS
-from .pixel_check import check_mask, check_pair
-from .pu21 import pu21
-from .response import logarithmic_for, nits_per_unit, relative_to
-from .tone_mapping import DisplayView, View
+from .display.colour import linear_from_srgb
+from .display.tone_mapping import DisplayView, View
+from .flip.flip_error import flip_error, hdr_flip_error, shown
+from .losses.loss import DISPLAY_NITS
+from .pixels.pixel_check import check_mask, check_pair
+from .responses.itp import de_itp_map
+from .responses.pu21 import pu21
+from .responses.response import logarithmic_for, nits_per_unit, relative_to
 
 Array = NDArray[np.floating]
 

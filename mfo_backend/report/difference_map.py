@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics.flip import flip_map
+from ..metrics.flip.ldr_flip import flip_map
 from ..types.image import Pixels
 
 # Every sixteenth colour of matplotlib's magma (S. van der Walt and N. Smith, CC0), the palette of FLIP; between them

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..metrics.block_means import block_means
-from ..metrics.flip_error import flip_error
-from ..metrics.tone_mapping import View
+from ..metrics.display.tone_mapping import View
+from ..metrics.flip.block_means import block_means
+from ..metrics.flip.flip_error import flip_error
 from ..types.image import Encoding, Image, Pixels
 from .difference_map import magma
 from .picture import displayed, png_bytes

@@ -8,7 +8,7 @@ import io
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics.tone_mapping import View
+from ..metrics.display.tone_mapping import View
 from ..types.image import Encoding, Image, Pixels
 
 

@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from ..metrics.colour import srgb_from_linear
+from ..metrics.display.colour import srgb_from_linear
 from ..types.certainty import Certainty, Level
 from ..types.parameter import Value
 from ..types.result import FitResult

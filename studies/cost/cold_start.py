@@ -85,7 +85,7 @@ def make_job(name: str, folder: Path, size: int) -> Path:
 
 def write_bench_job(scenario_name: str, number: int, folder: Path, size: int) -> None:
     """The job of a scene of `mfo bench`, its reference with 256 samples a pixel."""
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()
@@ -93,8 +93,8 @@ def write_bench_job(scenario_name: str, number: int, folder: Path, size: int) ->
     from mfo_backend.bench.scenes.scenario import SCENARIOS
     from mfo_backend.bench.scenes.scene import write_scene
     from mfo_backend.fit.settings import FitSettings
-    from mfo_backend.job.make_job import make_job as write_job
-    from mfo_backend.render.renderer import load_renderer
+    from mfo_backend.job.folder.make_job import make_job as write_job
+    from mfo_backend.render.pictures.renderer import load_renderer
     from mfo_backend.scene.image_file import write_exr
 
     scenario = SCENARIOS[scenario_name]
@@ -108,7 +108,7 @@ def write_bench_job(scenario_name: str, number: int, folder: Path, size: int) ->
 def measure(name: str, job: Path, repeat: int) -> dict[str, Any]:
     """Wall and CPU seconds of cold and warm runs, their parts, and the way through Blender."""
     caches = job.parents[1] / "caches" / name
-    probe = _timed(["-c", "from mfo_backend.render.llvm import configure_llvm; configure_llvm()"], caches)
+    probe = _timed(["-c", "from mfo_backend.render.machine.llvm import configure_llvm; configure_llvm()"], caches)
     found: dict[str, Any] = {"llvm probe, once a machine": probe}
     run = ["-m", "mfo_backend", "run", str(job), "--progress", "none"]
     inside = ["-m", "studies.cost.cold_start", "--inside", str(job)]
@@ -231,14 +231,14 @@ def phases_of(job: Path) -> dict[str, Any]:
     stages = Stages()
     import io
 
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     with stages.within("variant"):
         if needs_llvm():
             configure_llvm()
     import drjit as dr
 
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     with stages.within("variant"):
         load_variant()
@@ -247,12 +247,12 @@ def phases_of(job: Path) -> dict[str, Any]:
     from mfo_backend.fit.judge.picture_judge import PictureJudge
     from mfo_backend.fit.judge.verification import Verification
     from mfo_backend.fit.recorded.fit import RecordedRoute
-    from mfo_backend.job import run_job
-    from mfo_backend.job.progress import EventWriter
-    from mfo_backend.job.stop import StopSignal
-    from mfo_backend.render import renderer
-    from mfo_backend.render.mitsuba_renderer import MitsubaRenderer
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.job.output.progress import EventWriter
+    from mfo_backend.job.run import run_job
+    from mfo_backend.job.run.stop import StopSignal
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures import renderer
+    from mfo_backend.render.pictures.mitsuba_renderer import MitsubaRenderer
 
     stages.wrap(run_job, "read_reference", "load")
     stages.wrap(renderer, "load_renderer", "load")

@@ -23,7 +23,7 @@ import numpy as np
 from mfo_backend.bench.report.figure import COLOURS, legend_above, log_axis, new_figure, svg
 from mfo_backend.bench.report.table import Table, number
 from mfo_backend.bench.scenes.scene import materials_of
-from mfo_backend.render.pass_counter import PassCounter
+from mfo_backend.render.pictures.pass_counter import PassCounter
 from studies.recovery.scene_fit import fit_to, open_bench_scene, reference_of, write_bench_scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,7 +68,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.doc and set(arguments.only) != set(SERIES):
         parser.error("--doc writes the whole page: leave --only out")
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()
@@ -132,7 +132,7 @@ def samples(repeat: int) -> list[Point]:
 
 def parameters(repeat: int) -> list[Point]:
     """Over free values."""
-    from mfo_backend.material.principled_parameters import BLENDER_PRINCIPLED
+    from mfo_backend.material.principled.principled_parameters import BLENDER_PRINCIPLED
 
     lengths = [sum(BLENDER_PRINCIPLED[name].size for name in names) for names in PARAMETERS]
     return [cost(n, repeat, names=names) for n, names in zip(lengths, PARAMETERS, strict=True)]
@@ -170,8 +170,8 @@ SERIES = {
 
 def cost(x: int, repeat: int, *, size: int = 128, grid: int = 4, names: Sequence[str] = MOST, rings: int = 0) -> Point:
     """The median of `repeat` evaluations at size x size pixels; an exact sphere without `rings`."""
-    from mfo_backend.render.recorded_scene import RecordedScene
-    from mfo_backend.render.renderer import load_renderer
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures.renderer import load_renderer
 
     with tempfile.TemporaryDirectory() as folder:
         renderer = load_renderer(

@@ -91,7 +91,7 @@ def recorded_problem(scenario: str, scene_number: int, size: int, folder: Path) 
     scene = write_bench_scene(scenario, scene_number, size, folder)
     from mfo_backend.fit.recorded.where_to_look import all_groups
     from mfo_backend.fit.squares.residuals import log_residual, normal_equations, residual_rows
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     renderer, _ = open_bench_scene(scene, "balanced")
     table, truth = renderer.table, true_vector(scene, renderer)

@@ -33,7 +33,7 @@ WRONG_BY = 0.02
 
 def measure(scene: Any, number: int, arguments: argparse.Namespace) -> dict[str, Any]:
     """Fit a scene to its reference of this number."""
-    from mfo_backend.render.pass_counter import PassCounter
+    from mfo_backend.render.pictures.pass_counter import PassCounter
     from mfo_backend.types.certainty import Level
 
     renderer, settings = open_bench_scene(scene, arguments.preset, all_values=arguments.all_values)

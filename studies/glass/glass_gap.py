@@ -50,7 +50,7 @@ def shown(scene: Any, gap: str) -> Callable[[int, int], Any]:
 
 def measure(scene: Any, gap: str) -> dict[str, tuple[float, float, str]]:
     """FLIP, CPU seconds and the last stage of each preset."""
-    from mfo_backend.metrics.loss import make_loss
+    from mfo_backend.metrics.losses.loss import make_loss
     from mfo_backend.types.image import Encoding, Image
 
     picture, rows = shown(scene, gap), {}

@@ -62,7 +62,7 @@ def measure(renderer: Any, number: int, arguments: argparse.Namespace) -> dict[s
     """Fit scene `number` and judge the result."""
     from mfo_backend.fit.recover_material import recover_material
     from mfo_backend.fit.settings import FitSettings
-    from mfo_backend.render.pass_counter import PassCounter
+    from mfo_backend.render.pictures.pass_counter import PassCounter
     from mfo_backend.types.image import Encoding, Image
 
     table = renderer.table
@@ -138,11 +138,11 @@ def main() -> None:
     data = Path(os.environ.get("MFO_DATA", ROOT.parent / "shared" / "data"))
     mesh = data / "meshes" / arguments.mesh if arguments.mesh else None
 
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit
-    from mfo_backend.render.renderer import load_renderer
+    from mfo_backend.render.pictures.renderer import load_renderer
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.xml"

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from mfo_backend.cli.run_folder import run_folder
-from mfo_backend.job.fit_scene import fit_scene
-from mfo_backend.metrics.flip_error import flip_error
+from mfo_backend.job.run.fit_scene import fit_scene
+from mfo_backend.metrics.flip.flip_error import flip_error
 from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.image import Encoding, Image, Pixels
 

@@ -26,9 +26,9 @@ from mfo_backend.metrics.judges.display_light import DisplayLight
 from mfo_backend.metrics.judges.hdr_vdp import hdr_vdp_q_jods
 from mfo_backend.metrics.judges.hdr_vdp_program import is_configured
 from mfo_backend.metrics.judges.viewing import HDR_VIEWING
-from mfo_backend.metrics.loss import make_loss
-from mfo_backend.metrics.loss_names import LOSS_NAMES, OPTIONAL_LOSS_NAMES
-from mfo_backend.metrics.response import nits_per_unit
+from mfo_backend.metrics.losses.loss import make_loss
+from mfo_backend.metrics.losses.loss_names import LOSS_NAMES, OPTIONAL_LOSS_NAMES
+from mfo_backend.metrics.responses.response import nits_per_unit
 from mfo_backend.types.errors import SetupError
 from mfo_backend.types.image import Encoding, Image
 from studies.losses.material_pairs import CHANGES, REFERENCE_SPP, Pair, material_pairs

@@ -25,9 +25,9 @@ from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.result.outcome import Candidate
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.compare import compare_images
-from mfo_backend.metrics.loss import Loss, make_loss
-from mfo_backend.metrics.loss_names import loss_in_range
-from mfo_backend.render.pass_counter import PassCounter
+from mfo_backend.metrics.losses.loss import Loss, make_loss
+from mfo_backend.metrics.losses.loss_names import loss_in_range
+from mfo_backend.render.pictures.pass_counter import PassCounter
 from mfo_backend.types.image import Encoding, Image, Pixels
 
 Vector = NDArray[np.float64]
@@ -62,11 +62,11 @@ def ladders(judged: bool) -> list[Ladder]:
 
 def prepare() -> None:
     """Load Mitsuba."""
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     load_variant()
 
@@ -141,7 +141,7 @@ class _Judge:
 
 def measure_scene(number: int, size: int, folder: Path) -> dict[str, Any]:
     """Errors and cost of every ladder and preset in scene `number`; even ones have a point light, odd ones a probe."""
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     scenario = SCENARIOS[number % 2]
     written = write_scene(scenario, number, size, Assets(None), folder / str(number))
@@ -182,7 +182,7 @@ def measure_scene(number: int, size: int, folder: Path) -> dict[str, Any]:
 
 
 def _load(file: Path) -> Any:
-    from mfo_backend.render.mitsuba_renderer import load_mitsuba_renderer
+    from mfo_backend.render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
     return load_mitsuba_renderer(file, SHAPE, model="mitsuba_principled", parameters="reduced", materials={})
 

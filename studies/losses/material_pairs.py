@@ -98,7 +98,7 @@ CHANGES: dict[str, Callable[[Material, np.random.Generator], Material]] = {
 
 def _renderer(size: int) -> Callable[[Material], Pixels]:
     """A function that renders a material on a ball over a chequered floor under two area lights and a dim sky."""
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     load_variant()
     import mitsuba as mi

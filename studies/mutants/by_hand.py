@@ -38,7 +38,7 @@ WRONG = [
     ("mfo_backend/solve/bounded_least_squares.py", "rejected = gain <= 1e-4", "rejected = not trial.finite"),
     # a feature difference above 1 makes the exponent of FLIP negative
     (
-        "mfo_backend/metrics/flip_difference.py",
+        "mfo_backend/metrics/flip/flip_difference.py",
         "1 - np.minimum(np.sqrt(feature), 1)",
         "1 - np.sqrt(feature)",
     ),

@@ -54,7 +54,7 @@ def measure(context: str, seed: int, folder: Path, *, size: int, samples: int) -
 
 def _flip(reference: NDArray[np.float32], test: NDArray[np.float32]) -> float:
     """Mean FLIP of two scene-linear pictures, exposed so that the reference's mean is a middle grey."""
-    from mfo_backend.metrics.flip import flip_map
+    from mfo_backend.metrics.flip.ldr_flip import flip_map
 
     exposure = 0.18 / float(np.mean(reference))
     shown = [np.clip(picture * exposure, 0.0, 1.0) ** (1.0 / 2.2) for picture in (reference, test)]

@@ -74,11 +74,11 @@ def _blocks(picture: Array) -> Array:
 
 def render_job(job: Path, spp: int) -> tuple[Array, Array]:
     """Two renders of a job's scene with Blender's model, half of `spp` each."""
-    from mfo_backend.job.fit_scene import request_materials
-    from mfo_backend.job.job_folder import JobFolder
-    from mfo_backend.job.request import read_request
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
-    from mfo_backend.render.renderer import load_renderer
+    from mfo_backend.job.folder.job_folder import JobFolder
+    from mfo_backend.job.folder.request import read_request
+    from mfo_backend.job.run.fit_scene import request_materials
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.pictures.renderer import load_renderer
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit

@@ -84,8 +84,8 @@ def recover(seed: int, light: str, folder: Path, effort: Effort, judge: str) -> 
     RuntimeError
         With the last lines of whichever program failed.
     """
-    from mfo_backend.metrics.flip_error import flip_error
-    from mfo_backend.metrics.tone_mapping import DisplayView
+    from mfo_backend.metrics.display.tone_mapping import DisplayView
+    from mfo_backend.metrics.flip.flip_error import flip_error
     from mfo_backend.scene.image_file import read_image
     from mfo_backend.types.image import Encoding, Image
 

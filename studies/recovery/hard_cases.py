@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--rows", type=Path, default=Path("hard.jsonl"))
     arguments = parser.parse_args()
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()

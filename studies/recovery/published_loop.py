@@ -28,8 +28,8 @@ def published_flip(path: Path) -> type:
     """A loss with the interface of `metrics.flip_loss.HdrFlipLoss`, made of the authors' module."""
     import torch
 
-    from mfo_backend.metrics.exposure_range import ExposureRange
-    from tests.metrics.bench_flip import published_loss
+    from mfo_backend.metrics.flip.exposure_range import ExposureRange
+    from tests.metrics.flip.bench_flip import published_loss
 
     torch.set_num_threads(1)
     loss = published_loss(path)
@@ -65,7 +65,7 @@ def published_flip(path: Path) -> type:
 def measured(runner: Any, published: type, scenario: str, scene: int) -> dict[str, dict[str, float]]:
     """CPU seconds, error and iterations of each method on a scene."""
     from mfo_backend.bench.rows.row import Task
-    from mfo_backend.metrics import loss
+    from mfo_backend.metrics.losses import loss
 
     found = {}
     for method in METHODS:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 def write_bench_scene(scenario: str, number: int, size: int, folder: Path) -> Any:
     """Write scene `number` of a scenario into `folder`, after Mitsuba has been set up."""
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()  # before the first import of drjit
     from mfo_backend.bench.scenes.assets import Assets
     from mfo_backend.bench.scenes.scenario import SCENARIOS
     from mfo_backend.bench.scenes.scene import write_scene
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     load_variant()
     return write_scene(SCENARIOS[scenario], number, size, Assets.find(), folder)
@@ -29,7 +29,7 @@ def open_bench_scene(scene: Any, preset: str, *, all_values: bool = False) -> tu
     """The scene's renderer and the settings of its fit, which frees the scenario's values or all."""
     from mfo_backend.bench.runs.method import method_settings
     from mfo_backend.bench.scenes.scene import SHAPE
-    from mfo_backend.render.mitsuba_renderer import load_mitsuba_renderer
+    from mfo_backend.render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
     settings = method_settings(preset, scene.scenario, scene.number)
     values = "all" if all_values else settings.parameters

@@ -84,7 +84,7 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
 
 
 def _flips(folder: Path) -> tuple[float, float, float, float]:
-    from mfo_backend.metrics.flip_error import flip_error
+    from mfo_backend.metrics.flip.flip_error import flip_error
     from mfo_backend.scene.image_file import read_image
 
     reference, floor, after = (read_image(folder / f"{name}.exr") for name in ("reference", "floor", "after"))

@@ -31,8 +31,8 @@ def test_parameters_are_those_of_the_model(addon: object) -> None:
 
 def test_sockets_are_those_of_the_model(addon: object) -> None:
     from blender_addon import properties
-    from mfo_backend.material.blender_selection import FIXED, REDUCED
-    from mfo_backend.material.principled_parameters import SOCKET_OF_PARAMETER
+    from mfo_backend.material.principled.blender_selection import FIXED, REDUCED
+    from mfo_backend.material.principled.principled_parameters import SOCKET_OF_PARAMETER
 
     fitted = [(name, socket) for name, socket in SOCKET_OF_PARAMETER.items() if name not in FIXED]
     assert [(item[0], item[1]) for item in properties.SOCKET_ITEMS] == fitted
@@ -41,14 +41,15 @@ def test_sockets_are_those_of_the_model(addon: object) -> None:
 
 def test_schema_versions_agree(addon: object) -> None:
     from blender_addon.export import job as export
-    from mfo_backend.job import request, result
+    from mfo_backend.job.folder import request
+    from mfo_backend.job.output import result
 
     assert job_result.SCHEMA_VERSION == export.SCHEMA_VERSION == request.SCHEMA_VERSION == result.SCHEMA_VERSION
 
 
 def test_backend_accepts_what_is_exported(scene: SimpleNamespace) -> None:
-    from mfo_backend.job import request
-    from mfo_backend.job.job_folder import JobFolder
+    from mfo_backend.job.folder import request
+    from mfo_backend.job.folder.job_folder import JobFolder
 
     scene.bpy.ops.mfo.fit(reference=scene.reference, job_folder=scene.job, parameters="roughness", max_iterations=3)
     read = request.read_request(JobFolder.open(scene.job))

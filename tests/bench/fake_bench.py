@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from mfo_backend.bench.runs.run_bench import run_bench
-from mfo_backend.cli.bench import work
+from mfo_backend.cli.commands.bench import work
 from tests.bench.made_up_rows import FakeRunner
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from mfo_backend.job.request import request_from_json
+from mfo_backend.job.folder.request import request_from_json
 
 from ..addon import fake_backend
 from .conftest import ADDON_ID, RealBlender

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mfo_backend.metrics.flip_error import flip_error
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.flip.flip_error import flip_error
 from mfo_backend.scene.image_file import read_image
 
 from ..end_to_end.conftest import run_mfo

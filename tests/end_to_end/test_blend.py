@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mfo_backend.metrics.flip_error import flip_error
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.flip.flip_error import flip_error
 from mfo_backend.scene.image_file import read_image
 
 from .conftest import Done, Scene, run_bpy, run_mfo

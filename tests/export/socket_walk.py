@@ -22,7 +22,7 @@ from blender_addon.export.material_elements import bsdf_element
 from blender_addon.export.node_graph import names_by_graph
 from blender_addon.export.read_material import read_context, read_target
 from blender_addon.export.target_shader import target_shader
-from mfo_backend.material.principled_parameters import PARAMETER_OF_SOCKET
+from mfo_backend.material.principled.principled_parameters import PARAMETER_OF_SOCKET
 
 # With these no lobe is off, so that every other socket has an effect
 PRESENT = {

@@ -13,9 +13,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from blender_addon.probe.client import PREFIX  # noqa: E402
-from mfo_backend.job.fit_scene import request_materials  # noqa: E402
-from mfo_backend.job.job_folder import JobFolder  # noqa: E402
-from mfo_backend.job.request import read_request  # noqa: E402
+from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
+from mfo_backend.job.folder.request import read_request  # noqa: E402
+from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
 
 from .scenes import add_camera, add_light, new_material  # noqa: E402
 
@@ -140,8 +140,8 @@ def test_the_recorded_picture_is_cycles(
 
 def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
     """Pixels inside the target, by the recorded paths of the exported job and by Cycles."""
-    from mfo_backend.render.recorded_scene import RecordedScene
-    from mfo_backend.render.renderer import load_renderer
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures.renderer import load_renderer
 
     wanted = render_cycles()
     report = export(target, reference=None)

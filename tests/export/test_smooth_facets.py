@@ -36,10 +36,10 @@ def coarse_ball(scene: Any, geometry_offset: float, shading_offset: float, **soc
 
 
 def our_renderer(report: Any) -> Any:
-    from mfo_backend.job.fit_scene import request_materials
-    from mfo_backend.job.job_folder import JobFolder
-    from mfo_backend.job.request import read_request
-    from mfo_backend.render.renderer import load_renderer
+    from mfo_backend.job.folder.job_folder import JobFolder
+    from mfo_backend.job.folder.request import read_request
+    from mfo_backend.job.run.fit_scene import request_materials
+    from mfo_backend.render.pictures.renderer import load_renderer
 
     folder = JobFolder.open(report.folder)
     request = read_request(folder)
@@ -81,7 +81,7 @@ def test_light_is_where_cycles_has_it(
 
 
 def test_recorded_paths_see_the_same(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, tmp_path: Path) -> None:
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     item = coarse_ball(scene, 0.1, 0.6, **PLASTIC)
     render_cycles()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from blender_addon.export.view_lut import bake_view_lut, shown_by
-from mfo_backend.metrics.baked_view import BakedView
+from mfo_backend.metrics.display.baked_view import BakedView
 
 from .test_untouched import changes, fingerprint
 

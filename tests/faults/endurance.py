@@ -69,9 +69,9 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def backend(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
     """Jobs of three presets in turn, in one process, from seed to seed; also the kernels on disk."""
-    from mfo_backend.job.progress import EventWriter
-    from mfo_backend.job.run_job import run_job
-    from mfo_backend.job.stop import StopSignal
+    from mfo_backend.job.output.progress import EventWriter
+    from mfo_backend.job.run.run_job import run_job
+    from mfo_backend.job.run.stop import StopSignal
 
     job = export(folder, size)
     request = json.loads((job / "request.json").read_text())
@@ -144,11 +144,12 @@ def repeat(folder: Path, fits: int, size: int) -> Iterator[dict[str, Any]]:
 def _values(job: Path, threads: int) -> dict[str, list[float]]:
     """The recovered values with their certainty, and the errors, of a run in a new process."""
     code = (
-        "import sys, os, io\nfrom pathlib import Path\nfrom mfo_backend.render.llvm import configure_llvm, needs_llvm\n"
+        "import sys, os, io\nfrom pathlib import Path\n"
+        "from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm\n"
         "needs_llvm() and configure_llvm()\nimport drjit as dr\n"
         f"dr.set_thread_count({threads})\n"
-        "from mfo_backend.job.run_job import run_job\nfrom mfo_backend.job.progress import EventWriter\n"
-        "from mfo_backend.job.stop import StopSignal\n"
+        "from mfo_backend.job.run.run_job import run_job\nfrom mfo_backend.job.output.progress import EventWriter\n"
+        "from mfo_backend.job.run.stop import StopSignal\n"
         f"run_job(Path({str(job)!r}), EventWriter(stream=io.StringIO()), StopSignal())\nos._exit(0)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=environment(), capture_output=True)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.job.make_job import make_job
+from mfo_backend.job.folder.make_job import make_job
 from mfo_backend.scene.image_file import write_exr
 
 from ..stability.test_extremes import POINT, SCENE, SKY

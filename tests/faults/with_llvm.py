@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from mfo_backend.cli.main import main
-from mfo_backend.render import llvm
+from mfo_backend.render.machine import llvm
 
 if __name__ == "__main__":
     at = sys.argv.index("--")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mfo_backend.render.pass_counter import PassCounter
+from mfo_backend.render.pictures.pass_counter import PassCounter
 from mfo_backend.types.image import Encoding, Image, Pixels
 from mfo_backend.types.parameter import Parameter, ParameterTable
 

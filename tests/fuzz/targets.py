@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from mfo_backend.job.job_folder import JobFolder
-from mfo_backend.job.request import read_request, request_from_json, request_to_json
-from mfo_backend.job.scene_files import check_scene_files, film_size
+from mfo_backend.job.folder.job_folder import JobFolder
+from mfo_backend.job.folder.request import read_request, request_from_json, request_to_json
+from mfo_backend.job.folder.scene_files import check_scene_files, film_size
 from mfo_backend.scene import picture_size
 from mfo_backend.scene.image_file import read_image, write_exr, write_png
 from mfo_backend.scene.ply_file import check_ply

@@ -20,7 +20,7 @@ def _variant() -> None:
 @pytest.fixture(scope="session")
 def plugin() -> ModuleType:
     mi.set_variant(VARIANT)
-    from mfo_backend.material import principled_plugin
+    from mfo_backend.material.plugins import principled_plugin
 
     principled_plugin.register()
     return principled_plugin

@@ -74,8 +74,8 @@ def run(bsdf: Any, what: str, arguments: tuple[Any, Any, Any, Any]) -> tuple[int
 def main() -> None:
     """Print the table."""
     mi.set_variant("llvm_ad_rgb")
-    from mfo_backend.material.principled_parameters import BLENDER_PRINCIPLED
-    from mfo_backend.material.principled_plugin import register
+    from mfo_backend.material.plugins.principled_plugin import register
+    from mfo_backend.material.principled.principled_parameters import BLENDER_PRINCIPLED
 
     register()
     dr.set_thread_count(1)

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from mfo_backend.material.principled_parameters import BLENDER_PRINCIPLED, SOCKET_OF_PARAMETER  # noqa: E402
+from mfo_backend.material.principled.principled_parameters import BLENDER_PRINCIPLED, SOCKET_OF_PARAMETER  # noqa: E402
 from tools.cycles_probe import ask_cycles  # noqa: E402
 
 Array = NDArray[np.float64]
@@ -138,8 +138,8 @@ def evaluate_cases(cases: Cases, group: Group, version: Sequence[int], double: b
     """Our f_r |cos|, (cases, 3), in single or double precision (LLVM)."""
     import drjit as dr
 
-    from mfo_backend.material.blender_principled import blender_principled
     from mfo_backend.material.cycles_model import cycles_model
+    from mfo_backend.material.principled.blender_principled import blender_principled
 
     vector, number = (dr.llvm.ad.Array3f64, dr.llvm.ad.Float64) if double else (dr.llvm.ad.Array3f, dr.llvm.ad.Float)
     parameters = {
@@ -170,8 +170,8 @@ TABLE = ROOT / "docs" / "reference" / "material_parity.md"
 TABLE_VERSION = "5.0.1"
 INTRODUCTION = """# Blender's Principled BSDF here and in Cycles
 
-`python tests/material/parity.py` writes this file; `tests/material/test_cycles_parity.py` holds the 5.0.1 rows.
-Each row: {materials} random materials with four direction pairs each, one noise-free Cycles pixel per case
+`python tests/material/parity.py` writes this file; `tests/material/principled/test_cycles_parity.py` holds the rows of
+5.0.1. Each row: {materials} random materials with four direction pairs each, one noise-free Cycles pixel per case
 (`tools/cycles_probe.py`), our function in single precision on the CPU. The error of a case is the largest difference of
 a colour component over the largest component.
 

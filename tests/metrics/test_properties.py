@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from mfo_backend.metrics.colour import linear_from_srgb, srgb_from_linear
-from mfo_backend.metrics.loss import make_loss
-from mfo_backend.metrics.loss_names import LOSS_NAMES
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.colour import linear_from_srgb, srgb_from_linear
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.losses.loss import make_loss
+from mfo_backend.metrics.losses.loss_names import LOSS_NAMES
 from mfo_backend.types.image import Encoding, Image
 
 SIZE = (8, 11, 3)

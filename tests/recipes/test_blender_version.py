@@ -18,13 +18,13 @@ def test_a_new_blender_version_has_its_own_api_and_material(tmp_path: Path) -> N
 
         print(light_strength(SimpleNamespace(power=3.0, exposure=1.0)), light_strength(SimpleNamespace(energy=3.0)))
 
-        from mfo_backend.render.variant import load_variant
+        from mfo_backend.render.machine.variant import load_variant
         load_variant()
         import drjit as dr
         import mitsuba as mi
-        from mfo_backend.material.blender_principled import blender_principled
+        from mfo_backend.material.principled.blender_principled import blender_principled
         from mfo_backend.material.cycles_model import cycles_model
-        from mfo_backend.material.lobes import ALL_LOBES
+        from mfo_backend.material.principled.needed_lobes import ALL_LOBES
 
         wi, wo = mi.Vector3f(0.0, 0.6, 0.8), mi.Vector3f(0.0, 0.0, 1.0)
         values = {"coat_weight": 1.0, "coat_tint": (0.5, 1.0, 1.0)}

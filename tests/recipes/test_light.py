@@ -30,8 +30,8 @@ def test_a_new_light_goes_from_blender_to_the_floor(tmp_path: Path) -> None:
         light = read_light(lamp, np.array(lamp.matrix_world), 1.0, Findings())
         element = ElementTree.fromstring(ElementTree.tostring(light_element(light, "ring"), "unicode"))
 
-        from mfo_backend.render.plugins import check_plugins
-        from mfo_backend.render.variant import load_variant
+        from mfo_backend.render.machine.plugins import check_plugins
+        from mfo_backend.render.machine.variant import load_variant
         load_variant()
         import drjit as dr
         import mitsuba as mi

@@ -12,14 +12,14 @@ from .recipe import follow
 
 def test_a_new_lobe_has_its_value_and_its_derivative(tmp_path: Path) -> None:
     said = follow("A lobe", tmp_path).see("""
-        from mfo_backend.render.variant import load_variant
+        from mfo_backend.render.machine.variant import load_variant
         load_variant()
         import drjit as dr
         import mitsuba as mi
-        from mfo_backend.material.blender_principled import blender_principled
-        from mfo_backend.material.blender_selection import select_blender_parameters
-        from mfo_backend.material.dual import Dual
-        from mfo_backend.material.lobes import needed_lobes
+        from mfo_backend.material.principled.blender_principled import blender_principled
+        from mfo_backend.material.principled.blender_selection import select_blender_parameters
+        from mfo_backend.material.arrays.dual import Dual
+        from mfo_backend.material.principled.needed_lobes import needed_lobes
 
         wi, wo = dr.normalize(mi.Vector3f(0.3, 0.1, 1.0)), dr.normalize(mi.Vector3f(0.1, -0.2, 1.0))
         values = {"base_color": (0.5, 0.5, 0.5), "roughness": 0.6}

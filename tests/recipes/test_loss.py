@@ -13,8 +13,8 @@ SEE = """
 import numpy as np
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.squares.stage_residuals import finishing_residuals
-from mfo_backend.metrics.loss import make_loss
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.losses.loss import make_loss
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 
 reference, image = (0.02 * 10 ** np.random.default_rng(0).uniform(0, 2, (2, 12, 15, 3))).astype(np.float32)

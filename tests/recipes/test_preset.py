@@ -17,7 +17,7 @@ def test_a_new_preset_is_known_everywhere(tmp_path: Path) -> None:
         from mfo_backend.bench.runs.method import DEFAULT_METHODS
         from mfo_backend.fit.plans import RecordedPlan
         from mfo_backend.fit.settings import FitSettings
-        from mfo_backend.job.run_job import _BYTES_PER_PIXEL
+        from mfo_backend.job.run.run_job import _BYTES_PER_PIXEL
 
         settings = FitSettings(preset="draft")
         print(PRESET_ITEMS[0][0], settings.preset, DEFAULT_METHODS[0], RecordedPlan.of("draft").grid_last,

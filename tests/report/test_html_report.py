@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.report.html_report import ReportContent, report_html
 from mfo_backend.report.picture import displayed, displayed_linear, png_bytes
 from mfo_backend.report.value_table import swatch_colour, value_text

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.report.live_pictures import LARGEST_MAP, LARGEST_SIDE, LivePictures
 from mfo_backend.types.image import Encoding, Image
 

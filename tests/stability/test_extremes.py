@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.job.make_job import make_job
-from mfo_backend.job.progress import EventWriter
-from mfo_backend.job.run_job import run_job
-from mfo_backend.job.stop import StopSignal
+from mfo_backend.job.folder.make_job import make_job
+from mfo_backend.job.output.progress import EventWriter
+from mfo_backend.job.run.run_job import run_job
+from mfo_backend.job.run.stop import StopSignal
 from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.status import Status
 

@@ -33,11 +33,11 @@ def without_times(result: dict[str, Any]) -> dict[str, Any]:
 
 def results(threads: int, folder: Path) -> dict[str, Any]:
     """Of every job the result and a digest of its picture."""
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()
-    from mfo_backend.render.variant import load_variant, use_threads
+    from mfo_backend.render.machine.variant import load_variant, use_threads
 
     load_variant()
     use_threads(threads)

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.compare import compare_images
+from ...metrics.judgement import judge_images
 from ...metrics.judges.hdr_vdp_program import is_configured
-from ...metrics.judges.judgement import judge_images
 from ...metrics.judges.packages import require_pycvvdp
-from ...render.plain_picture import PlainScene
-from ...render.renderer import Renderer, load_renderer
+from ...render.pictures.plain_picture import PlainScene
+from ...render.pictures.renderer import Renderer, load_renderer
 from ...scene.image_file import read_image
 from ...types.errors import MfoError
 from ...types.image import Encoding, Image, Pixels

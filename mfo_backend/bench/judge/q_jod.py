@@ -11,7 +11,7 @@ import numpy as np
 from ...metrics.judges.display_light import DisplayLight
 from ...metrics.judges.hdr_vdp import hdr_vdp_q_jods
 from ...metrics.judges.viewing import HDR_VIEWING
-from ...metrics.response import nits_per_unit
+from ...metrics.responses.response import nits_per_unit
 from ...types.image import Pixels
 from ..rows.row import Row
 

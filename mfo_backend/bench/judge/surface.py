@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...fit.judge.checked_reference import stage_losses
 from ...fit.recover_material import recover_material
 from ...fit.settings import FitSettings
-from ...render.mitsuba_renderer import MitsubaRenderer, load_mitsuba_renderer
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer, load_mitsuba_renderer
 from ...types.errors import BadInputError
 from ...types.event import Event, StageEnd
 from ...types.image import Pixels

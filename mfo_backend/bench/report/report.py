@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
-from ...job.atomic_file import write_atomically
+from ...job.folder.atomic_file import write_atomically
 from ..rows.findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
 from ..rows.row import Row
 from ..rows.row_file import RowFile

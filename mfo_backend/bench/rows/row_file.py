@@ -11,8 +11,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from ...job.atomic_file import write_atomically
-from ...job.progress import finite
+from ...job.folder.atomic_file import write_atomically
+from ...job.output.progress import finite
 from ...types.errors import BadInputError
 from .row import Key, Row
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.tone_mapping import DisplayView
+from ...metrics.display.tone_mapping import DisplayView
 from ...report.picture import displayed_linear
 from ...types.image import Pixels
 from .row import Task

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...fit.result.outcome import FitOutcome
 from ...fit.settings import FitSettings
-from ...job.atomic_file import write_atomically
+from ...job.folder.atomic_file import write_atomically
 from ...types.errors import SetupError
 from ...types.event import Event, StageEnd
 from ...types.image import Pixels
@@ -60,11 +60,11 @@ class FitRunner:
         threads: int = 0,
         host: CallsBlender | None = None,
     ) -> None:
-        from ...render.llvm import configure_llvm, needs_llvm
+        from ...render.machine.llvm import configure_llvm, needs_llvm
 
         if needs_llvm():
             configure_llvm()  # before the first import of drjit
-        from ...render.variant import load_variant, thread_count, use_threads
+        from ...render.machine.variant import load_variant, thread_count, use_threads
 
         self.size = size
         began = time.monotonic()
@@ -128,7 +128,7 @@ class FitRunner:
 
     def _fit(self, task: Task, settings: FitSettings, should_stop: Callable[[], bool]) -> _Measured:
         from ...fit.recover_material import recover_material
-        from ...render.mitsuba_renderer import load_mitsuba_renderer
+        from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
         began, method = time.monotonic(), METHODS[task.method]
         # a renderer of its own for every fit: passes count from 0 and nothing is left over from the fit before

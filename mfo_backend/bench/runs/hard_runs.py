@@ -14,11 +14,11 @@ from ...fit.recorded.where_to_look import detail_grid
 from ...fit.recover_material import recover_material
 from ...fit.settings import FitSettings
 from ...metrics.compare import compare_images
-from ...metrics.tone_mapping import DisplayView
-from ...render.highlight_cells import Highlights
-from ...render.mitsuba_renderer import MitsubaRenderer
-from ...render.renderer import Renderer, load_renderer
-from ...render.widened_mask import widened
+from ...metrics.display.tone_mapping import DisplayView
+from ...render.camera.highlight_cells import Highlights
+from ...render.camera.widened_mask import widened
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.pictures.renderer import Renderer, load_renderer
 from ...types.certainty import Level
 from ...types.errors import MfoError
 from ...types.image import Encoding, Image, Pixels
@@ -112,7 +112,7 @@ class ExactPicture:
     """
 
     def __init__(self, renderer: Renderer, vector: NDArray[np.float64]) -> None:
-        from ...render.recorded_scene import RecordedScene
+        from ...render.paths.recorded_scene import RecordedScene
 
         assert isinstance(renderer, MitsubaRenderer)
         mask = renderer.target_mask()

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from ...job.result import versions
+from ...job.output.result import versions
 
 
 def machine_facts(variant: str, *, threads: int, import_seconds: float) -> dict[str, Any]:

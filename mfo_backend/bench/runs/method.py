@@ -11,8 +11,8 @@ import numpy as np
 
 from ...fit.plans import RecordedPlan
 from ...fit.settings import FitSettings
-from ...metrics.loss import make_loss
-from ...metrics.loss_names import OPTIONAL_LOSS_NAMES
+from ...metrics.losses.loss import make_loss
+from ...metrics.losses.loss_names import OPTIONAL_LOSS_NAMES
 from ...types.errors import SetupError
 from ...types.image import Encoding, Image
 from ..scenes.scenario import Scenario

@@ -20,11 +20,11 @@ PARTS = ("record", "render", "jacobian", "metric", "solve", "files", "other")
 _PACKAGE = str(Path(__file__).parents[2])
 # the innermost frame in one of these files or folders of the package decides
 _PLACES = {
-    "render/record_paths.py": "record",
-    "render/recorded_background.py": "record",
-    "render/proposal.py": "record",
-    "render/recorded_jacobian.py": "jacobian",
-    "render/recorded_paths.py": "jacobian",
+    "render/paths/record_paths.py": "record",
+    "render/paths/recorded_background.py": "record",
+    "render/paths/proposal.py": "record",
+    "render/paths/recorded_jacobian.py": "jacobian",
+    "render/paths/recorded_paths.py": "jacobian",
     "render/": "render",
     "material/": "render",
     "metrics/": "metric",

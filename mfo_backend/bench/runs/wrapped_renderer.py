@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.renderer import Pullback, Renderer, Vector
+from ...render.pictures.renderer import Pullback, Renderer, Vector
 from ...types.image import Pixels
 
 

@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-from ...job.atomic_file import write_atomically
-from ...job.fit_scene import request_materials
-from ...job.job_folder import JobFolder
-from ...job.request import read_request
-from ...material.principled_parameters import PARAMETER_OF_SOCKET
+from ...job.folder.atomic_file import write_atomically
+from ...job.folder.job_folder import JobFolder
+from ...job.folder.request import read_request
+from ...job.run.fit_scene import request_materials
+from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
 from ...types.parameter import Value
 from .scenario import Scenario
 from .scene import BenchScene

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...material.mitsuba_parameters import MITSUBA_PRINCIPLED
-from ...material.principled_parameters import BLENDER_PRINCIPLED, SOCKET_OF_PARAMETER
+from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, SOCKET_OF_PARAMETER
 from ...types.parameter import Value
 from .assets import Assets, Mesh, Probe
 from .scenario import Scenario

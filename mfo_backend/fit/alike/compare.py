@@ -16,7 +16,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.blender_selection import AMOUNT_OF
+from ...material.principled.blender_selection import AMOUNT_OF
 from ...types.parameter import ParameterTable
 from ..squares.problem import Problem, Rival
 from ..squares.recording_noise import rows_of_samples

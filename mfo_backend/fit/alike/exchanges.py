@@ -9,8 +9,8 @@ up where they promise no less.
 *Metals.* A black dielectric and a dark metal differ in their reflectance at normal incidence alone.
 
 *Widths.* Cycles clamps the larger of the anisotropic lobe's two widths, roughness^2 / stretch, at 1
-(`material/layers.py`). Past that only the other one counts, roughness^2 x stretch. A fit that ends short of the clamp
-knows nothing of the flat part: its derivatives call both values determined.
+(`material/principled/layers.py`). Past that only the other one counts, roughness^2 x stretch. A fit that ends short of
+the clamp knows nothing of the flat part: its derivatives call both values determined.
 """
 
 from __future__ import annotations

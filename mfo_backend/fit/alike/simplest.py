@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.blender_selection import AMOUNT_OF
+from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable
 from ..squares.problem import Problem, Refined, Rival

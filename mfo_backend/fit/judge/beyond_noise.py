@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.colour import srgb_from_linear
-from ...metrics.flip import flip_map
-from ...metrics.neighbours import sums_around
+from ...metrics.display.colour import srgb_from_linear
+from ...metrics.flip.ldr_flip import flip_map
+from ...metrics.pixels.neighbours import sums_around
 from ...types.verdict import Difference
 
 # Pixels between two whose differences are multiplied. Those next to each other may share some of their noise: by

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.loss import Loss, make_loss
-from ...metrics.tone_mapping import DisplayView, View
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...metrics.losses.loss import Loss, make_loss
 from ...types.errors import BadInputError
 from ...types.image import Image, Pixels
 from ..settings import FitSettings

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.baked_view import HALF_LEVEL, BakedView
-from ...metrics.pixel_check import check_finite
-from ...metrics.tone_mapping import DisplayView, View
-from ...render.renderer import Renderer
+from ...metrics.display.baked_view import HALF_LEVEL, BakedView
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...metrics.pixels.pixel_check import check_finite
+from ...render.pictures.renderer import Renderer
 from ...types.event import Listener
 from ...types.image import Encoding, Image, Pixels
 from ..settings import FitSettings

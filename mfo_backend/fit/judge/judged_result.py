@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.tone_mapping import View
+from ...metrics.display.tone_mapping import View
 from ...types.certainty import Certainty, Level
 from ...types.image import Image, Pixels
 from ...types.parameter import Value

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.widened_mask import widened
+from ...render.camera.widened_mask import widened
 from ...types.verdict import Cause
 
 MOST_SHIFT = 5  # pixels that a picture is tried to be moved by, along each axis

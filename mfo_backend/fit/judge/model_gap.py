@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.block_means import block_sums
-from ...metrics.colour import linear_from_srgb
-from ...metrics.neighbours import sums_around
-from ...metrics.tone_mapping import View
+from ...metrics.display.colour import linear_from_srgb
+from ...metrics.display.tone_mapping import View
+from ...metrics.flip.block_means import block_sums
+from ...metrics.pixels.neighbours import sums_around
 from ...types.image import Encoding, Image, Pixels
 from ...types.model_gap import ModelGap
 from ..tolerances import DIM_FLOOR

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.block_means import block_means, block_side, full_blocks, means_beside
-from ...metrics.exposure_range import lit_exposures
-from ...metrics.flip_error import flip_error
-from ...metrics.flip_filters import DEFAULT_PIXELS_PER_DEGREE, flip_reach
-from ...metrics.hdr_flip import HdrFlip
-from ...metrics.squared_loss import mean_squared_error
-from ...metrics.tone_mapping import DisplayView, View
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside
+from ...metrics.flip.exposure_range import lit_exposures
+from ...metrics.flip.flip_error import flip_error
+from ...metrics.flip.flip_filters import DEFAULT_PIXELS_PER_DEGREE, flip_reach
+from ...metrics.flip.hdr_flip import HdrFlip
+from ...metrics.losses.squared_loss import mean_squared_error
 from ...types.image import Encoding, Image, Pixels
 from .region import blocks_around
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.block_means import block_means, block_side, block_sums, full_blocks, spread
-from ...metrics.loss import Loss
-from ...metrics.tone_mapping import DisplayView, View
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...metrics.flip.block_means import block_means, block_side, block_sums, full_blocks, spread
+from ...metrics.losses.loss import Loss
 from ...types.image import Encoding, Image, Pixels
 from ..settings import FitSettings
 from .checked_reference import counted_pixels, stage_losses

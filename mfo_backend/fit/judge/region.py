@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.loss import Loss
+from ...metrics.losses.loss import Loss
 from ...types.image import Encoding, Image, Pixels
 
 

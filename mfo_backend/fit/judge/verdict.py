@@ -8,10 +8,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.block_means import block_side, block_sums
-from ...metrics.colour import linear_from_srgb, srgb_from_linear
-from ...metrics.tone_mapping import DisplayView, View
-from ...render.widened_mask import widened
+from ...metrics.display.colour import linear_from_srgb, srgb_from_linear
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...metrics.flip.block_means import block_side, block_sums
+from ...render.camera.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
 from ...types.verdict import Difference, Judgement, Verdict
 from .beyond_noise import NEXT, beyond_noise

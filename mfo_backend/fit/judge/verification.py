@@ -12,12 +12,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.block_means import block_side, full_blocks, means_beside
-from ...metrics.flip_error import shown
-from ...metrics.tone_mapping import View
-from ...render.mitsuba_renderer import MitsubaRenderer
-from ...render.renderer import Vector
-from ...render.widened_mask import widened
+from ...metrics.display.tone_mapping import View
+from ...metrics.flip.block_means import block_side, full_blocks, means_beside
+from ...metrics.flip.flip_error import shown
+from ...render.camera.widened_mask import widened
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.pictures.renderer import Vector
 from ...types.image import Encoding, Image, Pixels
 from ..random_streams import Stream
 from ..result.outcome import Candidate

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ...render.renderer import Interrupted, Renderer, Vector
+from ...render.pictures.renderer import Interrupted, Renderer, Vector
 from ...types.image import Pixels
 from ..judge.checked_reference import stage_losses
 from ..judge.fit_task import FitTask

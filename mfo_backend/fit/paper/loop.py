@@ -23,8 +23,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...metrics.loss import Loss
-from ...render.renderer import Interrupted, Renderer, Vector
+from ...metrics.losses.loss import Loss
+from ...render.pictures.renderer import Interrupted, Renderer, Vector
 from ...solve.adam import Adam
 from ...solve.stopping import Stopping, StoppingRules
 from ...types.event import Listener

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...metrics.baked_view import BakedView
-from ...metrics.tone_mapping import DisplayView
-from ...render.mitsuba_renderer import MitsubaRenderer
+from ...metrics.display.baked_view import BakedView
+from ...metrics.display.tone_mapping import DisplayView
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...types.image import Pixels
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.weak_combinations import weak_combinations
@@ -62,7 +62,7 @@ class RecordedRoute:
     """
 
     def __init__(self, task: FitTask, renderer: MitsubaRenderer, plan: RecordedPlan | None) -> None:
-        from ...render.recorded_scene import RecordedScene
+        from ...render.paths.recorded_scene import RecordedScene
 
         settings = task.settings
         self._task, self._renderer = task, renderer

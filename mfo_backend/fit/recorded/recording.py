@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.primary_rays import TILE
-from ...render.recorded_image import RECALLED, RecordedImage
-from ...render.recorded_paths import LaneGroups, RecordedPaths
-from ...render.recorded_scene import MOST_LANES, RecordedScene
+from ...render.camera.primary_rays import TILE
+from ...render.paths.recorded_image import RECALLED, RecordedImage
+from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
+from ...render.paths.recorded_scene import MOST_LANES, RecordedScene
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..plans import RecordedPlan

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.block_means import block_sums
-from ...metrics.neighbours import next_to, sums_around
-from ...render.primary_rays import TILE
-from ...render.recorded_paths import LaneGroups, RecordedPaths
+from ...metrics.flip.block_means import block_sums
+from ...metrics.pixels.neighbours import next_to, sums_around
+from ...render.camera.primary_rays import TILE
+from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
 from ...types.image import Pixels
 from ..tolerances import DIM_FLOOR
 

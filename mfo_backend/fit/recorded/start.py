@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.primary_rays import TILE
-from ...render.recorded_paths import LaneGroups
-from ...render.recorded_scene import MOST_LANES
+from ...render.camera.primary_rays import TILE
+from ...render.paths.recorded_paths import LaneGroups
+from ...render.paths.recorded_scene import MOST_LANES
 from ...solve.bounded_least_squares import Solution
 from ...types.errors import UnrecordableError
 from ..result.course import Stage

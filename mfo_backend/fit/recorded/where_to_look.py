@@ -9,9 +9,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.colour import luminance
-from ...render.recorded_paths import LaneGroups, RecordedPaths
-from ...render.widened_mask import widened
+from ...metrics.display.colour import luminance
+from ...render.camera.widened_mask import widened
+from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
 from ...types.image import Pixels
 from ..plans import RecordedPlan
 from ..tolerances import DIM_FLOOR
@@ -21,7 +21,7 @@ MINIMUM_INTERIOR_SHARE = 0.3
 MINIMUM_LIGHT_SHARE = 0.5  # of the target's light in the reference
 MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target lights the silhouette and little else
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
-# the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/highlight_cells.py`).
+# the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/camera/highlight_cells.py`).
 GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60

@@ -8,7 +8,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.renderer import Renderer
+from ...render.pictures.renderer import Renderer
 from ...types.event import BestValues, Listener
 from ...types.result import FitResult
 from ...types.status import Status

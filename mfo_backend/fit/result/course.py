@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.renderer import Renderer
+from ...render.pictures.renderer import Renderer
 from ...solve.bounded_least_squares import NormalEquations
 from ...types.event import Listener, Preview, Progress, StageEnd
 from ...types.image import Pixels

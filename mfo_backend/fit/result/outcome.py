@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.renderer import Renderer
+from ...render.pictures.renderer import Renderer
 from ...types.certainty import Certainty, WeakCombination
 from ...types.image import Pixels
 from ...types.result import FitResult, StageReport

@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ...render.recorded_image import RecordedImage
-from ...render.recorded_paths import LaneGroups
-from ...render.renderer import Vector
+from ...render.paths.recorded_image import RecordedImage
+from ...render.paths.recorded_paths import LaneGroups
+from ...render.pictures.renderer import Vector
 from ...solve.bounded_least_squares import NormalEquations
 from ..tolerances import DIM_FLOOR
 from .recording_noise import rows_of_samples, unbiased_equations

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.recorded_image import TwoSamples
+from ...render.paths.recorded_image import TwoSamples
 from ...solve.bounded_least_squares import NormalEquations
 from .residuals import Residual, gram_of, rows_and_slope, sloped
 

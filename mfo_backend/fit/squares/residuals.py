@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.baked_view import BakedView
-from ...metrics.response import ChannelResponse, Logarithmic, Response
+from ...metrics.display.baked_view import BakedView
+from ...metrics.responses.response import ChannelResponse, Logarithmic, Response
 from ...solve.bounded_least_squares import NormalEquations
 from ..tolerances import DIM_FLOOR, MODEL_ERROR
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.loss import squared_response
-from ...metrics.tone_mapping import View
+from ...metrics.display.tone_mapping import View
+from ...metrics.losses.loss import squared_response
 from ...types.image import Encoding, Pixels
 from ..settings import FitSettings
 from .residuals import MakeResidual, RelativeResidual, ResponseResidual

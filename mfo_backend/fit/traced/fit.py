@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.mitsuba_renderer import MitsubaRenderer
-from ...render.prepared_material import EMISSION
+from ...render.models.prepared_material import EMISSION
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...types.certainty import Certainty, Level
 from ...types.errors import UnrecordableError
 from ...types.image import Pixels
@@ -32,7 +32,7 @@ from .polished import CORE, Polished
 from .stages import TransmissionFit
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
-    from ...render.traced_paths import TracedPaths
+    from ...render.paths.traced_paths import TracedPaths
 
 STAGES = ("scan", "race", "polish")
 _PREVIEW_PATHS, _PREVIEW_SPP = 1 << 15, 2  # a quarter of a launch, whatever the size of the picture
@@ -59,7 +59,7 @@ class TracedRoute:
         renderer: MitsubaRenderer,
         plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
     ) -> None:
-        from ...render.traced_paths import TracedPaths
+        from ...render.paths.traced_paths import TracedPaths
 
         if EMISSION in renderer.table.names:
             raise UnrecordableError("Stages on whole light paths hold the emission as it is.")

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.tone_mapping import View
-from ...render.recorded_image import TwoSamples
+from ...metrics.display.tone_mapping import View
+from ...render.paths.recorded_image import TwoSamples
 from ...types.image import Image, Pixels
 from ..judge.model_gap import model_gap
 from ..random_streams import Stream

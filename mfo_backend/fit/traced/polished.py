@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.blender_selection import AMOUNT_OF
+from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import SafeMatrix
 from ...types.parameter import ParameterTable

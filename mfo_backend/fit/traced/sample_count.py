@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.neighbours import neighbour_pairs, sums_around
+from ...metrics.pixels.neighbours import neighbour_pairs, sums_around
 from ...types.image import Pixels
 from ..tolerances import DIM_FLOOR
 

@@ -24,7 +24,7 @@ from .sample_count import MOST_COUNT, Recount
 from .sample_pools import TilePools
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
-    from ...render.traced_paths import TracedPaths
+    from ...render.paths.traced_paths import TracedPaths
 
 Vector = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types.errors import BadInputError
-from ..pixel_check import check_pair
+from ..pixels.pixel_check import check_pair
 from .packages import CVVDP, require_pycvvdp, require_torch
 from .viewing import Viewing
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..response import ChannelResponse
+from ..responses.response import ChannelResponse
 
 Array = NDArray[np.floating]
 

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types.errors import BadInputError, SetupError
-from ..flip_filters import DEFAULT_PIXELS_PER_DEGREE
-from ..pixel_check import check_pair
+from ..flip.flip_filters import DEFAULT_PIXELS_PER_DEGREE
+from ..pixels.pixel_check import check_pair
 from .hdr_vdp_program import FOLDER_VARIABLE, find_code, find_program
 
 Array = NDArray[np.floating]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..flip_filters import DEFAULT_PIXELS_PER_DEGREE
+from ..flip.flip_filters import DEFAULT_PIXELS_PER_DEGREE
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..pu21 import pu21, pu21_slope
-from ..response import ChannelResponse
+from ..responses.pu21 import pu21, pu21_slope
+from ..responses.response import ChannelResponse
 
 Array = NDArray[np.floating]
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from mfo_backend.bench.runs.wrapped_renderer import NewSeeds, Watched
-from mfo_backend.render.pass_counter import PassCounter
+from mfo_backend.render.pictures.pass_counter import PassCounter
 
 
 class Counting:

@@ -10,7 +10,7 @@ import pytest
 
 from mfo_backend.fit.alike.compare import compare, rival_notes
 from mfo_backend.fit.squares.problem import Rival
-from mfo_backend.render.recorded_image import TwoSamples
+from mfo_backend.render.paths.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import NormalEquations
 from mfo_backend.types.parameter import Parameter, ParameterTable
 

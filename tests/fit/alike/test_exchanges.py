@@ -11,7 +11,7 @@ import pytest
 
 from mfo_backend.fit.alike.exchanges import F0_OF_LEVEL, best_basin, metal_exchanged, metal_rivals, moved, width_rivals
 from mfo_backend.fit.squares.residuals import normal_equations
-from mfo_backend.render.recorded_image import TwoSamples
+from mfo_backend.render.paths.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import SolveLimits, solve_bounded
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
@@ -155,7 +155,7 @@ BRUSHED = ParameterTable([Parameter("roughness", 1, 0.02, 1.0, 0.5), Parameter("
 
 
 def widths(x):
-    """Of Blender's anisotropic lobe (`material/layers.py`)."""
+    """Of Blender's anisotropic lobe (`material/principled/layers.py`)."""
     roughness, stretch = x[0], np.sqrt(1.0 - 0.9 * x[1])
     return min(roughness**2 / stretch, 1.0), roughness**2 * stretch
 

@@ -19,7 +19,7 @@ from mfo_backend.fit.certainty.covariance import with_rivals
 from mfo_backend.fit.squares.problem import Refined, Rival
 from mfo_backend.fit.squares.residuals import normal_equations
 from mfo_backend.fit.tolerances import HOPELESS
-from mfo_backend.render.recorded_image import TwoSamples
+from mfo_backend.render.paths.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import SolveLimits, solve_bounded
 from mfo_backend.types.parameter import Parameter, ParameterTable
 

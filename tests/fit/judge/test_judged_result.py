@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from mfo_backend.fit.judge.judged_result import judged_result
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.certainty import Certainty, Level
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.result import FitResult

@@ -8,7 +8,7 @@ import pytest
 
 from mfo_backend.fit.judge.model_gap import model_gap
 from mfo_backend.fit.tolerances import DIM_FLOOR
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.model_gap import ModelGap
 

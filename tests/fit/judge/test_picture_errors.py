@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.judge.picture_errors import picture_errors
-from mfo_backend.metrics import block_means as blocks
-from mfo_backend.metrics.exposure_range import lit_exposures
-from mfo_backend.metrics.flip_error import flip_error
-from mfo_backend.metrics.hdr_flip import hdr_flip_map
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.flip import block_means as blocks
+from mfo_backend.metrics.flip.exposure_range import lit_exposures
+from mfo_backend.metrics.flip.flip_error import flip_error
+from mfo_backend.metrics.flip.hdr_flip import hdr_flip_map
 from mfo_backend.types.image import Encoding, Image
 
 HEIGHT, WIDTH = 90, 110

@@ -9,8 +9,8 @@ import pytest
 from mfo_backend.fit.judge.minimise_flip import minimise_flip
 from mfo_backend.fit.judge.picture_judge import PictureJudge, _MaskedBlur
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.metrics import block_means
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.flip import block_means
 from mfo_backend.types.image import Encoding, Image
 
 SIZE = 24

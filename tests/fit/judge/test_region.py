@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.judge.region import MaskedLoss, blocks_around, fill_outside
-from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.losses.loss import make_loss
 from mfo_backend.types.image import Encoding, Image
 
 

@@ -9,8 +9,8 @@ from scipy.ndimage import gaussian_filter
 
 from mfo_backend.fit.judge.beyond_noise import beyond_noise
 from mfo_backend.fit.judge.verdict import is_worse, judge
-from mfo_backend.metrics.colour import srgb_from_linear
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.colour import srgb_from_linear
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.verdict import Cause, Verdict
 

@@ -17,9 +17,9 @@ from mfo_backend.fit.judge.verification import (
     SHOWN_SAMPLES,
     Verification,
 )
-from mfo_backend.metrics.tone_mapping import DisplayView
-from mfo_backend.render.pass_counter import PassCounter
-from mfo_backend.render.widened_mask import widened
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.render.camera.widened_mask import widened
+from mfo_backend.render.pictures.pass_counter import PassCounter
 from mfo_backend.types.image import Encoding, Image
 
 SHAPE = (32, 32, 3)
@@ -240,10 +240,10 @@ def test_what_is_shown_has_some_more_samples_within_the_limit(size, shown):
 
 
 def test_no_piece_of_a_whole_frame_repeats_the_numbers_of_further_samples():
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     load_variant()
-    from mfo_backend.render.pixel_pictures import pieces_of
+    from mfo_backend.render.pictures.pixel_pictures import pieces_of
 
     mask = np.zeros((2160, 3840), bool)
     mask[:100, :100] = True

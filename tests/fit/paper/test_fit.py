@@ -11,7 +11,7 @@ import pytest
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.result.outcome import FitOutcome
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.metrics.colour import srgb_from_linear
+from mfo_backend.metrics.display.colour import srgb_from_linear
 from mfo_backend.types.errors import BadInputError, SetupError
 from mfo_backend.types.event import Started
 from mfo_backend.types.image import Encoding, Image

@@ -7,7 +7,7 @@ import pytest
 from mfo_backend.fit.paper.loop import StagesOutcome, run_stages
 from mfo_backend.fit.result.outcome import Candidate
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.losses.loss import make_loss
 from mfo_backend.types.event import Preview, Progress, StageEnd
 from mfo_backend.types.status import Status
 

@@ -8,14 +8,14 @@ import pytest
 
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.metrics.tone_mapping import DisplayView
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.event import Preview, Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
-from tests.metrics.view_tables import baked, filmic
+from tests.metrics.display.view_tables import baked, filmic
 from tests.render.scenes import AREA, POINT, SKY, write_scene
 
 REDUCED = ["base_color", "roughness", "metallic", "specular"]
@@ -165,7 +165,7 @@ def test_previews_come_at_most_once_a_second_and_show_the_fit(tmp_path):
 
 
 def test_a_start_without_finite_numbers_is_left_out(tmp_path, monkeypatch):
-    from mfo_backend.render.recorded_jacobian import RecordedJacobian
+    from mfo_backend.render.paths.recorded_jacobian import RecordedJacobian
 
     renderer = load(tmp_path, POINT, size=24)
     reference = renderer.image(renderer.table.pack(TRUTHS[0]), seed=5, spp=256)
@@ -181,7 +181,7 @@ def test_a_start_without_finite_numbers_is_left_out(tmp_path, monkeypatch):
 
 
 def test_no_finite_number_anywhere_falls_back_to_the_paper_and_says_so(tmp_path, monkeypatch):
-    from mfo_backend.render.recorded_jacobian import RecordedJacobian
+    from mfo_backend.render.paths.recorded_jacobian import RecordedJacobian
 
     renderer = load(tmp_path, POINT, ["roughness"], size=16)
     reference = renderer.image(renderer.table.pack({"roughness": 0.3}), seed=5, spp=64)
@@ -282,7 +282,7 @@ def test_a_mirror_like_metal_is_not_taken_for_a_black_plastic(tmp_path):
     }
     x = renderer.table.pack(truth)
     from mfo_backend.fit.recorded.where_to_look import detail_grid
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     # a recording as reference: path tracing finds a highlight narrower than a pixel by luck only
     scene, mask = RecordedScene(renderer, 3000), renderer.target_mask()
@@ -321,7 +321,7 @@ def test_a_large_target_is_fitted_on_some_of_its_pixels(tmp_path, monkeypatch, l
     from mfo_backend.fit.plans import RecordedPlan
     from mfo_backend.fit.recorded import fit as recorded_fit
     from mfo_backend.fit.recorded import where_to_look as choose_groups
-    from mfo_backend.render import recorded_scene
+    from mfo_backend.render.paths import recorded_scene
 
     renderer = load(tmp_path, POINT, size=64)
     reference = renderer.image(renderer.table.pack(TRUTHS[1]), seed=5, spp=1024)

@@ -8,7 +8,7 @@ import pytest
 
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.status import Status
 from tests.render.scenes import LAMPS, write_scene

@@ -15,8 +15,8 @@ from mfo_backend.fit.recorded import keep_user_values as kept_values
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.squares.problem import Rival
-from mfo_backend.metrics.loss import make_loss
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.metrics.losses.loss import make_loss
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.solve.bounded_least_squares import NormalEquations
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.image import Encoding, Image

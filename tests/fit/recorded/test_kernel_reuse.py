@@ -11,7 +11,7 @@ mi.set_variant("llvm_ad_rgb")
 
 from mfo_backend.fit.recover_material import recover_material  # noqa: E402  after the variant is set
 from mfo_backend.fit.settings import FitSettings  # noqa: E402
-from mfo_backend.render.renderer import load_renderer  # noqa: E402
+from mfo_backend.render.pictures.renderer import load_renderer  # noqa: E402
 from mfo_backend.types.image import Encoding, Image  # noqa: E402
 from mfo_backend.types.light_paths import LightPaths  # noqa: E402
 from tests.render.scenes import FLOOR, write_scene  # noqa: E402

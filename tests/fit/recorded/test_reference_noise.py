@@ -13,15 +13,15 @@ SIZE = 64
 
 @pytest.fixture(scope="module")
 def module():
-    from mfo_backend.render.llvm import configure_llvm, needs_llvm
+    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
 
     if needs_llvm():
         configure_llvm()
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     load_variant()
     from mfo_backend.fit.recorded import reference_noise as tile_noise
-    from mfo_backend.render.primary_rays import tile_order
+    from mfo_backend.render.camera.primary_rays import tile_order
 
     return SimpleNamespace(tile_noise=tile_noise.tile_noise, tile_order=tile_order)
 

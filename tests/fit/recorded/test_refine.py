@@ -12,7 +12,7 @@ import pytest
 
 from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.squares.problem import Refined
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.render.pictures.renderer import load_renderer
 from tests.fit.recorded.one_refine import refine
 from tests.render.scenes import AREA, SKY, write_scene
 

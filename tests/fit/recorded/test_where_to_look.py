@@ -69,10 +69,10 @@ def test_the_solution_is_recorded_more_finely_where_it_has_detail_unless_that_is
 
 def recorded(inside_lanes, silhouette_lanes):
     """A target of 8 x 8 pixels in a frame of 12 x 12, whose border is half background."""
-    from mfo_backend.render.variant import load_variant
+    from mfo_backend.render.machine.variant import load_variant
 
     load_variant()
-    from mfo_backend.render.recorded_paths import RecordedPaths
+    from mfo_backend.render.paths.recorded_paths import RecordedPaths
 
     pixel = np.arange(144).reshape(12, 12)[2:10, 2:10].ravel()
     border = np.ones((8, 8), bool)

@@ -12,8 +12,8 @@ from mfo_backend.fit.result import best_so_far
 from mfo_backend.fit.result.best_so_far import BestSoFar
 from mfo_backend.fit.result.outcome import Candidate
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.metrics.loss import make_loss
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.metrics.losses.loss import make_loss
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.event import BestValues
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.parameter_bounds import narrowed

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.result.outcome import START_KEPT, Choice, End, RouteEnds, final_result
-from mfo_backend.material.principled_parameters import BLENDER_PRINCIPLED
+from mfo_backend.material.principled.principled_parameters import BLENDER_PRINCIPLED
 from mfo_backend.types.status import Status
 
 TABLE = BLENDER_PRINCIPLED.select(["base_color", "roughness"])

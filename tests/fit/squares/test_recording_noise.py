@@ -14,7 +14,7 @@ from mfo_backend.fit.squares.recording_noise import (
     without_own_noise,
 )
 from mfo_backend.fit.squares.residuals import RelativeResidual, WeightedResidual, log_residual, normal_equations
-from mfo_backend.render.recorded_image import TwoSamples
+from mfo_backend.render.paths.recorded_image import TwoSamples
 
 RNG = np.random.default_rng(7)
 GROUPS = 4000

@@ -18,11 +18,11 @@ from mfo_backend.fit.squares.residuals import (
     normal_equations,
     residual_rows,
 )
-from mfo_backend.metrics.itp import Itp
-from mfo_backend.metrics.pu21 import Pu21
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.responses.itp import Itp
+from mfo_backend.metrics.responses.pu21 import Pu21
 
-from ...metrics.view_tables import baked, filmic
+from ...metrics.display.view_tables import baked, filmic
 
 RNG = np.random.default_rng(2)
 REFERENCE = RNG.uniform(0.05, 2.0, (50, 3))

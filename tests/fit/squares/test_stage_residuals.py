@@ -8,8 +8,8 @@ import pytest
 
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.squares.stage_residuals import finishing_residuals
-from mfo_backend.metrics.loss import make_loss, squared_response
-from mfo_backend.metrics.tone_mapping import DisplayView
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.losses.loss import make_loss, squared_response
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
 

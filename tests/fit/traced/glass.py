@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.image import Encoding, Image
 from tests.render.scenes import AREA, FLOOR, SKY, write_scene
 

@@ -14,7 +14,7 @@ import pytest
 import scipy.ndimage
 
 from mfo_backend.metrics.judges.viewing import HDR_VIEWING, Viewing
-from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.losses.loss import make_loss
 from mfo_backend.scene.image_file import read_image
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image

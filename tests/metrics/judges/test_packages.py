@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mfo_backend.metrics.judgement import judge_images
 from mfo_backend.metrics.judges import packages
-from mfo_backend.metrics.judges.judgement import judge_images
-from mfo_backend.metrics.loss import make_loss
-from mfo_backend.metrics.loss_names import OPTIONAL_LOSS_NAMES
+from mfo_backend.metrics.losses.loss import make_loss
+from mfo_backend.metrics.losses.loss_names import OPTIONAL_LOSS_NAMES
 from mfo_backend.types.errors import SetupError
 from mfo_backend.types.image import Encoding, Image
 
@@ -67,7 +67,7 @@ def test_a_comparison_without_judges_has_no_score_and_one_note(monkeypatch):
 
 def test_losses_and_comparison_import_no_torch():
     code = (
-        "import sys, mfo_backend.metrics.loss, mfo_backend.metrics.judges.judgement, mfo_backend.cli.compare\n"
+        "import sys, mfo_backend.metrics.losses.loss, mfo_backend.metrics.judgement, mfo_backend.cli.commands.compare\n"
         "print(sorted({'torch', 'pycvvdp', 'lpips'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from mfo_backend.metrics.judges.packages import LPIPS, require_torch
-from mfo_backend.metrics.loss import make_loss
+from mfo_backend.metrics.losses.loss import make_loss
 from mfo_backend.types.errors import BadInputError, SetupError
 from mfo_backend.types.image import Encoding, Image
 

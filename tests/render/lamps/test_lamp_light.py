@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from mfo_backend.render.variant import load_variant
+from mfo_backend.render.machine.variant import load_variant
 from tests.render.scenes import LAMPS
 
 HIGH = 2.0  # metres from the lamp to the origin, whose normal points to it

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.light_paths import LightPaths
 from tests.render.scenes import FLOOR, LAMPS, POINT, SKY, write_scene
 
@@ -25,7 +25,7 @@ def load(folder, lights, sockets=GLAZE, *, model="blender_principled", **options
 
 
 def recorded(renderer, vector, grid=24):
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
     paths = scene.record(vector, grid=grid, seed=3, near=False)
@@ -85,7 +85,7 @@ def test_paths_through_glass_meet_lamps(tmp_path, camera):
 target="0, 0, 0" up="0, 0, 1"/></transform><rgb name="radiance" value="3, 4, 5"/></emitter>"""
     lights = behind.replace("</emitter>", SEEN) if camera else behind
     renderer = load(tmp_path, lights + LAMPS["sphere"], GLASS, depth=6)
-    from mfo_backend.render.traced_paths import TracedPaths
+    from mfo_backend.render.paths.traced_paths import TracedPaths
 
     pixels = np.flatnonzero(renderer.target_mask().ravel())
     x = renderer.table.pack({"base_color": (0.9, 0.8, 0.7), "roughness": 0.3})

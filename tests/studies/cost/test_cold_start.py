@@ -11,8 +11,8 @@ import sys
 import pytest
 
 from mfo_backend.fit.settings import FitSettings
-from mfo_backend.job.make_job import make_job
-from mfo_backend.render.renderer import load_renderer
+from mfo_backend.job.folder.make_job import make_job
+from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.scene.image_file import write_exr
 from studies.cost.cold_start import PHASES, ROOT, table
 from tests.render.scenes import AREA, FLOOR, POINT, write_scene

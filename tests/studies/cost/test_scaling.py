@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mfo_backend.render.recorded_image import RecordedImage
+from mfo_backend.render.paths.recorded_image import RecordedImage
 from studies.cost.scaling import FEW, SERIES, Point, cost, exponents, page, plot
 
 POINTS = [Point(x, 8 * x, {"evaluation": 1e-5 * x**0.5, "recording": 2e-5 * x}) for x in (100, 400, 1600)]

@@ -86,7 +86,7 @@ def test_the_gradient_of_recorded_pictures(tmp_path, monkeypatch):
     study.prepare()
     from mfo_backend.bench.scenes.assets import Assets
     from mfo_backend.bench.scenes.scene import write_scene
-    from mfo_backend.render.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     written = write_scene(study.SCENARIOS[0], 0, 16, Assets(None), tmp_path)
     renderer = study._load(written.file)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files of a node graph's values: plain arrays of one size inside the job folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.lib import format as npy
+
+from ...types.errors import BadInputError
+from .job_folder import JobFolder
+
+LARGEST_SIDE = 4 * 16384  # subpixels
+_VALUES = np.dtype("<f4")
+
+
+def check_graph_files(folder: JobFolder, positions: str | None, sockets: Mapping[str, str]) -> None:
+    """Check the file of `positions` and those of the values by socket.
+
+    Raises
+    ------
+    BadInputError
+        If one is missing, outside the folder, no array of float32 (height, width, 1 or 3), cut off, or of another size
+        than the positions; or there are values without positions.
+    """
+    if positions is None:
+        if sockets:
+            name = next(iter(sockets))
+            raise BadInputError(f"request.json: socket {name!r} has a graph, but there is no entry 'graph': add it.")
+        return
+    size = _size(folder.file(positions, what="request.json: graph.positions"))
+    if size[2] != 3:
+        raise BadInputError(f"{positions} has {size[2]} numbers for a position: it must have 3.")
+    for name, file in sockets.items():
+        found = _size(folder.file(file, what=f"request.json: graph of {name}"))
+        if found[:2] != size[:2]:
+            raise BadInputError(f"{file} is {found[1]} x {found[0]}, but {positions} {size[1]} x {size[0]}.")
+
+
+def _size(path: Path) -> tuple[int, int, int]:
+    """Height, width and numbers of each place; nothing of the content is read."""
+    try:
+        with path.open("rb") as file:
+            read = npy.read_array_header_1_0 if npy.read_magic(file) == (1, 0) else npy.read_array_header_2_0
+            shape, by_columns, kind = read(file)
+            left = path.stat().st_size - file.tell()
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"{path.name} is no array that NumPy reads ({error}): export the job anew.") from None
+    fits = len(shape) == 3 and shape[2] in (1, 3) and all(0 < side <= LARGEST_SIDE for side in shape[:2])
+    if not fits or by_columns or kind != _VALUES or left != int(np.prod(shape)) * _VALUES.itemsize:
+        raise BadInputError(f"{path.name} does not hold float32 (height, width, 1 or 3): export the job anew.")
+    return shape

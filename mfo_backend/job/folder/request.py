@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""request.json: what a job asks for, checked before anything is rendered. Its keys: `docs/reference/job_folder.md`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from ...fit.settings import FitSettings
+from ...metrics.display.tone_mapping import DisplayView
+from ...types.errors import BadInputError
+from ...types.image import Encoding
+from ...types.light_paths import NO_LIMIT, LightPaths
+from .checked_object import CheckedObject, is_number, shown
+from .graph_files import check_graph_files
+from .job_folder import JobFolder
+from .scene_files import check_scene_files
+
+SCHEMA_VERSION = 1
+LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
+WHERE = "request.json"
+_KEYS = (
+    *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
+    *("film_exposure", "graph", "fit", "notes"),
+)
+
+
+@dataclass(frozen=True)
+class Target:
+    """The shape and BSDF of `scene` being fitted, and the Blender names they come from."""
+
+    shape_id: str
+    bsdf_id: str = ""
+    object: str = ""
+    material: str = ""
+    slot: int = 0
+
+
+@dataclass(frozen=True)
+class Socket:
+    """A socket of a Blender Principled node; a linked one stays as it is.
+
+    Its `texture` is a picture over the UV map, its `graph` holds what nodes give as the camera sees it; both are files
+    of the job.
+    """
+
+    value: Any = None
+    linked: bool = False
+    texture: str | None = None
+    graph: str | None = None
+
+
+@dataclass(frozen=True)
+class NodeGraph:
+    """How the target's `graph` files are seen: the (3, 4) matrix from the world to column, row and 1, and the file of
+    world positions."""
+
+    camera: tuple[tuple[float, ...], ...]
+    positions: str
+
+
+@dataclass(frozen=True)
+class Material:
+    """A Blender Principled material by socket name; colours are linear Rec.709."""
+
+    name: str
+    distribution: str
+    sockets: Mapping[str, Socket]
+    subsurface_method: str = "RANDOM_WALK"
+
+
+@dataclass(frozen=True)
+class ViewTable:
+    """The file of a view's table; `metrics.baked_view.BakedView` has what it holds."""
+
+    path: str
+    size: int
+    log2_min: float
+    log2_max: float
+
+
+@dataclass(frozen=True)
+class Request:
+    """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference."""
+
+    scene: str
+    target: Target
+    width: int
+    height: int
+    reference: str
+    encoding: Encoding
+    film_transparent: bool = False
+    view: DisplayView | None = None
+    view_table: ViewTable | None = None
+    light_paths: LightPaths | None = None
+    film_exposure: float = 1.0  # what all radiance of the scene file is multiplied with
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    graph: NodeGraph | None = None
+    fit: FitSettings = field(default_factory=FitSettings)
+    notes: tuple[str, ...] = ()
+    generator: Mapping[str, Any] = field(default_factory=dict)
+
+
+def read_request(folder: JobFolder, *, trusted: bool = False) -> Request:
+    """The checked request of a job folder; `trusted` is that of `check_scene_files`.
+
+    Raises
+    ------
+    BadInputError
+        If the file is missing, is not JSON, or anything in it is unknown, of a wrong type, out of range or points
+        outside the folder or to nothing.
+    """
+    try:
+        data = json.loads(folder.request.read_text("utf-8"))
+    except FileNotFoundError:
+        raise BadInputError(f"The job folder {folder.root} holds no request.json: give a job folder.") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadInputError(f"{folder.request} cannot be read as JSON ({error}): write it anew.") from error
+    request = request_from_json(data)
+    folder.file(request.scene, what=f"{WHERE}: scene")
+    folder.file(request.reference, what=f"{WHERE}: reference.path")
+    if request.view_table is not None:
+        folder.file(request.view_table.path, what=f"{WHERE}: view.lut.path")
+    check_scene_files(folder, request.scene, trusted=trusted)
+    for bsdf_id, material in request.materials.items():
+        for name, socket in material.sockets.items():
+            if socket.texture is not None:
+                folder.file(socket.texture, what=f"{WHERE}: materials.{bsdf_id}.sockets.{name}.texture")
+    named = request.materials.get(request.target.bsdf_id)
+    held = {name: socket.graph for name, socket in named.sockets.items() if socket.graph} if named else {}
+    check_graph_files(folder, request.graph.positions if request.graph else None, held)
+    return request
+
+
+def request_from_json(data: Any) -> Request:
+    """The request in parsed JSON; files are not looked at.
+
+    Raises
+    ------
+    BadInputError
+        For another schema version, unknown or missing keys, wrong types and values out of range.
+    """
+    version = data.get("schema_version") if isinstance(data, Mapping) else None
+    if isinstance(data, Mapping) and version != SCHEMA_VERSION:
+        raise BadInputError(
+            f"{WHERE} has schema_version {shown(version)}, this backend reads {SCHEMA_VERSION}: "
+            "use add-on and backend of one release."
+        )
+    top = CheckedObject(data, WHERE, _KEYS)
+    image = CheckedObject(top.raw("image"), f"{WHERE}: image", ("width", "height", "film_transparent"))
+    reference = CheckedObject(top.raw("reference"), f"{WHERE}: reference", ("path", "encoding"))
+    return Request(
+        scene=top.text("scene"),
+        target=_target(top.raw("target")),
+        width=image.integer("width", 1, LARGEST_SIDE),
+        height=image.integer("height", 1, LARGEST_SIDE),
+        film_transparent=image.boolean("film_transparent", False),
+        reference=reference.text("path"),
+        encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
+        view=_view(top.raw("view", None)),
+        view_table=_view_table(top.raw("view", None)),
+        light_paths=_light_paths(top.raw("light_paths", None)),
+        film_exposure=top.number("film_exposure", 1e-6, 1e6, 1.0),
+        materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
+        graph=_graph(top.raw("graph", None)),
+        fit=_fit(top.raw("fit", {})),
+        notes=top.texts("notes", ()),
+        generator=_generator(top.mapping("generator", {})),
+    )
+
+
+def request_to_json(request: Request) -> dict[str, Any]:
+    """The JSON form of a request; `request_from_json` is its inverse."""
+    materials = asdict(request)["materials"]
+    for material in materials.values():
+        material["sockets"] = {
+            name: {key: value for key, value in socket.items() if key not in ("texture", "graph") or value is not None}
+            for name, socket in material["sockets"].items()
+        }
+    view = asdict(request.view) if request.view is not None else None
+    if request.view_table is not None:
+        view = {**(view or {}), "lut": asdict(request.view_table)}
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "generator": dict(request.generator),
+        "scene": request.scene,
+        "target": asdict(request.target),
+        "image": {
+            "width": request.width,
+            "height": request.height,
+            "film_transparent": request.film_transparent,
+        },
+        "reference": {"path": request.reference, "encoding": request.encoding.value},
+        "view": view,
+        "light_paths": asdict(request.light_paths) if request.light_paths is not None else None,
+        "film_exposure": request.film_exposure,
+        "materials": materials,
+        "graph": asdict(request.graph) if request.graph is not None else None,
+        "fit": asdict(request.fit),
+        "notes": list(request.notes),
+    }
+
+
+def _generator(data: Mapping[str, Any]) -> dict[str, Any]:
+    version = data.get("blender", [5, 0])
+    if not isinstance(version, (list, tuple)) or not all(type(part) is int and 0 <= part < 1000 for part in version):
+        raise BadInputError(f"{WHERE}: generator.blender is {shown(version)}: it must be a version like [5, 0, 1].")
+    return dict(data)
+
+
+def _target(data: Any) -> Target:
+    target = CheckedObject(data, f"{WHERE}: target", ("shape_id", "bsdf_id", "object", "material", "slot"))
+    return Target(
+        shape_id=target.text("shape_id"),
+        bsdf_id=target.text("bsdf_id", ""),
+        object=target.text("object", ""),
+        material=target.text("material", ""),
+        slot=target.integer("slot", 0, 32766, 0),
+    )
+
+
+def _material(bsdf_id: str, data: Any) -> Material:
+    where = f"{WHERE}: materials.{bsdf_id}"
+    material = CheckedObject(data, where, ("name", "distribution", "subsurface_method", "sockets"))
+    sockets = {}
+    for name, entry in material.mapping("sockets").items():
+        socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture", "graph"))
+        value = socket.raw("value", None)
+        numbers = value if isinstance(value, list) else [value]
+        if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
+            raise socket.wrong("value", "a number, a list of one to four, true, false or null")
+        texture = socket.text("texture") if socket.raw("texture", None) is not None else None
+        graph = socket.text("graph") if socket.raw("graph", None) is not None else None
+        sockets[name] = Socket(value, socket.boolean("linked", False), texture, graph)
+    return Material(
+        name=material.text("name"),
+        distribution=material.text("distribution", "MULTI_GGX"),
+        sockets=sockets,
+        subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
+    )
+
+
+def _graph(data: Any) -> NodeGraph | None:
+    if data is None:
+        return None
+    graph = CheckedObject(data, f"{WHERE}: graph", ("camera", "positions"))
+    rows = graph.raw("camera")
+    if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
+        raise graph.wrong("camera", "three rows of four numbers")
+    for row in rows:
+        if not (isinstance(row, (list, tuple)) and len(row) == 4 and all(map(is_number, row))):
+            raise graph.wrong("camera", "three rows of four numbers")
+    return NodeGraph(tuple(tuple(float(number) for number in row) for row in rows), graph.text("positions"))
+
+
+def _fit(data: Any) -> FitSettings:
+    if not isinstance(data, Mapping):
+        raise BadInputError(f"{WHERE}: fit is {shown(data)}: it must be a JSON object.")
+    return FitSettings.from_request(data)
+
+
+def _view(data: Any) -> DisplayView | None:
+    if data is None:
+        return None
+    view = CheckedObject(data, f"{WHERE}: view", ("exposure_ev", "gamma", "lut"))
+    # Blender allows -32 to 32 stops and a gamma of 0 to 5, of which 0 is a black picture
+    return DisplayView(view.number("exposure_ev", -32.0, 32.0, 0.0), view.number("gamma", 0.01, 5.0, 1.0))
+
+
+def _view_table(data: Any) -> ViewTable | None:
+    if not isinstance(data, Mapping) or data.get("lut") is None:
+        return None
+    table = CheckedObject(data["lut"], f"{WHERE}: view.lut", ("path", "size", "log2_min", "log2_max"))
+    return ViewTable(
+        path=table.text("path"),
+        size=table.integer("size", 3, 128),
+        log2_min=table.number("log2_min", -64.0, 64.0),
+        log2_max=table.number("log2_max", -64.0, 64.0),
+    )
+
+
+def _light_paths(data: Any) -> LightPaths | None:
+    if data is None:
+        return None
+    counts = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+    paths = CheckedObject(data, f"{WHERE}: light_paths", ("filter_glossy", "clamp_indirect", *counts))
+    return LightPaths(
+        paths.number("filter_glossy", 0.0, 1e4, 0.0),
+        paths.number("clamp_indirect", 0.0, 1e12, 0.0),
+        *(paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts),
+    )

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fit that a job runs: the request's scene in Mitsuba against its reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.display.tone_mapping import View
+from ...types.errors import UnrecordableError
+from ...types.event import Listener
+from ...types.image import Image, Pixels
+from ...types.parameter_bounds import narrowed
+from ...types.result import FitResult
+from ...types.status import Status
+from ..folder.job_folder import JobFolder
+from ..folder.request import Request, request_to_json
+from .material_classes import (
+    MaterialClass,
+    brightest_glow,
+    changed,
+    is_better,
+    is_worth_another,
+    other_classes,
+    parameters_of,
+    tried_notes,
+    value_of,
+    with_values_of,
+)
+
+if TYPE_CHECKING:
+    from ...render.models.prepared_material import Materials
+    from ...render.pictures.renderer import Renderer
+
+_WITHOUT_LIGHT_PATHS = (
+    "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
+    "limits for one kind of bounce."
+)
+_GRAPH_AVERAGES = (
+    "The model 'mitsuba_principled' takes the averages of what nodes give ({names}), and leaves their normals out."
+)
+_GRAPH_UNSEEN = (
+    "What nodes give ({names}) is known where the camera sees the target first: light that meets it elsewhere, behind "
+    "glass or in a mirror, finds the averages."
+)
+_GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them.
+
+    Errors are those of the `counted` pixels, True (height, width).
+    """
+
+    result: FitResult
+    start_image: Pixels
+    result_image: Pixels
+    counted: NDArray[np.bool_]
+    variant: str = ""
+
+
+class Fitter(Protocol):
+    """Fits what a request asks for; tests give one that needs no renderer."""
+
+    def __call__(
+        self,
+        folder: JobFolder,
+        request: Request,
+        reference: Image,
+        view: View,
+        *,
+        listener: Listener,
+        should_stop: Callable[[], bool],
+    ) -> JobOutcome:
+        """Run the fit; errors are those of `recover_material`."""
+        ...
+
+
+def fit_scene(
+    folder: JobFolder,
+    request: Request,
+    reference: Image,
+    view: View,
+    *,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> JobOutcome:
+    """Fit the material of the request's target with Mitsuba.
+
+    Raises
+    ------
+    BadInputError
+        If the scene, the target or a parameter cannot be used.
+    SetupError
+        If Mitsuba or LLVM is missing.
+    Interrupted
+        If it was asked to stop before there was anything to keep.
+    """
+    from ...render.machine.llvm import configure_llvm, needs_llvm
+
+    if needs_llvm():
+        configure_llvm()  # before the first import of drjit, so the imports below stay here
+    from ...fit.recover_material import recover_material
+    from ...render.machine.variant import load_variant
+    from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
+    from ...render.pictures.renderer import load_renderer
+
+    materials = request_materials(folder, request)
+
+    def load(materials: Materials, parameters: str | Sequence[str]) -> Renderer:
+        renderer = load_renderer(
+            folder.root / request.scene,
+            request.target.shape_id,
+            model=request.fit.model,
+            parameters=parameters,
+            materials=materials,
+            light_paths=request.light_paths,
+        )
+        renderer.table = narrowed(renderer.table, request.fit.bounds)
+        renderer.start = renderer.table.clip(renderer.start)
+        return renderer
+
+    def fit(renderer: Renderer, *, hand_over: bool = True) -> _Fitted:
+        outcome = recover_material(
+            renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop,
+            hand_over=hand_over, noted=bool(request.notes),
+        )  # fmt: skip
+        return _Fitted(outcome.result, outcome.start_image, outcome.result_image, outcome.counted)
+
+    variant = load_variant()
+    if request.fit.preset == "paper":
+        thread = NativeThread(should_stop)
+        fitted = fit(InterruptibleRenderer(thread.call(lambda: load(materials, request.fit.parameters)), thread))
+    else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
+        renderer = load(materials, request.fit.parameters)
+        fitted = fit(renderer)
+        target = request.target.bsdf_id
+
+        def fit_from(other: MaterialClass) -> _Fitted:
+            names = parameters_of(other, renderer.table.names)
+            return fit(load(materials | {target: changed(materials[target], other)}, names), hand_over=False)
+
+        def is_wanted(found: _Fitted) -> bool:
+            return not should_stop() and is_worth_another(found.result, request.fit.parameters)
+
+        if target in materials:
+            glow = brightest_glow(reference, view, fitted.counted) / request.film_exposure
+            classes = other_classes(materials[target], glow)
+            fitted = _with_other_classes(fitted, materials[target], classes, fit_from, is_wanted)
+    result = fitted.result
+    if request.light_paths is not None and result.model == "mitsuba_principled":
+        result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
+    result = replace(result, notes=(*result.notes, *_graph_notes(request, result)))
+    return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant)
+
+
+def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """What is not held of the values that nodes give the target, in sentences."""
+    material = request.materials.get(request.target.bsdf_id)
+    held = [name for name, socket in material.sockets.items() if socket.graph] if material is not None else []
+    if not held:
+        return ()
+    names = ", ".join(held)
+    if result.model == "mitsuba_principled":
+        return (_GRAPH_AVERAGES.format(names=names),)
+    if not any("whole light paths" in note for note in result.notes):
+        return ()
+    flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
+    return (_GRAPH_UNSEEN.format(names=names), *flat)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A judged result and the pictures of `JobOutcome`."""
+
+    result: FitResult
+    start_image: Pixels
+    result_image: Pixels
+    counted: NDArray[np.bool_]
+
+
+def _with_other_classes(
+    fitted: _Fitted,
+    material: Mapping[str, Any],
+    classes: Sequence[MaterialClass],
+    fit_from: Callable[[MaterialClass], _Fitted],
+    is_wanted: Callable[[_Fitted], bool],
+) -> _Fitted:
+    """The fit or a better one of other `classes`, tried while one is wanted; where none is better, the notes say so."""
+    first, no_nearer, refused = fitted.result.recovered, [], []
+    for other in classes:
+        if not is_wanted(fitted):
+            break
+        try:
+            again = fit_from(other)
+        except UnrecordableError:
+            refused.append(other)
+            continue
+        if again.result.status is not Status.CANCELLED:
+            no_nearer.append(other)
+        fitted = _better(fitted, again, other, material)
+    if fitted.result.recovered is not first:  # the note of the class that was better says enough
+        return fitted
+    notes = (*fitted.result.notes, *tried_notes(no_nearer, refused))
+    return replace(fitted, result=replace(fitted.result, notes=notes))
+
+
+def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapping[str, Any]) -> _Fitted:
+    """The first fit, or that of another class where it is clearly better; the user's values are its start, too."""
+    before, after = first.result, again.result
+    seconds, passes = before.seconds + after.seconds, before.passes + after.passes
+    if before.judgement is None or not is_better(after.judgement, before.judgement, other):
+        return replace(first, result=replace(before, seconds=seconds, passes=passes))
+    after = with_values_of(other, after, material)
+    result = replace(
+        after,
+        initial={name: before.initial.get(name, value_of(material, name)) for name in after.recovered},
+        errors={name: (before.errors[name][0], error) for name, (_, error) in after.errors.items()},
+        notes=(*after.notes, other.note),
+        seconds=seconds,
+        passes=passes,
+    )
+    return replace(again, result=result, start_image=first.start_image)
+
+
+def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
+    """The request's materials with textures by absolute path, the Blender version and the film's exposure."""
+    materials = request_to_json(request)["materials"]
+    for material in materials.values():
+        material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
+        material["film_exposure"] = request.film_exposure
+        for name, socket in material["sockets"].items():
+            if socket.get("texture"):
+                socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
+            if socket.get("graph") and request.graph is not None:
+                socket["graph"] = str(folder.file(socket["graph"], what=f"request.json: graph of {name}"))
+                socket["positions"] = str(folder.file(request.graph.positions, what="request.json: graph.positions"))
+                socket["camera"] = request.graph.camera
+    return materials

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kinds of material that one fit does not reach from another, as starts of further fits.
+
+Recorded paths hold opaque materials only, and from an opaque start no slope leads to glass. So where the user lets all
+values be fitted and the result does not look the same, the fit begins again from the material of another class.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.principled.principled_dict import socket_value
+from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
+from ...metrics.display.tone_mapping import View
+from ...types.image import Encoding, Image
+from ...types.parameter import Value
+from ...types.result import FitResult
+from ...types.verdict import Cause, Judgement, Verdict
+
+# Socket values that a class begins with; all others stay as in the scene
+GLASS = {"Transmission Weight": 1.0, "Metallic": 0.0, "Alpha": 1.0, "Roughness": 0.1, "Base Color": [0.9, 0.9, 0.9]}
+CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
+OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
+# Layers above the emission, which dim it in Cycles and not in Mitsuba, are off
+GLOWING = OPAQUE | {"Coat Weight": 0.0, "Sheen Weight": 0.0, "Emission Color": [0.5, 0.5, 0.5]}
+_OF_GLASS = ("transmission_weight", "ior")
+_ABOVE_EMISSION = tuple(name for name in BLENDER_PRINCIPLED.names if name.startswith(("coat_", "sheen_")))
+# A glow adds to every pixel, so none is darker but by noise; of the median of the target, which may be clipped
+MOST_GLOW = 2.0
+_AROUND = (Cause.LIGHT, Cause.SURROUNDINGS, Cause.PICTURE)  # where the surroundings differ
+CLEARLY_BETTER = 0.5  # times the difference of the first result, and less than that by so much FLIP
+LEAST_GAIN = 0.01
+
+
+@dataclass(frozen=True)
+class MaterialClass:
+    """A class with the values it begins with, and what a user is told.
+
+    A fit of it changes what `all` stands for, or with `also` that, but never what is named so. A class that `glows` is
+    believed only where its light is found on the surroundings, too.
+    """
+
+    name: str
+    sockets: Mapping[str, Any]
+    also: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
+    glows: bool = False
+
+    @property
+    def note(self) -> str:
+        """For the notes of a result."""
+        return f"The material of the scene did not match, so the fit began again from one that is {self.name}."
+
+
+def tried_notes(no_nearer: Sequence[MaterialClass], refused: Sequence[MaterialClass]) -> tuple[str, ...]:
+    """For the notes of a result that no other class took the place of: what was tried, and what no fit holds."""
+    said = ["The material of the scene did not match."] if no_nearer or refused else []
+    if no_nearer:
+        said.append(f"Fits that began again from one that is {_or(no_nearer)} came not clearly nearer.")
+    if refused:
+        said.append(f"No fit holds one that is {_or(refused)}.")
+    return (" ".join(said),) if said else ()
+
+
+def _or(classes: Sequence[MaterialClass]) -> str:
+    return " or ".join(other.name for other in classes)
+
+
+_CLASSES = (
+    MaterialClass("of glass", GLASS),
+    MaterialClass("cut out", CUT_OUT, ("alpha",), _OF_GLASS),
+    MaterialClass("opaque", OPAQUE),
+)
+
+
+def _glowing(strength: float) -> MaterialClass:
+    sockets = GLOWING | {"Emission Strength": strength}
+    return MaterialClass("glowing", sockets, ("emission_color",), (*_OF_GLASS, *_ABOVE_EMISSION), glows=True)
+
+
+def brightest_glow(reference: Image, view: View, target: NDArray[np.bool_]) -> float:
+    """The radiance that the emission of a target, True (height, width), is sought below; 0 for a black one."""
+    pixels = reference.pixels if reference.encoding is Encoding.LINEAR else view.linear(reference.pixels)
+    return MOST_GLOW * max(float(np.median(pixels[target], axis=0).max()), 0.0)
+
+
+def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClass]:
+    """The classes that a material, as in request.json, is not of and may be changed to; none where links decide.
+
+    The one that glows comes first, for its fit is the quickest; its emission is at most of the radiance `glow`.
+    """
+    sockets = material["sockets"]
+    own = _class_of(sockets)
+    classes = (_glowing(glow), *_CLASSES) if glow > 0.0 else _CLASSES
+    return [
+        other for other in classes
+        if other.name != own and not any(sockets.get(name, {}).get("linked") for name in other.sockets)
+    ]  # fmt: skip
+
+
+def _class_of(sockets: Mapping[str, Any]) -> str:
+    def value(name: str, default: float) -> float:
+        found = sockets.get(name, {}).get("value")
+        return default if found is None else float(found)
+
+    if value("Alpha", 1.0) < 1.0:
+        return "cut out"
+    if value("Transmission Weight", 0.0) == 0.0:
+        return "opaque"
+    return "of glass" if value("Metallic", 0.0) == 0.0 else "glass under metal"
+
+
+def changed(material: Mapping[str, Any], to: MaterialClass) -> dict[str, Any]:
+    """The material with what the class begins with."""
+    other = copy.deepcopy(dict(material))
+    for name, value in to.sockets.items():
+        other["sockets"].setdefault(name, {})["value"] = value
+    return other
+
+
+def parameters_of(other: MaterialClass, names: Sequence[str]) -> str | list[str]:
+    """What a fit of the class changes, of values that a fit of `all` changes otherwise."""
+    if not other.also:
+        return "all"
+    return [*(name for name in names if name not in other.never), *other.also]
+
+
+def value_of(material: Mapping[str, Any], name: str) -> Value:
+    """A value of a material by the name of its parameter; Blender's own where the material has none."""
+    socket = SOCKET_OF_PARAMETER[name]
+    found = material["sockets"].get(socket, {}).get("value")
+    return BLENDER_PRINCIPLED[name].default if found is None else socket_value(socket, found)
+
+
+def is_worth_another(result: FitResult, selection: str | Sequence[str]) -> bool:
+    """Whether a result may be of the wrong class and the user lets the fit change that."""
+    judgement = result.judgement
+    if judgement is None or selection != "all" or result.model != "blender_principled":
+        return False
+    # another class has another shadow, too, so light may seem to be the cause
+    return judgement.verdict is not Verdict.SAME and judgement.cause is not Cause.PICTURE
+
+
+def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[str, Any]) -> FitResult:
+    """The result of a class with the values that the class has and the material lacks, which no fit has changed.
+
+    The emission's colour is as bright as can be and its strength has the rest, as an artist would set them.
+    """
+    values = dict(result.recovered)
+    for socket, value in other.sockets.items():
+        name = PARAMETER_OF_SOCKET[socket]
+        held = socket_value(socket, value)
+        if name not in values and not np.allclose(held, value_of(material, name)):
+            values[name] = held
+    certainty = dict(result.certainty)
+    if other.glows:
+        color, strength = np.asarray(values["emission_color"]), float(other.sockets["Emission Strength"])
+        peak = max(float(color.max()), 1e-6)
+        values |= {"emission_color": tuple(float(c) for c in color / peak), "emission_strength": strength * peak}
+        if (sure := certainty.get("emission_color")) is not None:
+            certainty["emission_color"] = replace(sure, sd=tuple(sd / peak for sd in sure.sd))
+            certainty["emission_strength"] = replace(sure, sd=(strength * max(sure.sd),))
+    bounds = {name: (BLENDER_PRINCIPLED[name].lower, BLENDER_PRINCIPLED[name].upper) for name in values}
+    return replace(result, recovered=values, certainty=certainty, bounds=bounds | dict(result.bounds))
+
+
+def is_better(judgement: Judgement | None, than: Judgement, other: MaterialClass) -> bool:
+    """Whether the result of another class is clearly nearer to the reference."""
+    if judgement is None or (other.glows and judgement.cause in _AROUND):
+        return False
+    before, after = than.target.visible, judgement.target.visible
+    return after < min(CLEARLY_BETTER * before, before - LEAST_GAIN)

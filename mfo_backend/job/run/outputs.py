@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a finished job leaves in its folder: pictures, the report and, last, result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...metrics.display.tone_mapping import View
+from ...metrics.flip.block_means import block_means, block_side, means_beside
+from ...metrics.flip.flip_error import flip_error
+from ...metrics.pixels.side_by_side import side_by_side
+from ...report.curve_picture import curve_png
+from ...report.difference_map import magma
+from ...report.html_report import ReportContent, report_html
+from ...report.picture import displayed, displayed_linear, mask_png, png_bytes
+from ...scene.image_file import write_exr
+from ...types.image import Encoding, Image
+from ..folder.atomic_file import write_atomically
+from ..folder.job_folder import JobFolder
+from ..folder.request import Request
+from ..output.progress import DIFFERENCE_PATH, PREVIEW_PATH
+from ..output.result import result_to_json, versions, write_result
+from .fit_scene import JobOutcome
+
+
+def write_outputs(
+    folder: JobFolder,
+    request: Request,
+    reference: Image,
+    view: View,
+    outcome: JobOutcome,
+    *,
+    notes: Sequence[str],
+) -> None:
+    """Write pictures, report and result.json; the last appears by rename when the others are complete.
+
+    Raises
+    ------
+    OSError, BadInputError
+        If the folder cannot be written or the disk is full.
+    """
+    side = block_side(outcome.counted)  # as `fit.picture_errors`
+    seen = means_beside(reference.encoding, Image(outcome.result_image, Encoding.LINEAR), side, view)
+    difference = flip_error(block_means(reference, side), seen, display=view)
+    shown = {
+        "reference": lambda: displayed(reference, view),
+        "start": lambda: displayed_linear(outcome.start_image, view),
+        "result": lambda: displayed_linear(outcome.result_image, view),
+        "difference": lambda: magma(difference.map),
+    }
+    files = side_by_side(lambda picture: png_bytes(picture()), list(shown.values()))
+    pictures = dict(zip(shown, files, strict=True))
+    folder.pictures.mkdir(exist_ok=True)
+    for name, data in pictures.items():
+        write_atomically(folder.pictures / f"{name}.png", data)
+    curve = curve_png(outcome.result.stages)
+    if curve is not None:
+        write_atomically(folder.pictures / "curve.png", curve)
+    write_atomically(folder.counted, mask_png(outcome.counted))
+    write_exr(folder.pictures / "result.exr", outcome.result_image)
+    report = ReportContent(
+        title=_title(request),
+        subtitle=_subtitle(request, outcome.result.model),
+        result=outcome.result,
+        pictures=pictures,
+        notes=(*notes, *outcome.result.notes),
+        versions=versions(outcome.variant),
+    )
+    write_atomically(folder.report, report_html(report).encode("utf-8"))
+    write_result(folder, result_to_json(outcome.result, notes=notes, variant=outcome.variant))
+    for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
+        (folder.root / path).unlink(missing_ok=True)
+
+
+def bytes_needed(request: Request) -> int:
+    """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, a mask and one EXR."""
+    pixels = request.width * request.height
+    return 2**20 + pixels * (4 * 3 * 3 + 1 + 12)
+
+
+def _title(request: Request) -> str:
+    target = request.target
+    material = target.material or target.bsdf_id or target.shape_id
+    return f"{material} on {target.object}" if target.object else material
+
+
+def _subtitle(request: Request, model: str) -> str:
+    kind = "scene-linear" if request.encoding.value == "linear" else "sRGB display values"
+    samples = f", {request.fit.spp} samples per pixel" if request.fit.preset == "paper" else ""
+    return (
+        f"{request.reference}, {request.width} × {request.height} pixels, {kind}; model {model}, "
+        f"preset {request.fit.preset}{samples}, seed {request.fit.seed}"
+    )

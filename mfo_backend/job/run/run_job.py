@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One job from its request to pictures, report and result; every failure is one sentence and a status."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from dataclasses import replace
+from pathlib import Path
+
+from ...render.machine.memory import require_memory
+from ...render.pictures.renderer import Interrupted
+from ...report.live_pictures import LivePictures
+from ...scene.image_file import check_reference, read_image
+from ...types.errors import MfoError
+from ...types.event import BestValues, Event, Progress
+from ...types.image import Image
+from ...types.status import Status
+from ..folder.job_folder import JobFolder, unwritable
+from ..folder.request import Request, read_request
+from ..output.progress import EventWriter
+from ..output.result import write_partial
+from .fit_scene import Fitter, fit_scene
+from .job_view import view_of
+from .outputs import bytes_needed, write_outputs
+from .stop import StopSignal
+
+# Measured on Linux (docs/reference/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are
+# mapped but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
+_STARTUP_BYTES, _MAPPED_BYTES = 150_000_000, 380_000_000
+_BYTES_PER_PIXEL = {"fast": 430, "balanced": 500, "best": 500, "paper": 500}
+_CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."
+
+
+def run_job(
+    path: Path, events: EventWriter, stop: StopSignal, *, fitter: Fitter = fit_scene, trusted: bool = False
+) -> Status:
+    """Run the job in folder `path` and report its events; the last one is always `finished` or `failed`.
+
+    Only a `trusted` job may name files that Mitsuba reads unchecked (docs/user/threats.md). A request that cannot be
+    used leaves the folder as it was. Tracebacks go to stderr only.
+    """
+    try:
+        status, sentence = _run(path, events, stop, fitter, trusted)
+    except MfoError as error:
+        return _fail(events, error.status, str(error))
+    except Interrupted:
+        return _fail(events, Status.CANCELLED, _CANCELLED_EARLY)
+    except OSError as error:
+        traceback.print_exc(file=sys.stderr)
+        refused = unwritable(path, error)
+        return _fail(events, refused.status, str(refused))
+    except ImportError as error:  # a package is missing, or there was no memory for its library
+        traceback.print_exc(file=sys.stderr)
+        what = str(error).strip().split("\n")[0][:200]
+        sentence = f"A package cannot be loaded ({what}): run `mfo doctor`, or free some memory."
+        return _fail(events, Status.SETUP, sentence)
+    except MemoryError:
+        traceback.print_exc(file=sys.stderr)
+        return _fail(events, Status.FAILED, "The fit ran out of memory: lower the resolution or the samples per pixel.")
+    except Exception as error:
+        traceback.print_exc(file=sys.stderr)
+        what = str(error).strip().split("\n")[0][:200] or "no message"
+        return _fail(
+            events, Status.FAILED, f"The fit failed ({type(error).__name__}: {what}): the log holds the details."
+        )
+    events.finished(status, sentence)
+    return status
+
+
+def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trusted: bool) -> tuple[Status, str]:
+    stop.loading(lambda: events.failed(Status.CANCELLED, _CANCELLED_EARLY))
+    folder = JobFolder.open(path)
+    request = read_request(folder, trusted=trusted)
+    require_memory(
+        _STARTUP_BYTES + request.width * request.height * _BYTES_PER_PIXEL[request.fit.preset],
+        mapped=_MAPPED_BYTES,
+        what=f"A fit of {request.width}x{request.height} pixels",
+        cure="lower the resolution, or free some memory or raise its limit",
+    )
+    reference, notes = read_reference(folder, request)
+    view = view_of(folder, request, reference)
+    folder.require_space(bytes_needed(request))
+    small = LivePictures(reference, view)
+    events.attach(folder, small.current, small.difference)
+
+    said = tuple(dict.fromkeys((*request.notes, *notes)))  # the export may have said the same of the reference
+
+    def listener(event: Event) -> None:
+        if isinstance(event, BestValues):
+            write_partial(folder, event.result, notes=said)
+            return
+        if isinstance(event, Progress):
+            stop.loaded()
+        events(event)
+
+    outcome = fitter(folder, request, reference, view, listener=listener, should_stop=stop.requested)
+    stop.loaded()
+    write_outputs(folder, request, reference, view, outcome, notes=said)
+    folder.cancel.unlink(missing_ok=True)  # it has been answered
+    return outcome.result.status, outcome.result.message
+
+
+def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[str, ...]]:
+    """The checked reference with the request's encoding, and notes on what was changed in it.
+
+    Raises
+    ------
+    BadInputError
+        If it cannot be read, has another size than the scene, is all black or holds NaN or infinite pixels.
+    """
+    path = folder.file(request.reference, what="request.json: reference.path")
+    image = read_image(path, (request.width, request.height))
+    return check_reference(replace(image, encoding=request.encoding), request.width, request.height)
+
+
+def _fail(events: EventWriter, status: Status, sentence: str) -> Status:
+    events.failed(status, sentence)
+    return status

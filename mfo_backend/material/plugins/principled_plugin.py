@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Mitsuba plugin `blender_principled`. Choose the variant, an RGB one with derivatives, before importing this.
+
+Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a nested texture read at the surface point,
+further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will
+change after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later
+brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
+no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `filtered` (false) reads
+the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of Mitsuba 3.9 looks at: the integrator
+`cycles_path` puts Filter Glossy there. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
+`<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be textures of world directions on the camera's side, zero
+for the mesh's own.
+
+A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
+on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
+tells the radiance by view direction. The tangent is that of Mitsuba's shading frame, dp/du of the UV map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ...types.errors import SetupError
+from ...types.parameter import Value
+from ..cycles_model import cycles_model
+from ..principled.blender_principled import evaluate
+from ..principled.bumped_normals import valid_normal
+from ..principled.layers import Layers, layer_stack
+from ..principled.lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
+from ..principled.needed_lobes import needed_lobes
+from ..principled.principled_parameters import BLENDER_PRINCIPLED
+
+PLUGIN_NAME = "blender_principled"
+DIRECTIONS = ("normal", "coat_normal", "tangent")
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """The layers at a surface point, and their frame in the world where it is not that of the point."""
+
+    layers: Layers
+    si: Any
+    frame: Any
+
+    def to_local(self, wo: Any) -> Any:
+        """A direction of the point's frame in that of the layers."""
+        return self.layers.to_frame(wo if self.frame is None else self.frame.to_local(self.si.to_world(wo)))
+
+    def from_local(self, direction: Any) -> Any:
+        """The inverse of `to_local`."""
+        wo = self.layers.from_frame(direction)
+        return wo if self.frame is None else self.si.to_local(self.frame.to_world(wo))
+
+
+class BlenderPrincipled(mi.BSDF):
+    """Blender's Principled BSDF, two-sided, with Cycles' two-directional convention (`wi` is the camera's side)."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        mi.BSDF.__init__(self, props)
+        if not mi.is_rgb:
+            raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
+        version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
+        self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")))
+        self.filtered = bool(props.get("filtered", False))
+        self.reachable_only = not props.get("unreachable_refraction", True)
+        self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
+        BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
+        self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
+        fixed: dict[str, Value | None] = {}
+        for item in BLENDER_PRINCIPLED:
+            value: Any = props.get(item.name, item.default)
+            if isinstance(value, mi.Texture):
+                fixed[item.name] = None
+            elif item.size == 3:
+                value = mi.Color3f(value)
+                fixed[item.name] = tuple(float(value[k][0]) for k in range(3))
+            else:
+                fixed[item.name] = float(value)
+                value = mi.Float(value)
+            setattr(self, item.name, value)
+        self.directions = {name: props[name] for name in DIRECTIONS if name in props}
+        self.fixed = fixed
+        self._choose_lobes()
+        # A lobe that is left out keeps its literal values, which the compiler removes
+        for item in BLENDER_PRINCIPLED:
+            if item.name in self.given or item.name in self.free:
+                dr.make_opaque(getattr(self, item.name))
+
+    def _choose_lobes(self) -> None:
+        self.lobes = needed_lobes(self.fixed, self.free)
+        both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        varying = mi.BSDFFlags.SpatiallyVarying if None in self.fixed.values() else mi.BSDFFlags.Empty
+        components = [mi.BSDFFlags.GlossyReflection | both | varying]
+        if self.lobes.dielectric or self.lobes.sheen:
+            components.append(mi.BSDFFlags.DiffuseReflection | both | varying)
+        if self.lobes.transmission:
+            components.append(mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.NonSymmetric | both | varying)
+        if self.lobes.alpha:
+            components.append(mi.BSDFFlags.Null | both | varying)
+        if self.lobes.anisotropic:
+            components = [flag | mi.BSDFFlags.Anisotropic for flag in components]
+        self.m_components = components
+        flags = components[0]
+        for flag in components[1:]:
+            flags |= flag
+        self.m_flags = flags
+        # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
+        above = mi.Vector3f(0, 0, 1)
+        for index in (mi.Float(1.5), dr.opaque(mi.Float, 1.5)):  # known and unknown ones read other tables
+            indices = {"ior": index, "coat_ior": index, "specular_ior_level": index}
+            evaluate(layer_stack(indices, above, self.lobes, self.model), above)
+            evaluate(layer_stack({"ior": index, "coat_ior": index}, above, self.lobes, self.model), above)
+
+    def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Show every value; those of lobes that are left out too, so that a caller can set them."""
+        for item in BLENDER_PRINCIPLED:
+            callback.put(item.name, getattr(self, item.name), mi.ParamFlags.Differentiable)
+        for name, texture in self.directions.items():
+            callback.put(name, texture, mi.ParamFlags.NonDifferentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        """Trace the lobes of the changed values from now on, whatever they are."""
+        changed = {key.split(".")[0] for key in keys or ()} & set(BLENDER_PRINCIPLED.names)
+        if changed - self.free:
+            self.free |= changed
+            self._choose_lobes()
+        for name in changed:
+            dr.make_opaque(getattr(self, name))
+
+    def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
+        """Parameter values at a surface point, by name."""
+        values: dict[str, Any] = {}
+        for item in BLENDER_PRINCIPLED:
+            value = getattr(self, item.name)
+            if isinstance(value, mi.Texture):
+                value = value.eval_1(si, active) if item.size == 1 else mi.Color3f(value.eval(si, active))
+            values[item.name] = value
+        return values
+
+    def bumped_frame(
+        self, si: mi.SurfaceInteraction3f, active: Any
+    ) -> tuple[mi.Frame3f, mi.Vector3f, dict[str, mi.Vector3f]]:
+        """The frame of the microfacet lobes at a surface point, the view in it, and the other normals in it by name."""
+        view: Any = si.to_world(si.wi)
+        side: Any = dr.mulsign(mi.Float(1), si.wi.z)
+        smooth: Any = mi.Vector3f(si.sh_frame.n) * side
+        geometric = mi.Vector3f(si.n)
+        geometric = dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
+        given = {name: mi.Vector3f(texture.eval(si, active)) for name, texture in self.directions.items()}
+
+        def normal(name: str, instead: mi.Vector3f) -> mi.Vector3f:
+            if name not in given:
+                return instead
+            length = dr.norm(given[name])
+            return dr.select(length > 0.1, given[name] / dr.maximum(length, 1e-6), instead)
+
+        bumped = normal("normal", smooth)
+        coat = valid_normal(geometric, view, normal("coat_normal", smooth))
+        up = valid_normal(geometric, view, bumped)
+        along = normal("tangent", mi.Vector3f(si.sh_frame.s))
+        n = up * side
+        s = dr.normalize(along - n * dr.dot(n, along))
+        # a frame turned to the view is left-handed
+        own: Any = si.sh_frame
+        handed = dr.dot(dr.cross(own.n, own.s), own.t)
+        frame = mi.Frame3f(s, dr.mulsign(dr.cross(n, s), handed), n)
+        others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
+        return frame, frame.to_local(view), {name: frame.to_local(other) for name, other in others.items()}
+
+    def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> _Surface:
+        values, wi, frame = self.values_at(si, active), si.wi, None
+        if self.directions:
+            frame, wi, normals = self.bumped_frame(si, active)
+            values |= normals
+        layers = layer_stack(values, wi, self.lobes, self.model)
+        return _Surface(layers.blurred(si.duv_dx.x) if self.filtered else layers, si, frame)
+
+    def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
+        return lobe_choice(layers, with_transparency=self.lobes.alpha)
+
+    def _value(self, layers: Layers, local: Any) -> Any:
+        return mi.Color3f(evaluate(layers, local, reachable_only=self.reachable_only))
+
+    def _density(self, layers: Layers, choice: LobeChoice, local: Any) -> Any:
+        return pdf(layers, choice, local, reachable_only=self.reachable_only)
+
+    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """f_r |cos|, RGB."""
+        surface = self._layers(si, active)
+        return dr.select(active, self._value(surface.layers, surface.to_local(wo)), 0)
+
+    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """Density of `sample` per solid angle."""
+        surface = self._layers(si, active)
+        layers = surface.layers
+        return dr.select(active, self._density(layers, self._choice(ctx, layers), surface.to_local(wo)), 0)
+
+    def eval_pdf(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
+    ) -> tuple[Any, Any]:
+        """`eval` and `pdf`, the layers evaluated once."""
+        surface = self._layers(si, active)
+        layers, local = surface.layers, surface.to_local(wo)
+        density = self._density(layers, self._choice(ctx, layers), local)
+        return dr.select(active, self._value(layers, local), 0), dr.select(active, density, 0)
+
+    def sample(
+        self,
+        ctx: mi.BSDFContext,
+        si: mi.SurfaceInteraction3f,
+        sample1: Any,
+        sample2: mi.Point2f,
+        active: Any = True,
+    ) -> tuple[mi.BSDFSample3f, Any]:
+        """A direction of any lobe and value over density; straight through with probability 1 - alpha."""
+        surface = self._layers(si, active)
+        layers = surface.layers
+        choice = self._choice(ctx, layers)
+        local, lobe, valid = sample(layers, choice, sample1, sample2)
+        valid &= active
+        density = self._density(layers, choice, local)
+        weight = self._value(layers, local) / dr.maximum(density, 1e-30)
+        weight = dr.select(density > 0, weight, 0)
+        glass = lobe == NAMES.index("glass")
+        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
+        kind = dr.select(glass & (local.z < 0), mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
+        if choice["transparent"] is not None:
+            through = lobe == NAMES.index("transparent")
+            density = dr.select(through, choice["transparent"], density)
+            weight = dr.select(through, mi.Color3f(layers.transparency / dr.maximum(density, 1e-12)), weight)
+            kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.Null), kind)
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = surface.from_local(local)
+        bs.pdf = dr.select(valid, density, 0)
+        bs.eta = 1.0  # radiance is not scaled at the interface
+        bs.sampled_type = kind
+        bs.sampled_component = mi.UInt32(0)
+        return bs, dr.select(valid, weight, 0)
+
+    def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
+        """Share of light that passes unchanged, 1 - alpha."""
+        alpha = self.values_at(si, active)["alpha"]
+        return dr.select(active, mi.Color3f(1 - alpha), 0) if self.lobes.alpha else mi.Color3f(0)
+
+    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
+        """Base colour."""
+        return mi.Color3f(self.values_at(si, active)["base_color"])
+
+    def to_string(self) -> str:
+        """Short description."""
+        shown = ", ".join(f"{name}={getattr(self, name)}" for name in self.given)
+        return f"BlenderPrincipled[{shown}]"
+
+
+def register() -> None:
+    """Make `blender_principled` known to Mitsuba in the current variant."""
+    mi.register_bsdf(PLUGIN_NAME, BlenderPrincipled)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which values of Blender's Principled BSDF a fit changes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from ...types.errors import BadInputError
+from ...types.parameter import ParameterTable
+from .principled_parameters import BLENDER_PRINCIPLED
+
+REDUCED = ("base_color", "metallic", "roughness", "specular_ior_level")  # the paper's scenario "Parameters"
+# Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR and tint from its weight;
+# transmission, film, anisotropy and diffuse roughness join when the material has them already.
+OPAQUE = (*REDUCED, "specular_tint", "coat_weight", "coat_roughness", "sheen_weight", "sheen_roughness", "sheen_tint")
+_WITH = {
+    "transmission_weight": ("transmission_weight", "ior"),
+    "anisotropic": ("anisotropic", "anisotropic_rotation"),
+    "thin_film_thickness": ("thin_film_thickness", "thin_film_ior"),
+    "diffuse_roughness": ("diffuse_roughness",),
+}
+# Without an amount of the second the first has no effect
+AMOUNT_OF = {
+    "coat_roughness": "coat_weight",
+    "coat_ior": "coat_weight",
+    "coat_tint": "coat_weight",
+    "sheen_roughness": "sheen_weight",
+    "sheen_tint": "sheen_weight",
+    "thin_film_ior": "thin_film_thickness",
+    "anisotropic_rotation": "anisotropic",
+    "emission_color": "emission_strength",
+}
+# It multiplies the emission's colour, so that one of them is enough
+FIXED = ("emission_strength",)
+
+
+def select_blender_parameters(
+    selection: str | Sequence[str], *, present: Collection[str] = (), linked: Collection[str] = ()
+) -> ParameterTable:
+    """The parameters to fit, in the table's order.
+
+    Parameters
+    ----------
+    selection
+        ``"all"``, ``"reduced"`` (base colour, metallic, roughness, specular level) or names.
+    present
+        Names whose weight the material sets to something other than 0.
+    linked
+        Names that a texture feeds; they stay fixed.
+
+    Raises
+    ------
+    BadInputError
+        For unknown, linked or ineffective names, and when nothing is left to fit.
+    """
+    names = ", ".join(name for name in BLENDER_PRINCIPLED.names if name not in FIXED)
+    if isinstance(selection, str):
+        if selection not in ("all", "reduced"):
+            raise BadInputError(f'Unknown parameter set {selection!r}: give "all", "reduced" or names of {names}.')
+        wanted = list(REDUCED if selection == "reduced" else OPAQUE)
+        if selection == "all":
+            wanted += [extra for name, extras in _WITH.items() if name in present for extra in extras]
+        return BLENDER_PRINCIPLED.select(name for name in wanted if name not in linked)
+    table = BLENDER_PRINCIPLED.select(selection)
+    for name in table.names:
+        if name in FIXED:
+            raise BadInputError(
+                f"Parameter {name!r} cannot be fitted: it multiplies 'emission_color', fit that; choose among {names}."
+            )
+        if name in linked:
+            raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")
+        if name in AMOUNT_OF and AMOUNT_OF[name] not in {*present, *linked, *table.names}:
+            cure = "give it a value in the scene" if AMOUNT_OF[name] in FIXED else f"add {AMOUNT_OF[name]!r}"
+            raise BadInputError(f"Parameter {name!r} has no effect while {AMOUNT_OF[name]!r} is 0: {cure}.")
+    return table

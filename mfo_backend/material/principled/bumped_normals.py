@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Cycles does with a normal that nodes give: which one each lobe takes, and what is lost at the mesh's own.
+
+All directions lie on the side of the view. Sources: Cycles' treatment of linked normals (Blender 5.0), checked against
+its pictures; the terminator is Chiang, Li, Burley, "Taming the Shadow Terminator" (2019), in Estevez' form of a
+microfacet surface that shades the bumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...types.parameter import Parameter, ParameterTable
+from ..arrays import dual as dr
+
+# In the frame whose third axis is the normal of the microfacet lobes: the mesh's smooth normal, the one that nodes give
+# (of diffuse and sheen) and that of the coat
+BUMPED_NORMALS = ParameterTable(
+    Parameter(name, 3, -1.0, 1.0, (0.0, 0.0, 1.0)) for name in ("smooth_normal", "bumped_normal", "coat_normal")
+)
+# a reflection at a valid normal leaves the mesh's own plane by this cosine, or by a share of the view's
+LEAST_COSINE, SHARE_OF_VIEW = 0.01, 0.9
+TERMINATOR = 0.125  # alpha^2 of the bumps by the squared tangent of the angle between the normals
+
+
+@dataclass(frozen=True)
+class BumpedNormals:
+    """The mesh's `smooth` normal, that of diffuse lobes and that of the coat, in the frame of the layers."""
+
+    smooth: Any
+    diffuse: Any
+    coat: Any
+
+    @staticmethod
+    def of(parameters: Mapping[str, Any], turn: Any) -> BumpedNormals | None:
+        """Those among the parameters, through `turn` into the layers' frame; None for a surface without."""
+        if "bumped_normal" not in parameters:
+            return None
+        return BumpedNormals(*(turn(parameters[p.name]) for p in BUMPED_NORMALS))
+
+    def lit(self, normal: Any, wo: Any) -> Any:
+        """Whether a lobe about `normal` sees light from `wo`: on the same side of the mesh as of its own plane."""
+        return (dr.dot(normal, wo) > 0) & (dr.dot(self.smooth, wo) * dr.dot(self.smooth, normal) >= 0)
+
+    def terminator(self, wo: Any) -> Any:
+        """Share of the light from `wo` on a diffuse lobe that other bumps leave, the G1 of a GGX surface."""
+        ci, cd = dr.abs(dr.dot(self.smooth, wo)), dr.abs(dr.dot(self.smooth, self.diffuse))
+        alpha2 = dr.minimum(TERMINATOR * _tangent2(cd), 1)
+        return 2 / (1 + dr.sqrt(1 + alpha2 * _tangent2(ci)))
+
+
+def about(normal: Any, direction: Any) -> Any:
+    """`direction` in some frame whose third axis is `normal`: isotropic lobes ask for no more."""
+    vector = dr.kind_of(direction)
+    # the first axis of the layers' frame, made perpendicular
+    x = dr.normalize(vector(1 - normal.x * normal.x, -normal.x * normal.y, -normal.x * normal.z))
+    y = vector(
+        normal.y * x.z - normal.z * x.y,
+        normal.z * x.x - normal.x * x.z,
+        normal.x * x.y - normal.y * x.x,
+    )
+    return vector(dr.dot(direction, x), dr.dot(direction, y), dr.dot(direction, normal))
+
+
+def valid_normal(geometric: Any, view: Any, normal: Any) -> Any:
+    """The nearest normal to `normal` whose mirrored view does not go below the mesh's plane.
+
+    It turns in the plane of `normal` and `geometric`: with x and z along its axes, the mirrored view's z is a threshold
+    where 4 z^4 - ... is quadratic in z^2, and of its two roots the one towards `normal` is taken.
+    """
+    mirrored = 2 * dr.dot(normal, view) * normal - view
+    iz = dr.dot(view, geometric)
+    threshold = dr.minimum(SHARE_OF_VIEW * iz, LEAST_COSINE)
+    x_axis = dr.normalize(normal - dr.dot(normal, geometric) * geometric)
+    ix = dr.dot(view, x_axis)
+    a = dr.square(ix) + dr.square(iz)
+    b = 2 * (a + iz * threshold)
+    root = dr.safe_sqrt(dr.square(b) - 4 * a * dr.square(threshold + iz))
+    z2 = dr.clip(0.25 * (b + dr.select(ix < 0, root, -root)) / dr.maximum(a, 1e-12), 0, 1)
+    turned = dr.sqrt(1 - z2) * x_axis + dr.sqrt(z2) * geometric
+    return dr.select(dr.dot(geometric, mirrored) < threshold, turned, normal)
+
+
+def _tangent2(cosine: Any) -> Any:
+    return dr.maximum(dr.rcp(dr.square(dr.clip(cosine, 1e-6, 1))) - 1, 0)

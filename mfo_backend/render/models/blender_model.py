@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes whose materials are Blender's Principled BSDF as Cycles evaluates it (our Mitsuba plugin)."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.principled.blender_selection import select_blender_parameters
+from ...material.principled.principled_dict import blender_principled_dict, socket_value
+from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
+from ...scene.scene_xml import Element, Target
+from ...types.errors import BadInputError, UnrecordableError
+from ...types.parameter import Value
+from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
+
+SOCKETS = frozenset(PARAMETER_OF_SOCKET)
+_VERSION = (5, 0)  # of a job that does not say which Blender it comes from
+
+
+def prepare_blender_principled(
+    scene: Element, target: Target, selection: str | Sequence[str], materials: Materials
+) -> PreparedMaterial:
+    """Replace every BSDF that `materials` describes by sockets, wrappers included; the target's opens `selection`.
+
+    Entries of `materials` are those of request.json; `blender_version` and `film_exposure` may be added to each, and
+    the `texture` of a socket is an absolute path.
+
+    Raises
+    ------
+    BadInputError
+        If the sockets of the target are not given, or a parameter cannot be fitted.
+    """
+    if target.bsdf_id not in materials:
+        known = ", ".join(map(repr, materials)) or "none"
+        raise BadInputError(
+            f"Material {target.bsdf_id!r} has no sockets for model 'blender_principled' (given: {known}): "
+            "export the scene from Blender or choose 'mitsuba_principled'."
+        )
+    sockets = materials[target.bsdf_id]["sockets"]
+    linked = {PARAMETER_OF_SOCKET[name] for name, socket in sockets.items() if socket.get("linked") and name in SOCKETS}
+    present = [name for name, value in _constants(sockets).items() if value != 0.0]
+    table = select_blender_parameters(selection, present=present, linked=linked)
+    start = table.clip(table.pack(_constants(sockets)))
+    opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in table.unpack(start).items()}
+    textures = _textures(scene)
+    # a light Cycles does not sample: directions no microfacet of rough glass leads to do not count there
+    uniform = {emitter.get("type") for emitter in scene.iter("emitter")} == {"constant"}
+    for bsdf in scene.findall("bsdf"):
+        bsdf_id = bsdf.get("id", "")
+        if bsdf_id not in materials:
+            continue
+        free = [name for name in table.names if name != EMISSION] if bsdf_id == target.bsdf_id else ()
+        described = dict(materials[bsdf_id]["sockets"]) | (opened if free else {})
+        properties = blender_principled_dict(
+            described,
+            distribution=materials[bsdf_id].get("distribution", "MULTI_GGX"),
+            version=materials[bsdf_id].get("blender_version", _VERSION),
+            free=free,
+            unreachable_refraction=not uniform,
+        )
+        _rewrite(bsdf, bsdf_id, properties, textures)
+    outer = target.outer
+    key_ends, factors = {name: name for name in table.names}, {}
+    if EMISSION in table.names:
+        strength = float(np.ravel(_constants(sockets)["emission_strength"])[0])
+        factors[EMISSION] = strength * materials[target.bsdf_id].get("film_exposure", 1.0)
+        key_ends[EMISSION] = RADIANCE_KEY
+        _open_emission(scene, target.shape_id, factors[EMISSION] * start[table.slice_of(EMISSION)])
+    return PreparedMaterial(table, start, Target(target.shape_id, target.bsdf_id, outer, outer), key_ends, factors)
+
+
+def _open_emission(scene: Element, shape_id: str, radiance: NDArray[np.float64]) -> None:
+    """Give the shape an area emitter of this radiance instead of any other."""
+    shapes = {shape.get("id"): shape for shape in scene.iter("shape")}
+    if f"{shape_id}_back" in shapes:
+        raise UnrecordableError(
+            "The target is open and glows on both sides: the emission of one side alone can be fitted."
+        )
+    shape = shapes[shape_id]
+    for emitter in shape.findall("emitter"):
+        shape.remove(emitter)
+    emitter = ElementTree.SubElement(shape, "emitter", type="area")
+    ElementTree.SubElement(emitter, "rgb", name="radiance", value=", ".join(repr(float(v)) for v in radiance))
+
+
+def _constants(sockets: Mapping[str, Mapping[str, Any]]) -> dict[str, Value]:
+    values: dict[str, Value] = {}
+    for socket, content in sockets.items():
+        if socket in SOCKETS and content.get("value") is not None:
+            values[PARAMETER_OF_SOCKET[socket]] = socket_value(socket, content["value"])
+    return values
+
+
+def _textures(scene: Element) -> dict[str, Element]:
+    """Bitmap textures of the scene by file name, with the UV transform the exporter gave them."""
+    found = {}
+    for texture in scene.iter("texture"):
+        for child in texture.findall("string"):
+            if child.get("name") == "filename":
+                found[PurePosixPath(child.get("value", "").replace("\\", "/")).name] = texture
+    return found
+
+
+def _rewrite(bsdf: Element, bsdf_id: str, properties: Mapping[str, Any], textures: Mapping[str, Element]) -> None:
+    for child in list(bsdf):
+        bsdf.remove(child)
+    bsdf.attrib.clear()
+    bsdf.attrib.update({"type": str(properties["type"]), "id": bsdf_id})
+    for name, value in properties.items():
+        if name == "type":
+            continue
+        if isinstance(value, str):
+            ElementTree.SubElement(bsdf, "string", name=name, value=value)
+        elif isinstance(value, Mapping) and value["type"] == "projective":
+            bsdf.append(_projective(name, value))
+        elif isinstance(value, Mapping) and value["type"] == "rgb":
+            ElementTree.SubElement(bsdf, "rgb", name=name, value=", ".join(map(repr, value["value"])))
+        elif isinstance(value, Mapping):
+            file = PurePosixPath(value["filename"]).name
+            texture = copy.deepcopy(textures[file]) if file in textures else _bitmap(value["filename"])
+            texture.attrib.pop("id", None)
+            texture.set("name", name)
+            bsdf.append(texture)
+        else:
+            ElementTree.SubElement(bsdf, "float", name=name, value=repr(float(value)))
+
+
+def _projective(name: str, properties: Mapping[str, Any]) -> Element:
+    texture = ElementTree.Element("texture", type="projective", name=name)
+    for key in ("filename", "positions", "camera"):
+        ElementTree.SubElement(texture, "string", name=key, value=properties[key])
+    outside = properties["outside"]
+    if isinstance(outside, Sequence):
+        ElementTree.SubElement(texture, "rgb", name="outside", value=", ".join(repr(float(v)) for v in outside))
+    else:
+        ElementTree.SubElement(texture, "float", name="outside", value=repr(float(outside)))
+    return texture
+
+
+def _bitmap(filename: str) -> Element:
+    texture = ElementTree.Element("texture", type="bitmap")
+    ElementTree.SubElement(texture, "string", name="filename", value=filename)
+    ElementTree.SubElement(texture, "boolean", name="raw", value="true")
+    return texture

@@ -1,0 +1,396 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trace a scene once and keep what a change of the target's material cannot alter."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.arrays.own_memory import own_memory
+from ...types.errors import BadInputError
+from ...types.light_paths import LightPaths
+from ..camera.highlight_cells import Highlights, highlight_cells
+from ..camera.pixel_cells import PixelCells
+from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
+from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
+from ..transport.smooth_facets import ShadowTerminator, seen_side
+from ..transport.traced_radiance import traced_radiance
+from .even_points import even_points
+from .proposal import DefensiveProposal
+from .recorded_background import add_radiance, recorded_background
+from .recorded_paths import RecordedPaths
+
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """How many rays a recording takes.
+
+    `grid` squared camera rays start in each pixel; it is a number or an array (height, width). Point, spot and
+    directional lights take one sample for each of them; the other lights one light sample and one sample of the
+    proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
+    leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
+    both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
+    wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. `bumped` says
+    that nodes give normals to the plugin. With `light_paths` light over other surfaces has Cycles' blur, clamping and
+    limits. `pixels` (height, width) are the only ones looked at; where they hold all that see the target, nothing is
+    missed. With `highlights` more rays start where lights of no extent are mirrored. Every camera ray meets the lights
+    with extent in as many independent `samples`, or in samples of the same directions if they are `alike`. The first
+    `direct_samples` leave light over other surfaces out and need no other kernels than a recording with it. With
+    `free_emission` the target's own emission is kept apart from the constant picture.
+    """
+
+    grid: int | NDArray[np.int64] = 2
+    seed: int = 0
+    depth: int = 2
+    proposal: DefensiveProposal = field(default_factory=DefensiveProposal)
+    hide_emitters: bool = False
+    stride: int = 1
+    two_sided: bool = False
+    held: tuple[str, ...] = ()
+    bumped: bool = False
+    light_paths: LightPaths | None = None
+    pixels: NDArray[np.bool_] | None = None
+    highlights: Highlights | None = None
+    samples: int = 1
+    alike: bool = False
+    direct_samples: int = 0
+    free_emission: bool = False
+
+
+@dataclass
+class _Lanes:
+    """One technique's lanes before they are merged; positions of sample s follow s times the pixels."""
+
+    wi: mi.Vector3f
+    wo: mi.Vector3f
+    weight: mi.Color3f
+    position: mi.UInt32
+    held: tuple[Any, ...]
+
+
+@dataclass
+class _Hits:
+    """First hits of the camera rays on the target, and the number of `pixels`."""
+
+    si: Any
+    position: mi.UInt32
+    share: mi.Float
+    held: tuple[Any, ...]
+    pixels: int
+
+    def of_rays(self, ray: mi.UInt32) -> _Hits:
+        """Those of some rays, which may repeat."""
+        si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
+        return _Hits(si, position, share, tuple(dr.gather(type(a), a, ray) for a in self.held), self.pixels)
+
+
+def record_paths(
+    scene: mi.Scene,
+    shape: mi.Shape,
+    settings: RecordSettings,
+    *,
+    allow_dark: bool = False,
+) -> RecordedPaths:
+    """Record the light that reaches the first hit on `shape` from the scene's sensor.
+
+    Raises
+    ------
+    BadInputError
+        If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
+    """
+    with dr.suspend_grad():
+        lamps, terminator = SceneLamps(scene), ShadowTerminator.of(scene)
+        if lamps and settings.light_paths is None:
+            # so that paths over other surfaces know they are no camera's
+            settings = replace(settings, light_paths=LightPaths())
+        sensor = scene.sensors()[0]
+        width, height = (int(v) for v in sensor.film().crop_size())
+        rays = _camera_rays(scene, shape, settings, width, height)
+        every_ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
+        seen = hit = scene.ray_intersect_preliminary(every_ray, coherent=True)
+        target = mi.ShapePtr(shape)
+        dr.make_opaque(target)  # its number in this process is no part of the kernel
+        on_target = hit.is_valid() & (hit.shape == target)
+        dr.eval(hit, on_target)
+        index = dr.compress(on_target)
+        if dr.width(index) == 0:
+            raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
+        position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
+        hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
+        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.free_emission else None
+        glowing = dr.select(mi.Frame3f.cos_theta(si.wi) > 0.0, filter_weight, 0.0) if settings.free_emission else None
+        if lamps.seen:
+            before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
+            glow = before if glow is None else glow + before
+        si = _facing(shape, settings, si)
+        held = ()
+        if settings.held:
+            plugin: Any = shape.bsdf()
+            values = plugin.values_at(si, mi.Bool(True))
+            if settings.bumped:
+                values |= plugin.bumped_frame(si, mi.Bool(True))[2]
+            held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
+        si = _turned(shape, settings, si)
+        sampled = settings.depth > 2 or not lights_have_no_extent(scene)
+        if settings.depth == 2 or settings.light_paths is None:
+            si = _without_parametrisation(si)
+        # exact lights alone look at hits once each, and compute them again instead of keeping them
+        dr.eval(si if sampled else (), position, filter_weight, held)
+        pixels = len(rays.pixel)
+        hits = _Hits(si, position, filter_weight, held, pixels)
+        exact = [part for part in _delta_lights(scene, hits, terminator) if dr.width(part.position) > 0]
+        lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
+        if sampled:
+            lanes += _sampled_lights(scene, hits, settings, lamps, terminator)
+
+        covered, coverage = _coverage(pixels, position, filter_weight)
+        constant = recorded_background(
+            scene, rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
+            depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
+        )  # fmt: skip
+        if glow is not None:
+            add_radiance(constant, rays.pixel[np.array(position)], glow)
+        merged = _merge(lanes, settings, rays, covered, coverage, constant)
+        if glowing is not None:
+            own = add_radiance(np.zeros_like(constant), rays.pixel[np.array(position)], mi.Color3f(glowing))
+            merged = replace(merged, own_emission=own)
+        if merged.lanes == 0 and not allow_dark:
+            raise BadInputError("No light reaches the target: add a light or a world background.")
+        return merged
+
+
+def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:
+    """Camera rays on the settings' grid, and more of them in narrow highlights if the settings say so."""
+    sensor = scene.sensors()[0]
+    order, tile = tile_order(width, height, settings.stride)
+    if settings.pixels is not None:
+        kept = settings.pixels.reshape(-1)[order]
+        order, tile = order[kept], tile[kept]
+    per_axis = np.broadcast_to(settings.grid, (height, width)).reshape(-1)[order]
+    if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
+        return PrimaryRays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
+
+    target = mi.ShapePtr(shape)
+    dr.make_opaque(target)
+
+    def rays_in(cells: PixelCells) -> PrimaryRays:
+        return PrimaryRays(sensor, cells, order, tile, settings.seed, four=True)
+
+    def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
+        ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
+        hit = scene.ray_intersect_preliminary(ray, coherent=True)
+        on_target = hit.is_valid() & (hit.shape == target)
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
+        return _turned(shape, settings, _facing(shape, settings, si)), on_target
+
+    cells = PixelCells.grid((per_axis + 1) // 2)
+    return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
+
+
+def _without_parametrisation(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    """Where hits are and how they are turned: all that lights and proposals ask for."""
+    bare = dr.zeros(mi.SurfaceInteraction3f, dr.width(si))
+    bare.t, bare.time, bare.wavelengths = si.t, si.time, si.wavelengths
+    bare.p, bare.n, bare.sh_frame, bare.wi = si.p, si.n, si.sh_frame, si.wi
+    bare.shape, bare.prim_index = si.shape, si.prim_index
+    return bare
+
+
+def _facing(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    if settings.two_sided:
+        return _face_camera(seen_side(si))
+    return _face_camera(si) if shape.bsdf().class_name() == "TwoSidedBRDF" else si
+
+
+def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    """Turn shading frames towards the camera, as the `twosided` plugin does: (x, y, z) -> (x, y, -z)."""
+    back = si.wi.z < 0.0
+    si.sh_frame.n = dr.select(back, -si.sh_frame.n, si.sh_frame.n)
+    si.wi.z = dr.abs(si.wi.z)
+    return si
+
+
+def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+    """Shading frames turned to the normals of a bumped material's microfacets: light is sampled about them."""
+    if not settings.bumped:
+        return si
+    plugin: Any = shape.bsdf()
+    frame, wi, _ = plugin.bumped_frame(si, mi.Bool(True))
+    si.sh_frame, si.wi = frame, wi
+    return si
+
+
+def _delta_lights(scene: mi.Scene, hits: _Hits, terminator: ShadowTerminator) -> list[_Lanes]:
+    """One exact sample for each light of no extent."""
+    si = hits.si
+    started = []
+    for emitter in scene.emitters():
+        if not mi.has_flag(emitter.flags(), DELTA):
+            continue
+        ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
+        wo = si.to_local(ds.d)
+        lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
+        lit &= ~scene.ray_test(terminator.ray(si, ds, lit), True, lit)
+        started.append(_lit(hits, wo, value * (hits.share * terminator.bend(si, wo, lit)), lit))
+    return [kept() for kept in started]
+
+
+def _sampled_lights(
+    scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps, terminator: ShadowTerminator
+) -> list[_Lanes]:
+    """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
+    everywhere = list(scene.emitters())
+    extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
+    indirect = settings.depth > 2
+    # all samples in one launch: tracing the scene in Python takes longer than to launch it
+    count = dr.width(hits.position)
+    lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
+    sample = lane // rays
+    number = lane - sample * rays
+    first, hits = hits, hits.of_rays(number)
+    si, share = hits.si, hits.share
+    # what has random numbers of its own: pixels and tiles of each sample, or of all if they are alike
+    tiles, own = hits.pixels // TILE**2 + 1, sample * dr.opaque(mi.UInt32, 0 if settings.alike else 1)
+    pixel = hits.position + own * dr.opaque(mi.UInt32, hits.pixels)
+    tile = hits.position // TILE**2 + own * dr.opaque(mi.UInt32, tiles)
+    pixels, tiles = hits.pixels * settings.samples, tiles * settings.samples
+    hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
+    proposal = settings.proposal
+    front = si.wi.z > 0.0
+    # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
+    # would be most of the noise, 3 % of a tile for two lights
+    choice = 1.0 / max(len(extended), 1)
+    started = []
+    if extended:
+        table = own_memory(np.array(extended), mi.UInt32)
+        turns = mi.UInt32(fresh_sampler(settings.seed + 0x3C6EF37, pixels).next_1d() * 65536)
+        pick = (number + dr.gather(mi.UInt32, turns, pixel)) % len(extended)
+        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, table, pick))
+        # one light's samples follow each other in the sequence
+        u = even_points(2, number // len(extended), tile, tiles, settings.seed + 0x51ED270)
+        ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
+        wo = si.to_local(ds.d)
+        lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
+        lit &= ~scene.ray_test(terminator.ray(si, ds, lit), lit)
+        light_density = ds.pdf * choice
+        mis = light_density / (light_density + proposal.density(si.wi, wo))
+        started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
+
+    lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
+    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u))
+    density = proposal.density(si.wi, wo)
+    valid = front & (wo.z > 0.0) & (density > 0.0)
+    ray = si.spawn_ray(si.to_world(wo))
+    met = scene.ray_intersect_preliminary(ray, active=valid)
+    far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
+    emitter = far.emitter(scene, valid)
+    emission = emitter.eval(far, valid)
+    ds = mi.DirectionSample3f(scene, far, si)
+    light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
+    weight = emission / (light_density + density)
+    if lamps:
+        weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
+    if indirect:
+        traced = met.is_valid() & (sample >= dr.opaque(mi.UInt32, settings.direct_samples))
+        dr.eval(traced, met, wo, weight, valid)
+        index = dr.compress(traced)
+        if dr.width(index) > 0:
+            some = first.of_rays(index - index // rays * rays)
+            met, towards = (dr.gather(type(a), a, index) for a in (met, wo))
+            total = dr.gather(mi.Color3f, weight, index) + _over_others(scene, some, met, towards, settings)
+            dr.scatter(weight, total, index, mode=dr.ReduceMode.Permute)
+    # the share may be negative, where the pixel filter is
+    share *= terminator.bend(si, wo, valid)
+    started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
+    return [kept() for kept in started]
+
+
+def _over_others(
+    scene: mi.Scene,
+    hits: _Hits,
+    met: mi.PreliminaryIntersection3f,
+    wo: mi.Vector3f,
+    settings: RecordSettings,
+) -> mi.Color3f:
+    """Radiance over the surfaces that rays from the target have `met`, but their own emission, by the rays' density.
+
+    Few rays of most scenes meet something: they are traced on from there side by side.
+    """
+    si = hits.si
+    before = None
+    if settings.light_paths is not None:
+        value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo)
+        before = (likely, value / dr.maximum(likely, 1e-12))
+    sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
+    ray = si.spawn_ray(si.to_world(wo))
+    radiance = traced_radiance(scene, sampler, ray, settings.light_paths, settings.depth - 1, before=before, met=met)
+    return radiance / settings.proposal.density(si.wi, wo)
+
+
+def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], _Lanes]:
+    """Start to compute lanes; returns what waits for those to keep, while the next technique is traced in Python."""
+    weight = mi.Color3f(weight)
+    keep = keep & dr.all(dr.isfinite(weight))
+    wi = hits.si.wi
+    dr.eval(wi, wo, weight, keep)
+
+    def kept() -> _Lanes:
+        index = dr.compress(keep)
+        return _Lanes(
+            dr.gather(mi.Vector3f, wi, index),
+            dr.gather(mi.Vector3f, wo, index),
+            dr.gather(mi.Color3f, weight, index),
+            dr.gather(mi.UInt32, hits.position, index),
+            tuple(dr.gather(type(value), value, index) for value in hits.held),
+        )
+
+    return kept
+
+
+def _coverage(pixels: int, position: mi.UInt32, share: mi.Float) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    total = np.bincount(np.array(position), np.array(share), pixels)
+    covered = np.flatnonzero(total > 0.0)
+    return covered, total[covered].astype(np.float32)
+
+
+def _merge(
+    lanes: list[_Lanes],
+    settings: RecordSettings,
+    rays: PrimaryRays,
+    covered: NDArray[np.int64],
+    coverage: NDArray[np.float32],
+    constant: NDArray[np.float32],
+) -> RecordedPaths:
+    """One lane array, ordered by sample, tile and pixel."""
+    position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
+    rank = np.empty(len(position), np.uint32)
+    rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
+    wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
+    held = [dr.zeros(type(value), len(position)) for value in lanes[0].held] if lanes else []
+    begin = 0
+    for part in lanes:
+        end = begin + dr.width(part.position)
+        if end > begin:
+            target = own_memory(rank[begin:end], mi.UInt32)
+            pairs = ((wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True))
+            for merged, value in pairs:
+                dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
+        begin = end
+    dr.eval(wi, wo, weight, held)
+    samples, pixels = settings.samples, len(rays.pixel)
+    count = np.bincount(position, minlength=samples * pixels).reshape(samples, pixels)[:, covered]
+    first = np.concatenate([np.zeros((samples, 1), int), np.cumsum(count, axis=1)], axis=1)
+    first[1:] += np.cumsum(first[:-1, -1])[:, None]
+    values = dict(zip(settings.held, held, strict=False))
+    return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant, values)

@@ -1,0 +1,307 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A renderer's scene as recorded paths: which rays to take, what to leave out, and images with Jacobians from them."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.recorded_models import RecordedModel, recorded_model
+from ...types.errors import UnrecordableError
+from ...types.parameter import Value
+from ..camera.highlight_cells import Highlights
+from ..camera.primary_rays import tile_order
+from ..camera.widened_mask import widened
+from ..lamps.met_lamps import lights_have_no_extent
+from ..machine.memory import require_memory
+from ..models.prepared_material import EMISSION
+from ..pictures.mitsuba_renderer import MitsubaRenderer
+from ..pictures.pass_counter import with_derivatives
+from .indirect_share import indirect_share
+from .packed_lanes import LaneReader, Lanes
+from .proposal import DefensiveProposal
+from .record_paths import RecordSettings, record_paths
+from .recorded_image import RecordedImage, TwoSamples
+from .recorded_jacobian import RecordedJacobian
+from .recorded_paths import LaneGroups, RecordedPaths
+
+# Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
+# noise of 64 samples a pixel.
+NEGLIGIBLE_INDIRECT = 0.005
+MOST_LANES = 6_000_000  # 216 MB; a recording that would be larger takes every second, third, ... tile
+# How finely highlights are recorded (`Highlights.share`): 0.3 % and 0.1 % of the picture at roughness 0.05
+SHARE_FIRST, SHARE_NEAR = 0.5, 0.35
+MOST_RAYS = 12_000_000  # of one recording, those that miss the target included
+# About as many bytes as memory rises by for each of them, and those that are mapped, as Dr.Jit rounds sizes up to
+# powers of two and keeps what is freed by its size; where every light is exact, and where light is sampled
+BYTES_PER_RAY_EXACT, BYTES_PER_RAY_SAMPLED = (150, 220), (340, 480)
+BYTES_PER_SAMPLE = 200  # of each further sample of the light
+PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
+DEEPEST = 16  # path length of a scene without a limit
+
+
+@dataclass(frozen=True)
+class SceneNeeds:
+    """What a recording of this scene has to hold, and why something is left out (sentences for the report)."""
+
+    sampled: bool
+    depth: int
+    notes: tuple[str, ...]
+
+
+class RecordedScene:
+    """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target.
+
+    Raises
+    ------
+    UnrecordableError
+        If the material has textures or a lobe that recorded paths cannot hold.
+    """
+
+    def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
+        self._integrator = renderer.scene.integrator()
+        if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
+            raise UnrecordableError("The target emits light and the integrator hides what does.")
+        self.renderer = renderer
+        self._covered = covered
+        self._taken = 0  # bytes for the rays of the largest recording so far
+        self.model = recorded_model(renderer.model, renderer.shape.bsdf())
+        self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
+        self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
+        if self._bumped:
+            self._fixed |= dict.fromkeys(self.model.normals.names)
+        self._held = tuple(name for name, value in self._fixed.items() if value is None)
+        self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
+
+    @property
+    def lights_exact(self) -> bool:
+        """Whether no light has an extent, so that direct light has no noise but at silhouettes."""
+        return lights_have_no_extent(self.renderer.scene)
+
+    @cached_property
+    def needs(self) -> SceneNeeds:
+        """What to record, found by tracing a few rays when it is first asked for."""
+        return self._probe()
+
+    def _probe(self) -> SceneNeeds:
+        """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
+        scene, sampled = self.renderer.scene, not self.lights_exact
+        limit = int(getattr(self._integrator, "max_depth", 2))
+        depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
+        if depth <= 2:
+            return SceneNeeds(sampled, 2, ())
+        width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
+        stride = max(1, math.ceil(math.sqrt(width * height / PROBE_RAYS)))
+        share = indirect_share(
+            scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths, stride=stride
+        )
+        if share < NEGLIGIBLE_INDIRECT:
+            note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
+            return SceneNeeds(sampled, 2, (note,))
+        return SceneNeeds(True, depth, ())
+
+    def record(
+        self,
+        vector: NDArray[np.float64],
+        *,
+        grid: int | NDArray[np.int64],
+        seed: int,
+        near: bool,
+        highlights: Highlights | None = None,
+        samples: int = 1,
+        enough: float = MOST_LANES,
+    ) -> RecordedPaths:
+        """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
+        that of the material `vector`.
+
+        `near` shapes the proposal for that material instead of for any and resolves highlights more finely, unless
+        `highlights` says how. Where light is sampled each ray meets it in as many independent `samples`.
+        Tiles are left out, evenly, as long as about `enough` lanes remain.
+        """
+        self.renderer.show(vector)
+        proposal = DefensiveProposal()
+        width = self._value(vector, self.model.scanned[0])
+        if near and isinstance(width, float):
+            proposal = DefensiveProposal.around(width)
+        hide = bool(getattr(self._integrator, "hide_emitters", False))
+        samples = samples if self.needs.sampled else 1
+        lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if self.needs.sampled else 1)
+        if self._near_target.any():
+            grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
+        stride = max(1, math.ceil(math.sqrt(lanes / MOST_LANES)), int(math.sqrt(lanes / enough)))
+        stride, pixels = self._affordable(grid, stride, samples)
+        two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
+        highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
+        settings = RecordSettings(
+            grid=grid,
+            seed=seed,
+            depth=self.needs.depth,
+            proposal=proposal,
+            hide_emitters=hide,
+            stride=stride,
+            two_sided=two_sided,
+            held=held,
+            bumped=self._bumped,
+            light_paths=light_paths,
+            pixels=pixels,
+            highlights=highlights,
+            samples=samples,
+            free_emission=EMISSION in self.renderer.table.names,
+        )
+        self.renderer.counter.add(1.0)
+        return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def finest_grid(self, samples: int, lanes: float) -> int:
+        """The finest grid with which a recording of so many samples of the light holds every tile in so many lanes, or
+        in those that any recording may have."""
+        return int(math.sqrt(min(lanes, MOST_LANES) / (2 * samples * self._covered)))
+
+    def _highlights(self, vector: NDArray[np.float64]) -> Highlights:
+        """How finely highlights of the material `vector` are recorded: an anisotropic lobe is narrow along one axis."""
+        anisotropy, turn = (self._value(vector, name) for name in ("anisotropic", "anisotropic_rotation"))
+        narrow = 1.0 - 0.9 * anisotropy if isinstance(anisotropy, float) else 1.0  # of both models
+        return Highlights(share=SHARE_NEAR, narrow=narrow, turn=turn if isinstance(turn, float) else 0.0)
+
+    def _affordable(
+        self, grid: int | NDArray[np.int64], stride: int, samples: int
+    ) -> tuple[int, NDArray[np.bool_] | None]:
+        """The stride with which a recording does not take too many camera rays, and the pixels it should look at.
+
+        Raises
+        ------
+        BadInputError
+            If even that is more than the memory that is left.
+        """
+        width, height = (int(n) for n in self.renderer.scene.sensors()[0].film().crop_size())
+        squares = np.broadcast_to(np.square(grid), (height, width))
+        pixels = None
+        count = _rays(squares, stride)
+        if count > MOST_RAYS:
+            pixels = self._near_target
+            while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
+                stride += 1
+        of_a_ray = BYTES_PER_RAY_SAMPLED if self.needs.sampled else BYTES_PER_RAY_EXACT
+        needed, mapped = (count * (size + (samples - 1) * BYTES_PER_SAMPLE) for size in of_a_ray)
+        if needed > self._taken:  # Dr.Jit keeps what an earlier recording has freed
+            require_memory(
+                needed - self._taken,
+                mapped=mapped,
+                what="Tracing the light of this picture",
+                cure="use a smaller picture or free some",
+            )
+            self._taken = needed
+        return stride, pixels
+
+    @cached_property
+    def _near_target(self) -> NDArray[np.bool_]:
+        """Pixels that may see the target: those that do and their neighbours in reach of the pixel filter."""
+        reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
+        return widened(self.renderer.target_mask(), reach)
+
+    def pictures(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage:
+        """The function from a vector to the image of the groups alone, background included, without derivatives.
+
+        It remembers two: solutions are compared in pairs.
+        """
+        constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
+        lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
+
+        def at(vector: NDArray[np.float64]) -> TwoSamples:
+            self.renderer.counter.add(cost)
+            return glow(vector, TwoSamples.of(self._image(vector, lanes, groups), constant))
+
+        return RecordedImage(at, 2)
+
+    @cached_property
+    def _image(self) -> RecordedJacobian:
+        return RecordedJacobian(self.model, self.renderer.table, self._fixed, derivatives=False)
+
+    def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
+        """The function from a vector to image and Jacobian of the groups, background included."""
+        constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
+        lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
+        cost = with_derivatives(self._share(groups), self.renderer.table.length)
+
+        def at(vector: NDArray[np.float64]) -> TwoSamples:
+            samples = self.jacobian(vector, lanes(), groups)
+            self.renderer.counter.add(cost)
+            return glow(vector, TwoSamples.of(samples, constant))
+
+        return RecordedImage(at, recalled)
+
+    def _own_emission(
+        self, paths: RecordedPaths, groups: LaneGroups
+    ) -> Callable[[NDArray[np.float64], TwoSamples], TwoSamples]:
+        """What adds the target's own light at a vector to its picture and derivatives, where the emission is free.
+
+        The light that it throws on other surfaces, and they on it, is that of the material it was recorded for.
+        """
+        if paths.own_emission is None:
+            return lambda vector, samples: samples
+        entries = self.renderer.table.slice_of(EMISSION)
+        unit = groups.average(paths.own_emission) * np.float32(self.renderer.factors[EMISSION])
+
+        def added(vector: NDArray[np.float64], samples: TwoSamples) -> TwoSamples:
+            samples.mean[:, :, 0] += unit * vector[entries].astype(np.float32)
+            if samples.mean.shape[2] > 1:
+                for channel, entry in enumerate(range(entries.start, entries.stop)):
+                    samples.mean[:, channel, 1 + entry] += unit[:, channel]
+            return samples
+
+        return added
+
+    def _share(self, groups: LaneGroups) -> float:
+        """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""
+        return len(groups.pixels) / max(self._covered, 1)
+
+    def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
+        table = self.renderer.table
+        return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
+
+
+def _rays(squares: NDArray[np.int64], stride: int) -> int:
+    """Camera rays in every `stride`-th tile."""
+    if stride == 1:
+        return int(squares.sum())
+    height, width = squares.shape
+    order, _ = tile_order(width, height, stride)
+    return int(squares.reshape(-1)[order].sum())
+
+
+def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value | None]:
+    """The values of the target's material in the scene, None for those of a texture.
+
+    Raises
+    ------
+    UnrecordableError
+        If one of them is a texture and the material is a plugin that cannot be asked for its values at a point.
+    """
+    keys = mi.traverse(renderer.shape.bsdf())
+    values: dict[str, Value | None] = {}
+    asked = hasattr(renderer.shape.bsdf(), "values_at")
+    for key in keys.keys():  # noqa: SIM118  the traversed object has no iterator of keys
+        parts = key.split(".")
+        name = next((part for part in parts if part in model.table.names), None)
+        if name is None:
+            continue
+        if parts[parts.index(name) + 1 :] not in ([], ["value"]):
+            if not asked:
+                raise UnrecordableError(f"Parameter {name!r} is a texture: recorded paths need one value.")
+            values[name] = None
+            continue
+        numbers = np.array(keys[key], np.float64).ravel()
+        size = model.table[name].size
+        values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))
+    dr.eval()
+    return values

@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole light paths over a target of Blender's Principled, and their derivatives by its free values.
+
+Light that enters the target meets its material several times, so there is no single recorded direction. Here a path is
+traced with the material itself and carries the derivative of its throughput by every free value (detached: the path
+stays where it is). Emitters are sampled at every vertex, as by Mitsuba's `path`, or by
+`cycles_path` with its Filter Glossy, clamping and limits of bounces where the scene asks for it.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false, reportAttributeAccessIssue=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.arrays.own_memory import own_memory
+from ...material.plugins.principled_plugin import BlenderPrincipled
+from ...material.principled.blender_principled import evaluate
+from ...material.principled.layers import layer_stack
+from ...material.principled.lobe_sampling import NAMES, lobe_choice, pdf, sample
+from ...types.errors import UnrecordableError
+from ...types.parameter import ParameterTable
+from ..camera.primary_rays import camera_ray, through_filter
+from ..lamps.met_lamps import SceneLamps, alone
+from ..pictures.mitsuba_renderer import MitsubaRenderer
+from ..pictures.pass_counter import with_derivatives
+from ..transport.smooth_facets import ShadowTerminator, sample_light, seen_side
+
+MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
+MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
+_DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmission)
+_TRANSMITS = (
+    int(mi.BSDFFlags.GlossyTransmission) | int(mi.BSDFFlags.DeltaTransmission) | int(mi.BSDFFlags.DiffuseTransmission)
+)
+LEAST_DIFFUSE = 0.02  # probability, under glass: more takes paths from the glass
+DEEPEST = 32  # path length of a scene without a limit
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """The directions in which derivatives are taken: one for each free value, but one for all of the base colour.
+
+    A channel of the picture depends on no other channel of the base colour, so that its three derivatives need one
+    pass.
+    """
+
+    table: ParameterTable
+    entries: tuple[tuple[int, ...], ...]
+
+    @staticmethod
+    def of(table: ParameterTable) -> Tangents:
+        """Those of a table."""
+        entries: list[tuple[int, ...]] = []
+        for p in table:
+            at = range(*table.slice_of(p.name).indices(table.length))
+            entries += [tuple(at)] if p.name == "base_color" else [(k,) for k in at]
+        return Tangents(table, tuple(entries))
+
+    def expand(self, columns: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(..., 3, 1 + directions) to (..., 3, 1 + values)."""
+        if all(len(e) == 1 for e in self.entries):
+            return columns
+        out = np.zeros((*columns.shape[:-1], 1 + self.table.length), np.float32)
+        out[..., 0] = columns[..., 0]
+        for direction, entry in enumerate(self.entries):
+            for channel, k in enumerate(entry):
+                where = slice(None) if len(entry) == 1 else channel
+                out[..., where, 1 + k] = columns[..., where, 1 + direction]
+        return out
+
+
+class TracedPaths:
+    """Pictures and Jacobians of chosen pixels for several vectors at once, under common random numbers.
+
+    Parameters
+    ----------
+    renderer
+        Its target has to be of the plugin `blender_principled`.
+
+    Raises
+    ------
+    UnrecordableError
+        For another material.
+    """
+
+    def __init__(self, renderer: MitsubaRenderer) -> None:
+        bsdf = renderer.shape.bsdf()
+        if not isinstance(bsdf, BlenderPrincipled):
+            raise UnrecordableError(f"Model {renderer.model!r} has no traced version for transmissive materials.")
+        self.renderer, self.table = renderer, renderer.table
+        self._bsdf = bsdf
+        self._tangents = Tangents.of(renderer.table)
+        scene = renderer.scene
+        integrator = scene.integrator()
+        limit = int(getattr(integrator, "max_depth", DEEPEST))
+        self._depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
+        self._hide = bool(getattr(integrator, "hide_emitters", False))
+        if self._hide and renderer.shape.is_emitter():
+            raise UnrecordableError("The target emits light and the integrator hides what does.")
+        self._light_paths = renderer.light_paths
+        self._lamps, self._terminator = SceneLamps(scene), ShadowTerminator.of(scene)
+        self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
+        self.lanes = 0
+
+    def roughness(self, vector: NDArray[np.float64]) -> float:
+        """Roughness of the material `vector`; 1 where a texture gives it."""
+        if "roughness" in self.table.names:
+            return float(vector[self.table.slice_of("roughness").start])
+        value = self._bsdf.fixed["roughness"]
+        return 1.0 if value is None else float(np.mean(value))
+
+    def images(
+        self,
+        vectors: NDArray[np.float64],
+        pixels: NDArray[np.int64],
+        *,
+        seed: int,
+        samples: int,
+        jacobian: bool,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> NDArray[np.float32]:
+        """Means over `samples` paths a pixel, (m, p, 3, 1 + K) with derivatives or (m, p, 3, 1), for vectors (m, K).
+
+        Path s of pixel p takes the same random numbers for every vector. Nothing more is traced once `should_stop`.
+        """
+        vectors = np.atleast_2d(vectors)
+        count = (1 + len(self._tangents.entries)) if jacobian else 1
+        result = np.zeros((len(vectors), len(pixels), 3, count), np.float32)
+        most = min(MOST_LANES, MOST_FLOATS // (3 * count))
+        rows = max(1, min(len(pixels), most // samples))
+        models = max(1, most // (rows * samples))
+        for begin in range(0, len(pixels), rows):
+            for first in range(0, len(vectors), models):
+                if should_stop():
+                    return self._tangents.expand(result) if jacobian else result
+                some = slice(begin, begin + rows)
+                group = slice(first, first + models)
+                result[group, some] = self._launch(vectors[group], pixels[some], begin, seed, samples, jacobian)
+        film = self.renderer.scene.sensors()[0].film().crop_size()
+        share = len(pixels) * samples * len(vectors) / float(film[0] * film[1])
+        self.renderer.counter.add(with_derivatives(share / 16.0, self.table.length if jacobian else 0))
+        return self._tangents.expand(result) if jacobian else result
+
+    def _launch(self, vectors, pixels, begin, seed, samples, jacobian) -> NDArray[np.float32]:
+        m, p = len(vectors), len(pixels)
+        lanes = m * p * samples
+        self.lanes += lanes
+        theta = own_memory(vectors, mi.Float)
+        pixel = own_memory(pixels, mi.UInt32)
+        p_opaque, samples_opaque, begin_opaque = (dr.opaque(mi.UInt32, v) for v in (p, samples, begin))
+        lane = dr.arange(mi.UInt32, lanes)
+        block = lane // samples_opaque
+        model = block // p_opaque
+        row = block - model * p_opaque
+        path = (row + begin_opaque) * samples_opaque + (lane - block * samples_opaque)
+        rng = PathRandom.of(path, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+        ray, weight = self._camera(dr.gather(mi.UInt32, pixel, row), rng)
+        columns = self._trace(ray, rng, theta, model * self.table.length, jacobian)
+        good = mi.Bool(True)
+        for c in columns:
+            good &= dr.all(dr.isfinite(c))
+        sums = [dr.select(good, c[k] * weight, 0.0) for c in columns for k in range(3)]
+        dr.eval(sums)
+        means = [dr.block_sum(s, samples).numpy() for s in sums]
+        table = np.stack(means, axis=-1).reshape(m, p, len(columns), 3)
+        return np.swapaxes(table, 2, 3) / np.float32(samples)
+
+    def _camera(self, pixel: mi.UInt32, rng: PathRandom) -> tuple[mi.Ray3f, mi.Float]:
+        sensor = self.renderer.scene.sensors()[0]
+        offset, sign = through_filter(sensor.film().rfilter())(rng.pair(0))
+        return camera_ray(sensor, pixel, offset, rng.pair(1)), mi.Float(1.0) if sign is None else sign
+
+    def _trace(self, ray, rng, theta, offset, jacobian) -> list[mi.Color3f]:
+        """Radiance along the rays and its derivatives in all directions."""
+        scene = self.renderer.scene
+        directions = len(self._tangents.entries) if jacobian else 0
+        state = {
+            "ray": mi.Ray3f(ray),
+            "beta": [mi.Color3f(1.0)] + [mi.Color3f(0.0) for _ in range(directions)],
+            "total": [mi.Color3f(0.0) for _ in range(1 + directions)],
+            "before": dr.zeros(mi.Interaction3f, dr.width(offset)),
+            "density": mi.Float(1.0),
+            "delta": mi.Bool(True),
+            "depth": mi.UInt32(0),
+            "left": mi.UInt32(self._depth),
+            "active": mi.Bool(True),
+        }
+        if self._light_paths is not None:
+            # the least density so far, and bounces of each kind
+            state |= {"least": mi.Float(1e30), "bounces": [mi.UInt32(0) for _ in range(3)]}
+
+        def body(s):
+            ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
+            si = seen_side(scene.ray_intersect(ray, active))
+            blur = self._blur(s)
+            if blur is not None:
+                si.duv_dx = mi.Point2f(blur, 0.0)
+            emitter = si.emitter(scene, active)
+            ds = mi.DirectionSample3f(scene, si, s["before"])
+            light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
+            seen = dr.select(s["delta"], 1.0, self._share(s["density"], light))
+            if self._hide:
+                seen = dr.select(depth == 0, 0.0, seen)
+            emission = mi.Color3f(emitter.eval(si, active)) * seen
+            emission = dr.select(active, emission, 0.0)
+            emission *= self._clamp(beta[0] * emission, depth >= 2)
+            total = [t + b * emission for t, b in zip(total, beta, strict=True)]
+            if self._lamps:
+                straight = s["bounces"][0] + s["bounces"][1] + s["bounces"][2] == 0
+                likely = dr.select(s["delta"], 1e30, s["density"])
+                shine = self._lamps.met(ray, si, active, density=likely, camera=straight)
+                shine *= self._clamp(beta[0] * shine, depth >= 2)
+                total = [t + b * shine for t, b in zip(total, beta, strict=True)]
+            active = active & si.is_valid() & (s["left"] > 1)
+            # light sampled from here
+            ds, value = sample_light(scene, self._terminator, si, rng.pair(2 + 3 * depth), active)
+            wo = si.to_local(ds.d)
+            lit = active & (ds.pdf > 0.0)
+            u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
+            on = active & (si.bsdf() == mi.BSDFPtr(self._bsdf)) if self._others else active
+            f_light, pdf_light, f_next, pdf_next, local, kind = self._at_target(
+                si, wo, u1, u2, on, theta, offset, directions
+            )
+            if self._others:
+                off = active & ~on
+                context = mi.BSDFContext()
+                bsdf = si.bsdf()
+                f, p, bs, w = bsdf.eval_pdf_sample(context, si, wo, u1, u2, off)
+                f_light[0] = dr.select(off, mi.Color3f(f), f_light[0])
+                pdf_light = dr.select(off, p, pdf_light)
+                f_next[0] = dr.select(off, mi.Color3f(w) * bs.pdf, f_next[0])
+                pdf_next = dr.select(off, bs.pdf, pdf_next)
+                local = dr.select(off, bs.wo, local)
+                kind = dr.select(off, bs.sampled_type, kind)
+            value *= self._terminator.bend(si, wo, lit)
+            bend = self._terminator.bend(si, local, active)
+            f_next = [f * bend for f in f_next]
+            weight = value * dr.select(alone(ds), 1.0, self._share(ds.pdf, pdf_light))
+            weight = dr.select(lit, weight, 0.0)
+            weight *= self._clamp(beta[0] * f_light[0] * weight, depth >= 1)
+            total[0] += beta[0] * f_light[0] * weight
+            for k in range(directions):
+                total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight
+            usable = active & (pdf_next > 0.0)
+            inverse = dr.select(usable, dr.rcp(dr.maximum(pdf_next, 1e-30)), 0.0)
+            new = [beta[0] * f_next[0] * inverse]
+            for k in range(directions):
+                new.append((beta[1 + k] * f_next[0] + beta[0] * f_next[1 + k]) * inverse)
+            # a path that shows nothing itself may have derivatives
+            strongest = reduce(dr.maximum, (dr.max(dr.abs(c)) for c in new))
+            active = usable & (strongest > 1e-5)
+            after = {
+                "ray": si.spawn_ray(si.to_world(local)),
+                "beta": new,
+                "total": total,
+                "before": mi.Interaction3f(si),
+                "density": pdf_next,
+                "delta": mi.has_flag(kind, mi.BSDFFlags.Delta),
+                "depth": depth + 1,
+                "left": s["left"] - 1,
+                "active": active,
+            }
+            return after | self._counted(s, kind, pdf_next, after["left"])
+
+        (state,) = dr.while_loop((state,), lambda s: s["active"], lambda s: (body(s),), label="traced paths")
+        return state["total"]
+
+    def _blur(self, state: dict[str, Any]) -> mi.Float | None:
+        """The least alpha of the microfacet lobes by Filter Glossy."""
+        if self._light_paths is None or self._light_paths.filter_glossy <= 0.0:
+            return None
+        return 0.5 * dr.safe_sqrt(1.0 - state["least"] / self._light_paths.filter_glossy)
+
+    def _share(self, a: mi.Float, b: mi.Float) -> mi.Float:
+        """Weight of a sample of density `a` that another technique finds with `b` (Veach 1995), as the picture has it.
+
+        `path` takes the power heuristic and `cycles_path` the balance heuristic; where samples are clamped it matters.
+        """
+        if self._light_paths is None:
+            a, b = dr.square(a), dr.square(b)
+        return dr.select(a > 0.0, a / (a + b), 0.0)
+
+    def _clamp(self, sample: mi.Color3f, indirect: mi.Bool) -> mi.Float | float:
+        """What to scale a sample by whose channels add up to more than Cycles allows."""
+        if self._light_paths is None or self._light_paths.clamp_indirect <= 0.0:
+            return 1.0
+        total, limit = dr.sum(dr.abs(sample)), 3.0 * self._light_paths.clamp_indirect
+        return dr.select(indirect & (total > limit), limit / total, 1.0)
+
+    def _counted(self, state: dict[str, Any], kind: mi.UInt32, density: mi.Float, left: mi.UInt32) -> dict[str, Any]:
+        """Bounces of each kind and the least density after a bounce; a straight passage is none."""
+        if self._light_paths is None:
+            return {}
+        counts = ~mi.has_flag(kind, mi.BSDFFlags.Null)
+        through, diffuse = (kind & _TRANSMITS) != 0, (kind & _DIFFUSE) != 0
+        of_kind = (diffuse & ~through, ~diffuse & ~through, through)
+        limits = self._light_paths
+        most = (limits.diffuse_bounces, limits.glossy_bounces, limits.transmission_bounces)
+        bounces = [
+            b + dr.select(counts & k, mi.UInt32(1), mi.UInt32(0))
+            for b, k in zip(state["bounces"], of_kind, strict=True)
+        ]
+        done = mi.Bool(False)
+        for count, limit in zip(bounces, most, strict=True):
+            done |= count > limit
+        least = dr.select(counts & (density > 0.0), dr.minimum(state["least"], density), state["least"])
+        return {"least": least, "bounces": bounces, "left": dr.select(done, dr.minimum(left, 1), left)}
+
+    def _at_target(self, si, wo, u1, u2, on, theta, offset, directions):
+        """Value and derivatives of the BSDF towards `wo` and towards a direction drawn from it, with densities."""
+        plugin = self._bsdf
+        entries = [dr.gather(mi.Float, theta, offset + k, on) for k in range(self.table.length)]
+        if directions:
+            dr.enable_grad(*entries)
+        parameters: dict[str, Any] = plugin.values_at(si, on)
+        iterator = iter(entries)
+        for p in self.table:
+            parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
+        layers = layer_stack(parameters, si.wi, plugin.lobes, plugin.model)
+        if plugin.filtered:
+            layers = layers.blurred(si.duv_dx.x)
+        choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha, least_diffuse=LEAST_DIFFUSE)
+        only = plugin.reachable_only
+        drawn, lobe, valid = sample(layers, choice, u1, u2)
+        towards = dr.detach(layers.to_frame(wo))
+        f_light = mi.Color3f(evaluate(layers, towards, reachable_only=only))
+        pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
+        f_next = mi.Color3f(evaluate(layers, drawn, reachable_only=only))
+        pdf_next = dr.detach(pdf(layers, choice, drawn, reachable_only=only))
+        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
+        through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
+        kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
+        if choice["transparent"] is not None:
+            null = lobe == NAMES.index("transparent")
+            f_next = dr.select(null, mi.Color3f(layers.transparency), f_next)
+            pdf_next = dr.select(null, dr.detach(choice["transparent"]), pdf_next)
+            kind = dr.select(null, mi.UInt32(+mi.BSDFFlags.Null), kind)
+        pdf_next = dr.select(valid & on, pdf_next, 0.0)
+        light, following = [dr.detach(f_light)], [dr.detach(f_next)]
+        for entry in self._tangents.entries[:directions]:
+            for k in entry:
+                dr.set_grad(entries[k], 1.0)
+                dr.enqueue(dr.ADMode.Forward, entries[k])
+            dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
+            light.append(mi.Color3f(dr.grad(f_light)))
+            following.append(mi.Color3f(dr.grad(f_next)))
+            dr.clear_grad(f_light)
+            dr.clear_grad(f_next)
+        light = [dr.select(on, c, 0.0) for c in light]
+        following = [dr.select(on, c, 0.0) for c in following]
+        return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), kind
+
+
+@dataclass(frozen=True)
+class PathRandom:
+    """Random numbers by path and place, without a state: a path keeps its numbers whatever the material does."""
+
+    a: mi.UInt32
+    b: mi.UInt32
+
+    @staticmethod
+    def of(path: mi.UInt32, seed: mi.UInt32) -> PathRandom:
+        """Those of a path number and a seed."""
+        return PathRandom(*mi.sample_tea_32(path, seed, 6))
+
+    def pair(self, place: Any) -> mi.Point2f:
+        """Two numbers in [0, 1) (D. Wheeler and R. Needham, TEA, 1994, as a hash)."""
+        x, y = mi.sample_tea_32(self.a, self.b + mi.UInt32(place) * 0x9E3779B9, 5)
+        return mi.Point2f(mi.Float(x >> 8), mi.Float(y >> 8)) * 2.0**-24

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Mitsuba integrator `cycles_path`: a path tracer that treats indirect light as Cycles does.
+
+What differs from Mitsuba's `prb` is Filter Glossy, the clamping of indirect light, limits for one kind of bounce
+(Cycles 5.0: kernel/integrator/surface_shader.h, path_state.h, film/light_passes.h), that rays meet lamps
+(`lamps.lamp`), and where shadow rays start (`smooth_facets`). Derivatives are those of path
+replay (Vicini, Speierer, Jakob 2021, "Path Replay Backpropagation"), for materials only: lights and shapes are held.
+Choose the variant before importing this.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
+
+from ...types.light_paths import NO_LIMIT, LightPaths
+from ..lamps.met_lamps import SceneLamps, alone
+from .smooth_facets import ShadowTerminator, sample_light, seen_side
+
+PLUGIN_NAME = "cycles_path"
+CERTAIN = 1e30  # density before the first bounce, and of mirrors
+_LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
+TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
+
+
+class CyclesPath(RBIntegrator):
+    """`max_depth`, `hide_emitters` as `prb`, further the numbers of `LightPaths` by name.
+
+    A nested texture `camera_world` is what rays straight from the camera see behind everything (`camera_world`).
+    """
+
+    def __init__(self, props: mi.Properties) -> None:
+        super().__init__(props)
+        self.filter_glossy = float(props.get("filter_glossy", 0.0))
+        self.clamp_indirect = float(props.get("clamp_indirect", 0.0))
+        self.camera_world = props.get("camera_world", None)
+        self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
+
+    @dr.syntax
+    def sample(
+        self,
+        mode: dr.ADMode,
+        scene: mi.Scene,
+        sampler: mi.Sampler,
+        ray: mi.Ray3f,
+        δL: Any = None,  # the name is that of Mitsuba's base class
+        state_in: Any = None,
+        active: Any = True,
+        before: tuple[Any, Any] | None = None,
+        met: Any = None,
+        **_: Any,
+    ) -> tuple[Any, Any, list[Any], Any]:
+        """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it.
+
+        What `ray` has `met`, if that is known, is not looked for again, and its emission is left out.
+        """
+        primal = mode == dr.ADMode.Primal
+        lamps, terminator = SceneLamps(scene), ShadowTerminator.of(scene)
+        context = mi.BSDFContext()
+        ray = mi.Ray3f(dr.detach(ray))
+        radiance = mi.Spectrum(0 if primal else state_in)
+        change = mi.Spectrum(0 if δL is None else δL)
+        throughput = mi.Spectrum(1)
+        first = mi.Spectrum(1 if before is None else dr.detach(before[1]))
+        least = mi.Float(CERTAIN if before is None else dr.detach(before[0]))
+        bounce = mi.UInt32(0 if before is None else 1)
+        left = mi.UInt32(self.max_depth)
+        diffuse, glossy, through = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        previous = dr.zeros(mi.Interaction3f)
+        density = mi.Float(1)
+        delta = mi.Bool(True)
+        active = mi.Bool(active)
+        valid = mi.Bool(False)
+        known = met is not None
+        hidden = self.hide_emitters and before is None
+
+        while dr.hint(active, label=f"cycles_path ({mode.name})"):
+            if dr.hint(known, mode="scalar"):
+                si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
+            else:
+                si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=bounce == 0, active=active)
+            if dr.hint(hidden, mode="scalar"):
+                skip = active & (bounce == 0) & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711
+                further = self.skip_area_emitters(scene, si.spawn_ray(ray.d), True, skip)
+                behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
+                si[skip] = behind
+            valid |= (bounce == 0) & si.is_valid()
+            si = seen_side(si)
+            si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), 0)
+            bsdf = si.bsdf(ray)
+
+            # light that the last direction meets
+            ds = mi.DirectionSample3f(scene, si, previous)
+            beyond = active & (left < self.max_depth) if known else active
+            seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
+            light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
+            emission = ds.emitter.eval(si, seen)
+            straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
+            if dr.hint(self.camera_world is not None, mode="scalar"):
+                behind_all = straight & seen & ~si.is_valid()
+                emission = dr.select(behind_all, seen_world(self.camera_world, ray.d, behind_all), emission)
+            shown = throughput * emission * share(delta, density, light_density)
+            shown *= clamp_factor(self.clamp_indirect, first * shown, bounce >= 2)
+            if dr.hint(lamps, mode="scalar"):
+                likely = dr.select(delta, CERTAIN, density)
+                shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight)
+                shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
+
+            goes_on = active & si.is_valid() & (left > 1)
+            ds, light = sample_light(scene, terminator, si, sampler.next_2d(), goes_on)
+            lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            if dr.hint(terminator.bends, mode="scalar"):
+                light *= terminator.bend(si, si.to_local(ds.d), lit)
+            with dr.resume_grad(when=not primal):
+                value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+                weight = dr.detach(share(alone(ds), ds.pdf, chance))
+                direct = dr.select(lit, throughput * value * light * weight, 0)
+                direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
+
+            bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
+            if dr.hint(terminator.bends, mode="scalar"):
+                ratio *= terminator.bend(si, bs.wo, goes_on)
+            onward = si.spawn_ray(si.to_world(bs.wo))
+            goes_on &= dr.any(throughput * ratio != 0)
+
+            if dr.hint(primal, mode="scalar"):
+                radiance += shown + direct
+            else:
+                radiance -= shown + dr.detach(direct)
+                with dr.resume_grad():
+                    again = bsdf.eval(context, si, si.to_local(onward.d), goes_on)
+                    out = shown + direct + radiance * dr.relative_grad(again)
+                    if dr.hint(mode == dr.ADMode.Backward, mode="scalar"):
+                        dr.backward_from(change * out)
+                    else:
+                        change += dr.forward_to(out)
+
+            # a straight passage is no bounce of any kind
+            counts = goes_on & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            is_through = (bs.sampled_type & TRANSMITS) != 0
+            is_diffuse = ((bs.sampled_type & DIFFUSE) != 0) & ~is_through
+            diffuse[counts & is_diffuse] += 1
+            glossy[counts & ~is_diffuse & ~is_through] += 1
+            through[counts & is_through] += 1
+            left -= 1
+            done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
+            left = dr.select(done, dr.minimum(left, 1), left)
+            least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
+            bounce += 1
+            throughput *= ratio
+            density, delta = mi.Float(bs.pdf), mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            previous = mi.Interaction3f(si)
+            ray = mi.Ray3f(onward)
+            active = goes_on
+            if dr.hint(known, mode="scalar"):
+                met = scene.ray_intersect_preliminary(ray, active=active)
+
+        return radiance if primal else change, valid, [], radiance
+
+
+def seen_world(texture: Any, direction: Any, active: Any = True) -> Any:
+    """Radiance of an equirectangular picture along world directions, +X in its middle, +Z at its top.
+
+    The layout is that of Blender's Environment Texture (Cycles' `direction_to_equirectangular`).
+    """
+    flat = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
+    polar = dr.safe_acos(direction.z)
+    flat.uv = mi.Point2f(0.5 - dr.atan2(direction.y, direction.x) / (2 * dr.pi), polar / dr.pi)
+    return mi.Color3f(texture.eval(flat, active))
+
+
+def share(alone: Any, density: Any, other: Any) -> Any:
+    """Weight of a sample of `density` that another technique finds with density `other` (Veach 1995), 1 if none can."""
+    return dr.select(alone, 1, density / dr.maximum(density + other, 1e-30))
+
+
+def least_alpha(filter_glossy: float, density: Any) -> Any:
+    """The least alpha of the microfacet lobes after bounces of which the unlikeliest had `density`."""
+    if filter_glossy <= 0.0:
+        return mi.Float(0)
+    return 0.5 * dr.safe_sqrt(1 - density / filter_glossy)
+
+
+def clamp_factor(clamp_indirect: float, sample: Any, indirect: Any) -> Any:
+    """What to scale a sample of light by, whose channels may add up to too much where it is `indirect`."""
+    if clamp_indirect <= 0.0:
+        return mi.Float(1)
+    total = dr.detach(dr.sum(dr.abs(sample)))
+    limit = 3.0 * clamp_indirect
+    return dr.select(indirect & (total > limit), limit / total, 1)
+
+
+def light_path_properties(light_paths: LightPaths) -> dict[str, float | int]:
+    """Properties of the integrator."""
+    numbers = {name: getattr(light_paths, name) for name in _LIMITS}
+    return {"filter_glossy": light_paths.filter_glossy, "clamp_indirect": light_paths.clamp_indirect, **numbers}
+
+
+def register() -> None:
+    """Make `cycles_path` known to Mitsuba in the current variant."""
+    mi.register_integrator(PLUGIN_NAME, CyclesPath)

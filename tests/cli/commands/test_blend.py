@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `mfo blend` does with a result, by its verdict; Blender and the fit only pretend."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from mfo_backend.cli.commands import blend
+from mfo_backend.cli.main import main
+
+
+@pytest.fixture
+def fitted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
+    """A finished fit whose verdict a test sets; `applied` are the words of every apply."""
+    result = {
+        "status": "converged", "verdict": "same", "sentence": "The result looks the same as the reference.",
+        "notes": [], "initial": {}, "recovered": {}, "errors": {},
+    }  # fmt: skip
+    applied: list[bool] = []
+
+    def apply(_host, _blend, _job, _save_as, *, force: bool = False, **_: object) -> tuple[str, ...]:
+        applied.append(force)
+        return ()
+
+    monkeypatch.setattr(blend, "find_blender_host", lambda program: None)
+    monkeypatch.setattr(blend, "fit_blend", lambda *_, **__: blend.BlendFit(tmp_path, result))
+    monkeypatch.setattr(blend, "apply_result", apply)
+    return SimpleNamespace(result=result, applied=applied)
+
+
+WORDS = ["blend", "a.blend", "--object", "Ball", "--reference", "r.exr", "--apply"]
+
+
+@pytest.mark.parametrize("verdict", ["same", "close", None])
+def test_a_result_that_may_match_is_applied(fitted: SimpleNamespace, verdict: str | None, capsys) -> None:
+    fitted.result["verdict"] = verdict
+    assert main(WORDS) == 0
+    assert fitted.applied == [False]
+    assert capsys.readouterr().out.splitlines()[-1] == fitted.result["sentence"]
+
+
+def test_a_mismatch_is_not_applied_and_has_an_exit_code_of_its_own(fitted: SimpleNamespace, capsys) -> None:
+    fitted.result |= {"status": "different", "verdict": "different", "sentence": "It does not match."}
+    assert main(WORDS) == 5
+    assert fitted.applied == []
+    said = capsys.readouterr().out
+    assert "Nothing was applied or saved" in said
+    assert "Saved:" not in said
+    assert said.splitlines()[-1] == "It does not match."
+
+
+def test_a_mismatch_is_applied_by_force(fitted: SimpleNamespace) -> None:
+    fitted.result |= {"status": "different", "verdict": "different"}
+    assert main([*WORDS, "--force"]) == 5
+    assert fitted.applied == [True]
+
+
+def test_json_says_that_nothing_was_saved(fitted: SimpleNamespace, capfd) -> None:
+    fitted.result |= {"status": "different", "verdict": "different"}
+    assert main([*WORDS, "--json"]) == 5
+    answer = json.loads(capfd.readouterr().out.splitlines()[-1])
+    assert (answer["verdict"], answer["saved"]) == ("different", None)

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""When a fit begins again from another class of material, from what, and which result counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mfo_backend.job.run import fit_scene as module
+from mfo_backend.job.run.material_classes import (
+    brightest_glow,
+    changed,
+    is_better,
+    is_worth_another,
+    other_classes,
+    parameters_of,
+    value_of,
+    with_values_of,
+)
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.types.certainty import Certainty, Level
+from mfo_backend.types.errors import UnrecordableError
+from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.result import FitResult
+from mfo_backend.types.status import Status
+from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict
+
+
+def material(**values):
+    return {"sockets": {name.replace("_", " "): {"value": value, "linked": False} for name, value in values.items()}}
+
+
+def judgement(verdict, cause=None, visible=0.2):
+    return Judgement(verdict, cause, Difference(visible + 0.05, 0.05, visible / 2.0, visible / 3.0, visible / 2.0))
+
+
+def result(judged, model="blender_principled"):
+    return SimpleNamespace(judgement=judged, model=model)
+
+
+@pytest.mark.parametrize(
+    ("values", "others"),
+    [
+        ({}, ["of glass", "cut out"]),
+        ({"Transmission_Weight": 1.0}, ["cut out", "opaque"]),
+        ({"Transmission_Weight": 1.0, "Metallic": 0.6}, ["of glass", "cut out", "opaque"]),
+        ({"Alpha": 0.5}, ["of glass", "opaque"]),
+    ],
+)
+def test_the_other_classes_are_tried(values, others):
+    assert [other.name for other in other_classes(material(**values), 0.0)] == others
+    assert [other.name for other in other_classes(material(**values), 2.0)] == ["glowing", *others]
+
+
+def test_a_class_begins_with_its_own_values_and_the_scenes_others():
+    own = material(Metallic=0.6, Roughness=0.5, Coat_Weight=0.3)
+    glass = changed(own, other_classes(own, 0.0)[0])
+    assert value_of(glass, "transmission_weight") == 1.0
+    assert value_of(glass, "metallic") == 0.0
+    assert value_of(glass, "coat_weight") == 0.3
+    assert value_of(own, "metallic") == 0.6
+    assert value_of(own, "transmission_weight") == 0.0  # Blender's own
+
+
+def test_a_link_decides_a_class():
+    own = material(Alpha=1.0, Transmission_Weight=0.0)
+    own["sockets"]["Alpha"]["linked"] = True
+    assert other_classes(own, 0.0) == []
+
+
+def test_a_cut_out_fits_how_much_there_is_of_it_but_no_glass():
+    cut_out = other_classes(material(), 0.0)[1]
+    assert parameters_of(cut_out, ("base_color", "ior", "transmission_weight")) == ["base_color", "alpha"]
+    assert parameters_of(other_classes(material(), 0.0)[0], ("base_color",)) == "all"
+
+
+def test_another_class_is_worth_it_where_the_material_may_be_wrong():
+    wrong = judgement(Verdict.DIFFERENT, Cause.MATERIAL)
+    assert is_worth_another(result(wrong), "all")
+    assert not is_worth_another(result(judgement(Verdict.SAME)), "all")
+    assert not is_worth_another(result(judgement(Verdict.DIFFERENT, Cause.PICTURE)), "all")
+    assert not is_worth_another(result(None), "all")
+    assert not is_worth_another(result(wrong), "reduced")  # the user holds transmission and alpha
+    assert not is_worth_another(result(wrong), ("base_color",))
+    assert not is_worth_another(result(wrong, "mitsuba_principled"), "all")
+
+
+def test_only_a_clearly_better_class_takes_the_place_of_the_scenes():
+    first = judgement(Verdict.DIFFERENT, Cause.MATERIAL, 0.2)
+    glowing, glass, _ = other_classes(material(), 2.0)
+    assert is_better(judgement(Verdict.CLOSE, Cause.MATERIAL, 0.08), first, glass)
+    assert not is_better(judgement(Verdict.DIFFERENT, Cause.MATERIAL, 0.12), first, glass)
+    assert not is_better(None, first, glass)
+    assert not is_better(judgement(Verdict.SAME, None, 0.01), judgement(Verdict.SAME, None, 0.015), glass)
+    # a glow stands for a lamp that is missing, but not for its light around the target
+    assert is_better(judgement(Verdict.CLOSE, Cause.LIGHT, 0.02), first, glass)
+    assert not is_better(judgement(Verdict.CLOSE, Cause.LIGHT, 0.02), first, glowing)
+    assert is_better(judgement(Verdict.SAME, None, 0.02), first, glowing)
+
+
+def test_a_glow_is_sought_below_what_the_target_shows():
+    target = np.array([[True, True, True, False]])
+    linear = Image(
+        np.array([[[0.1, 0.2, 0.4], [0.1, 0.3, 0.1], [5.0, 0.3, 0.3], [9.0, 9.0, 9.0]]], np.float32), Encoding.LINEAR
+    )
+    assert brightest_glow(linear, DisplayView(), target) == pytest.approx(0.6)
+    shown = Image(np.full((1, 4, 3), 0.5, np.float32), Encoding.SRGB)
+    assert brightest_glow(shown, DisplayView(exposure_ev=1.0), target) == pytest.approx(0.214, abs=1e-3)
+    assert brightest_glow(Image(np.zeros((1, 4, 3), np.float32), Encoding.LINEAR), DisplayView(), target) == 0.0
+
+
+def test_a_glow_is_written_as_a_full_colour_and_a_strength():
+    own = material(Coat_Weight=0.5)
+    glowing = other_classes(own, 4.0)[0]
+    assert "coat_weight" not in parameters_of(glowing, ("base_color", "coat_weight", "sheen_tint"))
+    fit = fitted(0.02).result
+    sure = {"emission_color": Certainty((0.01, 0.02, 0.01), Level.WEAK)}
+    fit = replace(fit, recovered={"emission_color": (0.1, 0.25, 0.05), "metallic": 0.0}, certainty=sure)
+    found = with_values_of(glowing, fit, own)
+    # the coat has been left out, which the material has to be told
+    assert found.recovered == {
+        "emission_color": pytest.approx((0.4, 1.0, 0.2)), "metallic": 0.0, "coat_weight": 0.0,
+        "emission_strength": pytest.approx(1.0),
+    }  # fmt: skip
+    assert found.certainty["emission_color"].sd == pytest.approx((0.04, 0.08, 0.04))
+    assert found.certainty["emission_strength"].sd == pytest.approx((0.08,))
+    assert set(found.bounds) == set(found.recovered)
+
+
+def test_what_a_class_has_held_is_part_of_its_result():
+    glass = material(Transmission_Weight=1.0, Metallic=0.0)
+    opaque = next(other for other in other_classes(glass, 0.0) if other.name == "opaque")
+    found = module._better(fitted(0.2), fitted(0.01, Verdict.SAME), opaque, glass).result
+    assert found.recovered == {"metallic": 0.4, "transmission_weight": 0.0}
+    assert found.initial == {"metallic": 0.0, "transmission_weight": 1.0}
+
+
+def fitted(visible, verdict=Verdict.DIFFERENT, status=Status.DIFFERENT):
+    result = FitResult(
+        status, "", "blender_principled", {"metallic": 0.0}, {"metallic": 0.4}, {}, (), {"flip": (0.3, visible)},
+        1.0, 2.0, judgement=judgement(verdict, Cause.MATERIAL, visible),
+    )  # fmt: skip
+    picture = np.full((2, 2, 3), visible, np.float32)
+    return module._Fitted(result, picture, picture, np.ones((2, 2), bool))
+
+
+def best_of(ends):
+    """What becomes of a fit whose glass and cut-out fits end so; None stands for a material that no fit holds."""
+
+    def fit_from(other):
+        end = ends[other.name]
+        if end is None:
+            raise UnrecordableError("It has a texture.")
+        return end
+
+    def is_wanted(found):
+        return is_worth_another(found.result, "all")
+
+    classes = other_classes(material(), 0.0)
+    return module._with_other_classes(fitted(0.2), material(), classes, fit_from, is_wanted).result
+
+
+def test_what_was_tried_in_vain_is_said():
+    found = best_of({"of glass": fitted(0.19), "cut out": fitted(0.3)})
+    assert found.notes == (
+        "The material of the scene did not match. "
+        "Fits that began again from one that is of glass or cut out came not clearly nearer.",
+    )
+    assert (found.seconds, found.passes) == (3.0, 6.0)
+    assert best_of({"of glass": None, "cut out": fitted(0.3)}).notes == (
+        "The material of the scene did not match. Fits that began again from one that is cut out came not clearly "
+        "nearer. No fit holds one that is of glass.",
+    )
+
+
+def test_the_class_that_is_better_is_the_only_one_named():
+    found = best_of({"of glass": fitted(0.02, Verdict.SAME, Status.CONVERGED), "cut out": None})
+    assert found.notes == (other_classes(material(), 0.0)[0].note,)
+    assert best_of({"of glass": fitted(0.08), "cut out": fitted(0.3)}).notes == found.notes
+
+
+def test_a_fit_that_was_stopped_is_not_called_worse():
+    stopped = fitted(0.3)
+    stopped = replace(stopped, result=replace(stopped.result, status=Status.CANCELLED, judgement=None))
+    assert best_of({"of glass": stopped, "cut out": stopped}).notes == ()

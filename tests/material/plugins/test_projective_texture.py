@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values found by projection: of the subpixel that shows the point, of a neighbour, or those outside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+HEIGHT, WIDTH = 4, 6
+# a camera that looks down the z axis: column is x, row is y, at any distance
+CAMERA = "1,0,0,0, 0,1,0,0, 0,0,0,1"
+
+
+@pytest.fixture
+def texture(tmp_path: Path) -> Any:
+    from mfo_backend.material.plugins.projective_texture import register  # needs the variant
+
+    register()
+    row, column = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    positions = np.stack([column + 0.5, row + 0.5, np.zeros_like(row)], axis=-1)
+    positions[:, -3:] = np.nan  # the surface ends after three columns
+    values = np.stack([column, row, 10.0 * row + column], axis=-1)
+    np.save(tmp_path / "positions.npy", positions)
+    np.save(tmp_path / "values.npy", values)
+    return mi.load_dict({
+        "type": "projective", "filename": str(tmp_path / "values.npy"), "camera": CAMERA,
+        "positions": str(tmp_path / "positions.npy"), "outside": mi.ScalarColor3f(7.0, 8.0, 9.0),
+    })  # fmt: skip
+
+
+def at(texture: Any, *points: tuple[float, float, float]) -> np.ndarray:
+    si = dr.zeros(mi.SurfaceInteraction3f, len(points))
+    si.p = mi.Point3f(*(mi.Float(list(axis)) for axis in zip(*points, strict=True)))
+    return np.array(texture.eval(si, mi.Bool(True))).T
+
+
+def test_a_point_has_the_value_of_its_subpixel(texture: Any) -> None:
+    found = at(texture, (0.1, 0.9, 0.0), (2.9, 3.2, 0.0), (1.5, 2.5, 0.3))
+    np.testing.assert_array_equal(found, [[0, 0, 0], [2, 3, 32], [1, 2, 21]])
+
+
+def test_just_beside_the_surface_a_neighbour_counts(texture: Any) -> None:
+    np.testing.assert_array_equal(at(texture, (3.2, 1.5, 0.0)), [[2, 1, 12]])
+
+
+def test_behind_it_beside_it_and_outside_of_the_picture_nothing_is_seen(texture: Any) -> None:
+    found = at(texture, (1.5, 1.5, 40.0), (5.9, 1.5, 0.0), (-0.5, 1.5, 0.0), (1.5, 4.5, 0.0))
+    np.testing.assert_array_equal(found, [[7, 8, 9]] * 4)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mfo_backend.render.pictures.renderer import Renderer, load_renderer
+from mfo_backend.types.errors import BadInputError
+
+SCENE = """<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="2"/></integrator>
+<sensor type="perspective"><float name="fov" value="40"/>
+<transform name="to_world"><lookat origin="0, -4, 0" target="0, 0, 0" up="0, 0, 1"/></transform>
+<film type="hdrfilm"><rfilter type="box"/><integer name="width" value="16"/><integer name="height" value="16"/></film>
+</sensor><bsdf type="twosided" id="glaze"><bsdf type="principled"/></bsdf>
+<shape type="sphere" id="target"><ref id="glaze"/></shape>
+<emitter type="point"><point name="position" x="2" y="-3" z="3"/><rgb name="intensity" value="20"/></emitter></scene>"""
+SOCKETS = {
+    "Base Color": {"value": [0.6, 0.2, 0.1], "linked": False},
+    "Roughness": {"value": 0.4, "linked": False},
+    "Coat Weight": {"value": 0.5, "linked": False},
+    "Metallic": {"value": 0.3, "linked": True},
+    "Normal": {"value": [0.0, 0.0, 0.0], "linked": False},
+}
+
+
+def load(tmp_path: Path, parameters, materials=None) -> Renderer:
+    path = tmp_path / "scene.xml"
+    path.write_text(SCENE)
+    if materials is None:
+        materials = {"glaze": {"name": "Glaze", "distribution": "MULTI_GGX", "sockets": SOCKETS}}
+    return load_renderer(path, "target", model="blender_principled", parameters=parameters, materials=materials)
+
+
+def test_starts_at_the_sockets_and_follows_finite_differences(tmp_path: Path) -> None:
+    renderer = load(tmp_path, ("base_color", "roughness", "coat_weight"))
+    assert renderer.table.unpack(renderer.start) == {
+        "base_color": (0.6, 0.2, 0.1),
+        "roughness": 0.4,
+        "coat_weight": 0.5,
+    }
+    weight = np.random.default_rng(0).random((16, 16, 3)).astype(np.float32)
+    image, pullback = renderer.image_and_pullback(renderer.start, seed=1, spp=4)
+    assert image[renderer.target_mask()].max() > 0.05
+    gradient = pullback(weight)
+    for i, h in enumerate(1e-2 * np.eye(renderer.table.length)):
+        low, high = (renderer.image(renderer.start + s * h, seed=1, spp=4).astype(float) for s in (-1, 1))
+        # a point light: paths do not move with the material; the rest is the h^2 of the difference and float32
+        np.testing.assert_allclose(gradient[i], np.sum((high - low) * weight) / 2e-2, rtol=5e-3)
+
+
+def test_the_whole_set_leaves_out_linked_and_invisible_parameters(tmp_path: Path) -> None:
+    names = load(tmp_path, "all").table.names
+    assert {"base_color", "roughness", "coat_weight", "sheen_weight", "specular_ior_level"} <= set(names)
+    assert not {"metallic", "alpha", "ior", "transmission_weight", "emission_strength"} & set(names)
+    assert load(tmp_path, "reduced").table.names == ("base_color", "roughness", "specular_ior_level")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "materials", "sentence"),
+    [
+        (("roughness",), {}, "Material 'glaze' has no sockets for model 'blender_principled' (given: none)"),
+        (("metallic",), None, "'metallic' is linked to a texture"),
+        (("emission_strength",), None, "it multiplies 'emission_color'"),
+        ("most", None, "Unknown parameter set 'most'"),
+        (("gloss",), None, "Unknown parameter 'gloss'"),
+    ],
+)
+def test_refuses_what_it_cannot_fit(tmp_path, parameters, materials, sentence: str) -> None:
+    with pytest.raises(BadInputError) as caught:
+        load(tmp_path, parameters, materials)
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize("world", [True, False], ids=["uniform world", "lamp"])
+def test_rough_glass_counts_unreachable_directions_only_for_lights_cycles_samples(tmp_path: Path, world: bool) -> None:
+    text = re.sub("<emitter.*</emitter>", '<emitter type="constant"/>', SCENE) if world else SCENE
+    path = tmp_path / "scene.xml"
+    path.write_text(text)
+    materials = {"glaze": {"name": "Glaze", "sockets": SOCKETS}}
+    renderer = load_renderer(path, "target", model="blender_principled", parameters=["roughness"], materials=materials)
+    assert renderer.shape.bsdf().reachable_only == world  # pyright: ignore[reportAttributeAccessIssue]

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A density must integrate to one and be the density of its own samples."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+mi.set_variant("llvm_ad_rgb")
+
+from mfo_backend.render.paths.proposal import DefensiveProposal  # noqa: E402  after the variant is set
+
+PROPOSALS = {"any": DefensiveProposal(), "sharp": DefensiveProposal.around(0.1), "rough": DefensiveProposal.around(0.9)}
+
+
+@pytest.mark.parametrize("name", PROPOSALS)
+@pytest.mark.parametrize("cosine", [0.95, 0.4])
+def test_samples_follow_the_density(name, cosine):
+    proposal = PROPOSALS[name]
+    n = 400_000
+    wi = dr.normalize(mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine))
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(1, n)
+    wo = proposal.sample(wi, sampler.next_1d(), sampler.next_2d())
+    density = np.array(proposal.density(wi, wo))
+    above = np.array(wo.z) > 0
+    # E[cos / density] is the integral of the cosine over the hemisphere
+    valid = above & (density > 0)
+    ratio = np.where(valid, 1.0 / np.maximum(density, 1e-9), 0.0)
+    assert np.mean(ratio * np.array(wo.z)) == pytest.approx(np.pi, rel=0.01)  # 400 000 samples of weight at most 2 pi
+
+
+def test_no_weight_explodes():
+    cosines = np.linspace(0.01, 1.0, 50)
+    wo = mi.Vector3f(mi.Float(np.sqrt(1 - cosines**2)), 0.0, mi.Float(cosines))
+    for proposal in PROPOSALS.values():
+        density = np.array(proposal.density(mi.Vector3f(0.0, 0.0, 1.0), wo))
+        assert (cosines / density).max() < np.pi / proposal.cosine_share * 1.001

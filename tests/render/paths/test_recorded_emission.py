@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A target that glows, on recorded paths. Oracle: Mitsuba's own integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mfo_backend.render.pictures.renderer import load_renderer
+from tests.render.scenes import POINT, write_scene
+
+GLOW = '<emitter type="area"><rgb name="radiance" value="0.3, 0.2, 0.1"/></emitter>'
+
+
+def test_the_targets_own_light_is_part_of_the_constant_picture(tmp_path):
+    materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": {}}}
+    path = write_scene(tmp_path, POINT, shape=GLOW)
+    names = ["base_color", "roughness"]
+    renderer = load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    x = renderer.table.pack({"base_color": (0.7, 0.3, 0.1), "roughness": 0.4})
+    paths = scene.record(x, grid=10, seed=3, near=False)
+    groups = paths.tile_groups(paths.interior)
+    got = scene.evaluator(paths, groups)(x)[:, :, 0]
+    expected = groups.average(renderer.image(x, seed=7, spp=256))
+    error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
+    assert error < 0.02  # `path` picks one of two lights: 1.6 % in a tile of 4096 samples
+    assert got.min() > 0.09  # nothing is darker than the glow
+
+
+def test_free_emission_is_linear_in_picture_and_derivatives(tmp_path):
+    sockets = {
+        "Emission Color": {"value": [0.5, 0.4, 0.2], "linked": False},
+        "Emission Strength": {"value": 0.8, "linked": False},
+    }
+    materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": sockets, "film_exposure": 1.5}}
+    path = write_scene(tmp_path, POINT, shape=GLOW)  # which the sockets know better
+    names = ["base_color", "roughness", "emission_color"]
+    renderer = load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    np.testing.assert_allclose(renderer.start[-3:], [0.5, 0.4, 0.2])
+    recorded_for = renderer.table.pack({"base_color": (0.7, 0.3, 0.1), "roughness": 0.4, "emission_color": 0.9})
+    paths = scene.record(recorded_for, grid=10, seed=3, near=False)
+    groups = paths.tile_groups(paths.interior)
+    x = renderer.table.pack({"base_color": (0.7, 0.3, 0.1), "roughness": 0.4, "emission_color": (0.1, 0.3, 0.6)})
+    got = scene.evaluator(paths, groups)(x)
+    expected = groups.average(renderer.image(x, seed=7, spp=256))
+    error = np.sqrt(np.mean((got[:, :, 0] - expected) ** 2) / np.mean(expected**2))
+    assert error < 0.02  # a ball does not light itself
+    assert got[:, 2, 0].min() > 0.6 * 0.8 * 1.5 - 0.02
+    np.testing.assert_allclose(got[:, :, -3:], 1.2 * np.broadcast_to(np.eye(3), (len(got), 3, 3)), atol=1e-4)
+    np.testing.assert_allclose(scene.pictures(paths, groups)(x)[:, :, 0], got[:, :, 0], rtol=1e-4)
