@@ -7,21 +7,13 @@ import atexit
 
 import bpy
 
-from . import (
-    backend_state,
-    comparison,
-    cycles_check,
-    handlers,
-    panel,
-    preferences_page,
-    preflight,
-    previews,
-    properties,
-    running_job,
-    translations,
-)
+from . import panel, properties, translations
+from .backend import backend_state, preferences_page
+from .check import preflight
 from .operators import CLASSES as OPERATORS
 from .panel import menu
+from .result import comparison, previews
+from .running import cycles_check, handlers, running_job
 from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences_page.CLASSES, *OPERATORS, *panel.CLASSES)

@@ -54,7 +54,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     """Write the job folder of an object's active material."""
     bpy = _open(chosen.file)
     from .export.job import ExportError, export_job
-    from .local_copy import unwritable
+    from .result.local_copy import unwritable
 
     obj = bpy.context.scene.objects.get(chosen.object)
     if obj is None:
@@ -101,7 +101,7 @@ def apply(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def _refuse_mismatch(chosen: argparse.Namespace) -> None:
-    from .job_result import JobResultError, must_ask, read_job_result
+    from .result.job_result import JobResultError, must_ask, read_job_result
 
     try:
         result = read_job_result(Path(chosen.job).absolute())
@@ -113,9 +113,9 @@ def _refuse_mismatch(chosen: argparse.Namespace) -> None:
 
 def _put_values(bpy: Any, chosen: argparse.Namespace) -> tuple[Any, Any, dict[str, Any], list[str]]:
     """Apply a job's result; returns the material, the result, its values by socket and what was skipped."""
-    from .job_result import JobResultError, read_job_result
-    from .local_copy import LocalCopyError, make_local, unwritable
-    from .write_back import WriteBackError, apply_values, result_to_sockets
+    from .result.job_result import JobResultError, read_job_result
+    from .result.local_copy import LocalCopyError, make_local, unwritable
+    from .result.write_back import WriteBackError, apply_values, result_to_sockets
 
     try:
         result = read_job_result(Path(chosen.job).absolute())

@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import comparison
+from .result import comparison
 from .versions import RELATIVE_PATH
 
 # name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance

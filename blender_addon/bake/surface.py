@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from ..export.read_mesh import material_of_slot, slot_count
+from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..versions import active_output
 from .closure_tree import ClosureTree, Leaf, Value
 from .dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for

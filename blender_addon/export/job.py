@@ -12,20 +12,20 @@ from typing import Any
 import bpy
 import tomllib
 
-from ..animated_sockets import animation_notes
-from ..local_copy import unwritable
+from ..result.animated_sockets import animation_notes
+from ..result.local_copy import unwritable
+from .files.job_folder import GENERATOR, new_job_folder
 from .findings import ExportError, Findings
-from .job_folder import GENERATOR, new_job_folder
 from .material_model import Material
-from .node_graph import FOLDER as GRAPH_FOLDER
-from .node_graph import evaluate_graph, probe_for
-from .read_scene import read_scene
-from .reference import Reference, read_reference
-from .reference_view import SCENE, output_view
-from .scene_bakes import SceneBakes
-from .scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
-from .scene_file import SceneFiles, scene_files
-from .target_shader import TargetShader, target_shader
+from .materials.node_graph import FOLDER as GRAPH_FOLDER
+from .materials.node_graph import evaluate_graph, probe_for
+from .nodes.target_shader import TargetShader, target_shader
+from .reference.reference import Reference, read_reference
+from .reference.reference_view import SCENE, output_view
+from .scene.read_scene import read_scene
+from .scene.scene_bakes import SceneBakes
+from .scene.scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
+from .scene.scene_file import SceneFiles, scene_files
 
 SCHEMA_VERSION = 1
 

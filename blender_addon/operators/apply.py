@@ -9,11 +9,19 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from .. import running_job, shown_result
-from ..job_result import JobResult, JobResultError, must_ask, read_job_result
-from ..local_copy import unwritable
-from ..preflight import redraw
-from ..write_back import WriteBackError, apply_values, fitted_shader, result_to_sockets, revert_values, toggle_values
+from ..check.preflight import redraw
+from ..result import shown_result
+from ..result.job_result import JobResult, JobResultError, must_ask, read_job_result
+from ..result.local_copy import unwritable
+from ..result.write_back import (
+    WriteBackError,
+    apply_values,
+    fitted_shader,
+    result_to_sockets,
+    revert_values,
+    toggle_values,
+)
+from ..running import running_job
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}

@@ -9,8 +9,9 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from .. import backend_state, running_job
-from ..preferences import preference
+from ..backend import backend_state
+from ..backend.preferences import preference
+from ..running import running_job
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 

@@ -9,11 +9,12 @@ from contextlib import suppress
 import bpy
 from bpy.props import StringProperty
 
-from .. import preflight, running_job
-from ..checks import from_export, in_order, quick_check
+from ..check import preflight
+from ..check.checks import from_export, in_order, quick_check
+from ..check.mending import KINDS, MendingError
 from ..export.job import ExportError, export_findings
-from ..mending import KINDS, MendingError
 from ..properties import toggle_bound
+from ..running import running_job
 
 _BUTTON = {"HIDDEN", "SKIP_SAVE"}
 

@@ -7,8 +7,10 @@
 import bpy
 from bpy.props import StringProperty
 
-from .. import cycles_check, preflight, shown_result
-from ..preferences import new_job_folder
+from ..backend.preferences import new_job_folder
+from ..check import preflight
+from ..result import shown_result
+from ..running import cycles_check
 from .fit_options import FitError, python_of
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}

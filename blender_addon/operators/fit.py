@@ -7,8 +7,9 @@
 import bpy
 from bpy.props import IntProperty, StringProperty
 
-from .. import fit_queue, running_job, shown_result
-from ..backend_section import needs_setup
+from ..backend.backend_section import needs_setup
+from ..result import shown_result
+from ..running import fit_queue, running_job
 from .check import thorough_check
 from .fit_options import FitError, FitOptions, selected_targets, target_of
 

@@ -11,16 +11,16 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .. import fit_queue, running_job
-from ..backend_python import BackendPythonError
+from ..backend.preferences import chosen_python, new_job_folder
 from ..export.job import ExportError, export_job
-from ..export.reference_view import REFERENCE_VIEWS
-from ..export.target_shader import target_shader
-from ..fit_queue import PreparedFit
-from ..local_copy import unwritable
-from ..preferences import chosen_python, new_job_folder
+from ..export.nodes.target_shader import target_shader
+from ..export.reference.reference_view import REFERENCE_VIEWS
+from ..process.backend_python import BackendPythonError
 from ..properties import chosen_of, crossed_limits
-from ..write_back import WriteBackError, fitted_shader
+from ..result.local_copy import unwritable
+from ..result.write_back import WriteBackError, fitted_shader
+from ..running import fit_queue, running_job
+from ..running.fit_queue import PreparedFit
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}

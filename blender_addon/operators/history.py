@@ -9,10 +9,12 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from .. import history, preflight, running_job, shown_result
-from ..job_result import JobResultError, must_ask, read_job_result
-from ..local_copy import unwritable
-from ..write_back import WriteBackError, apply_values
+from ..check import preflight
+from ..result import history, shown_result
+from ..result.job_result import JobResultError, must_ask, read_job_result
+from ..result.local_copy import unwritable
+from ..result.write_back import WriteBackError, apply_values
+from ..running import running_job
 from .apply import PRESS_AGAIN, was_asked
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}

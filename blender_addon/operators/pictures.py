@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ..comparison import comparison_image, picture_image, split_image
+from ..result.comparison import comparison_image, picture_image, split_image
 
 
 class _JobOperator:

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import bpy
 
-from .. import preflight, running_job
-from ..checks import FINE, IGNORED, STOPS, TO_CHOOSE, Finding
-from ..mending import KINDS
+from ..check import preflight
+from ..check.checks import FINE, IGNORED, STOPS, TO_CHOOSE, Finding
+from ..check.mending import KINDS
+from ..running import running_job
 from .layout import draw_sentence
 
 _ICONS = {STOPS: "ERROR", TO_CHOOSE: "FORWARD", IGNORED: "INFO", FINE: "CHECKMARK"}

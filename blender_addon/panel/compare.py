@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from .. import comparison, cycles_check, previews, shown_result
+from ..result import comparison, previews, shown_result
+from ..running import cycles_check
 from .layout import draw_messages, draw_numbers, draw_pictures, draw_sentence
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..shown_result import VERDICT_ICONS
+from ..result.shown_result import VERDICT_ICONS
 
 
 class MFO_UL_history(bpy.types.UIList):

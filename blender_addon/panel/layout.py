@@ -7,7 +7,7 @@ import textwrap
 
 import bpy
 
-from .. import previews
+from ..result import previews
 
 _LABELS = {"cycles": "In Cycles", "cycles_difference": "Difference"}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from .. import running_job
-from ..export.target_shader import TargetShader, target_shader
+from ..export.nodes.target_shader import TargetShader, target_shader
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
+from ..running import running_job
 
 
 class Parameters:

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from .. import preflight, running_job
-from ..checks import asks_view
+from ..check import preflight
+from ..check.checks import asks_view
+from ..running import running_job
 from .layout import letters
 
 _LETTERS_OF_A_ROW = 27  # of a line that holds both answers uncut; a narrower side bar has one below the other

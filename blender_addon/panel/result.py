@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import bpy
 
-from .. import previews
-from ..animated_sockets import animation_of
-from ..export.target_shader import target_shader
-from ..job_result import must_ask
+from ..export.nodes.target_shader import target_shader
+from ..result import previews
+from ..result.animated_sockets import animation_of
+from ..result.job_result import must_ask
 from .layout import draw_sentence, letters
 
 _LETTERS_OF_THREE = 26  # of a line with name, start and result; a narrower side bar has no start

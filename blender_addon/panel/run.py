@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import bpy
 
-from .. import fit_queue, previews, running_job, shown_result
-from ..backend_section import draw_setup, has_trouble
-from ..job_result import must_ask
+from ..backend.backend_section import draw_setup, has_trouble
 from ..operators.fit_options import selected_targets
+from ..result import previews, shown_result
+from ..result.job_result import must_ask
+from ..running import fit_queue, running_job
 from .layout import draw_pictures, draw_sentence, letters
 
 

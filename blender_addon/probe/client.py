@@ -16,10 +16,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ..backend_python import EXTENSION_ROOT
-from ..background_task import environment_for
-from ..job_process import log_tail
-from ..process_group import KILL, own_group, process_lives, signal_group
+from ..process.backend_python import EXTENSION_ROOT
+from ..process.background_task import environment_for
+from ..process.job_process import log_tail
+from ..process.process_group import KILL, own_group, process_lives, signal_group
 from .own_blender import own_blender, save_copy
 
 PREFIX = "material_fit_probe_"

@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export.color_space import to_rec709
-from ..export.shader_graph import source_of
+from ..export.images.color_space import to_rec709
+from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
 from .aov_render import frame_of, render_outputs, world_to_frame
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy

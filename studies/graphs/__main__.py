@@ -79,8 +79,8 @@ def row(graph: str, light: str, seed: int, size: int) -> dict[str, Any]:
     import bpy
 
     from blender_addon.export.job import export_job
-    from blender_addon.job_result import read_job_result
-    from blender_addon.write_back import apply_values, result_to_sockets
+    from blender_addon.result.job_result import read_job_result
+    from blender_addon.result.write_back import apply_values, result_to_sockets
 
     target, node = build_scene(graph, light, size)
     draw = random.Random(f"{graph} {light} {seed}")

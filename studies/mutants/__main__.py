@@ -37,7 +37,7 @@ DRAWN = {
     "mfo_backend/scene": 22,
     "mfo_backend/fit": 40,
     "blender_addon/export": 20,
-    "blender_addon/write_back.py": 6,
+    "blender_addon/result/write_back.py": 6,
 }
 
 

@@ -24,12 +24,12 @@ WRONG = [
     ),
     ("mfo_backend/fit/squares/recording_noise.py", "MOST_TAKEN * own_near) - own_near", "MOST_TAKEN * own_near)"),
     # a colour's alpha becomes 1 with Apply
-    ("blender_addon/write_back.py", "return (*map(float, color), held[3])", "return (*map(float, color), 1.0)"),
+    ("blender_addon/result/write_back.py", "return (*map(float, color), held[3])", "return (*map(float, color), 1.0)"),
     # Revert leads to what an earlier fit applied
-    ("blender_addon/write_back.py", "if name not in kept.originals:", "if True:"),
+    ("blender_addon/result/write_back.py", "if name not in kept.originals:", "if True:"),
     # the end of a line that was too long counts as a line of its own
     (
-        "blender_addon/progress_lines.py",
+        "blender_addon/process/progress_lines.py",
         'skipping = not line.endswith(b"\\n")',
         "skipping = False",
     ),

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from blender_addon import job_process, job_result
+from blender_addon.process import job_process
+from blender_addon.result import job_result
 from mfo_backend.types.status import Status
 
 
@@ -16,7 +17,7 @@ def test_exit_codes_mean_the_same() -> None:
 
 
 def test_good_outcomes_are_those_with_exit_code_0(addon: object) -> None:
-    from blender_addon import running_job
+    from blender_addon.running import running_job
 
     assert {s.value for s in Status if s.exit_code == 0} == running_job._GOOD
 

@@ -185,7 +185,7 @@ def test_failures_of_the_backend_reach_the_script(
 
 
 def step_until(scene: SimpleNamespace, done) -> None:
-    from blender_addon import running_job
+    from blender_addon.running import running_job
 
     end = time.monotonic() + 20
     while not done():
@@ -196,7 +196,7 @@ def step_until(scene: SimpleNamespace, done) -> None:
 
 def test_how_sure_a_value_is(tmp_path: Path) -> None:
     """Two standard deviations to each side, within what the fit could have chosen; null stands for infinity."""
-    from blender_addon.job_result import read_job_result
+    from blender_addon.result.job_result import read_job_result
 
     (tmp_path / "request.json").write_text(json.dumps({"schema_version": 1, "target": {}}))
     levels = {"roughness": ([0.05], "weak"), "metallic": ([0.1], "doubtful"), "sheen_weight": ([None], "weak")}
@@ -226,7 +226,7 @@ def test_values_are_copied_as_text(scene: SimpleNamespace) -> None:
 
 
 def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blender_addon.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
+    monkeypatch.setattr("blender_addon.process.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
     monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
     assert fit(scene, wait=False) == {"FINISHED"}
     assert not scene.bpy.ops.mfo.fit.poll()
@@ -270,7 +270,7 @@ def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeyp
 
 
 def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    from blender_addon import running_job
+    from blender_addon.running import running_job
 
     monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60, "end": "deaf"}))
     fit(scene, wait=False)
@@ -282,7 +282,7 @@ def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch
 
 
 def test_disable_and_enable_with_a_running_fit(scene: SimpleNamespace, addon, monkeypatch: pytest.MonkeyPatch) -> None:
-    from blender_addon import running_job
+    from blender_addon.running import running_job
 
     bpy = scene.bpy
     handlers = {name: len(getattr(bpy.app.handlers, name)) for name in ("load_pre", "load_post", "undo_post")}

@@ -96,7 +96,7 @@ def test_a_disk_that_is_full_when_the_backend_starts(scene: SimpleNamespace, mon
 
 
 def test_two_blenders_choose_two_folders(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    from blender_addon.preferences import new_job_folder
+    from blender_addon.backend.preferences import new_job_folder
 
     context, first = scene.bpy.context, os.getpid()
     names = set()

@@ -131,6 +131,6 @@ def _alive(pid: int) -> bool:
 
 
 def test_no_socket_of_the_principled_is_dropped_in_silence(blender: RealBlender) -> None:
-    """As tests/export/test_materials.py, with the sockets of this Blender: Thin Wall came with 5.2."""
+    """As tests/export/materials/test_materials.py, with the sockets of this Blender: Thin Wall came with 5.2."""
     walk = Path(__file__).resolve().parents[1] / "export" / "socket_walk.py"
     assert "SILENT []" in blender.run("--python-exit-code", "3", "--python", str(walk)).stdout

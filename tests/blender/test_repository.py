@@ -66,7 +66,7 @@ def test_installs_from_the_repository_and_uninstalls_without_a_trace(blender: Re
     script = (
         "import bpy, sys, pathlib; m = f'bl_ext.material_fit_here.material_fit_mfo';"
         "import addon_utils; addon_utils.enable(m); assert bpy.ops.mfo.fit.get_rna_type().name == 'Fit Material';"
-        "root = sys.modules[m].blender_addon.preferences.backend_root(); (root / 'env-1').mkdir(parents=True);"
+        "root = sys.modules[m].blender_addon.backend.preferences.backend_root(); (root / 'env-1').mkdir(parents=True);"
         "print('ROOT', root)"
     )
     out = blender.run("--python-exit-code", "3", "--python-expr", script, factory=False).stdout

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ..addon import fake_backend
-from ..addon.wheel_folder import write_wheel
+from ..addon.backend.wheel_folder import write_wheel
 from .conftest import ADDON_ID, RealBlender
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]

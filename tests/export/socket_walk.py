@@ -18,10 +18,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from blender_addon.export.findings import Findings
-from blender_addon.export.material_elements import bsdf_element
-from blender_addon.export.node_graph import names_by_graph
-from blender_addon.export.read_material import read_context, read_target
-from blender_addon.export.target_shader import target_shader
+from blender_addon.export.materials.material_elements import bsdf_element
+from blender_addon.export.materials.node_graph import names_by_graph
+from blender_addon.export.materials.read_material import read_context, read_target
+from blender_addon.export.nodes.target_shader import target_shader
 from mfo_backend.material.principled.principled_parameters import PARAMETER_OF_SOCKET
 
 # With these no lobe is off, so that every other socket has an effect

@@ -157,7 +157,7 @@ def test_addon_never_imports_a_renderer() -> None:
     root = Path(__file__).resolve().parents[2] / "blender_addon"
     blender = {"bpy", "_cycles", "mathutils", "bpy_extras", "gpu", "blf", "gpu_extras"}
     allowed = blender | {"numpy"} | set(sys.stdlib_module_names)
-    for path in [*(root / "export").glob("*.py"), root / "versions.py"]:
+    for path in [*(root / "export").rglob("*.py"), root / "versions.py"]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             if isinstance(node, ast.ImportFrom) and not node.level:

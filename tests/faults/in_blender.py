@@ -19,7 +19,7 @@ from typing import Any
 import bpy
 
 import blender_addon
-from blender_addon import running_job
+from blender_addon.running import running_job
 
 OBJECT = "Suzanne"
 FIT = {"object": OBJECT, "preset": "fast", "wait": False}

@@ -149,7 +149,7 @@ def _request(folder: Path) -> Target:
 
 def _result(folder: Path) -> Target:
     job = _job(folder / "result")
-    reader = importlib.import_module("blender_addon.job_result")
+    reader = importlib.import_module("blender_addon.result.job_result")
 
     def run(data: bytes) -> None:
         job.result.write_bytes(data)
@@ -163,7 +163,7 @@ def _result(folder: Path) -> Target:
 
 
 def _progress() -> Target:
-    reader = importlib.import_module("blender_addon.progress_lines")
+    reader = importlib.import_module("blender_addon.process.progress_lines")
     events = (
         {"event": "started", "stages": ["mse-hdr"], "parameters": ["roughness"], "seconds": 0.8},
         {"event": "progress", "stage": "mse-hdr", "stage_index": 0, "iteration": 12, "loss": 0.01, "fraction": 0.2},

@@ -17,8 +17,8 @@ def test_a_new_light_goes_from_blender_to_the_floor(tmp_path: Path) -> None:
         import bpy, xml.etree.ElementTree as ElementTree
         import numpy as np
         from blender_addon.export.findings import Findings
-        from blender_addon.export.light_elements import light_element
-        from blender_addon.export.read_light import read_light
+        from blender_addon.export.lights.light_elements import light_element
+        from blender_addon.export.lights.read_light import read_light
 
         data = bpy.data.lights.new("Ring", "AREA")
         data.shape, data.size, data.energy = "DISK", 2.0, 100.0

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from blender_addon.export.exr_file import write_exr as write_exr_of_the_addon
+from blender_addon.export.files.exr_file import write_exr as write_exr_of_the_addon
 from mfo_backend.scene.image_file import read_image, write_exr, write_png
 from mfo_backend.types.image import Encoding
 

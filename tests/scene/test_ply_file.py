@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blender_addon.export.ply_file import TriangleMesh
-from blender_addon.export.ply_file import write_ply as write_addon_ply
+from blender_addon.export.files.ply_file import TriangleMesh
+from blender_addon.export.files.ply_file import write_ply as write_addon_ply
 from mfo_backend.bench.scenes.bumpy_sphere import bumpy_sphere, write_ply
 from mfo_backend.scene.ply_file import check_ply
 from mfo_backend.types.errors import BadInputError

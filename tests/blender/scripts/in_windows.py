@@ -22,7 +22,10 @@ addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
 running_job, panel, preflight, fit_queue, handlers, cycles_check, shown_result = (
     importlib.import_module(f"{addon_id}.blender_addon.{name}")
-    for name in ("running_job", "panel", "preflight", "fit_queue", "handlers", "cycles_check", "shown_result")
+    for name in (
+        *("running.running_job", "panel", "check.preflight", "running.fit_queue", "running.handlers"),
+        *("running.cycles_check", "result.shown_result"),
+    )
 )
 LONGEST_STALL = 0.05  # seconds
 spent: list[tuple[float, float, str]] = []  # wall seconds, seconds of this thread's processor time, name

@@ -46,7 +46,8 @@ package.unregister()
 package.register()
 addon_utils.disable(addon_id)
 assert not leftovers(), leftovers()
-timers = [package.running_job._tick, package.backend_state._tick, package.backend_state._first_look]
+state = package.backend.backend_state
+timers = [package.running.running_job._tick, state._tick, state._first_look]
 assert not any(map(bpy.app.timers.is_registered, timers))
 assert not {"mitsuba", "drjit", "OpenEXR", "scipy"} & set(sys.modules)
 print("ALL GOOD", "with German" if has_german else "without German")

@@ -17,9 +17,9 @@ import addon_utils
 import bpy
 
 addon_id, wheels, lock, python = sys.argv[sys.argv.index("--") + 1 :]
-state = importlib.import_module(f"{addon_id}.blender_addon.backend_state")
-section = importlib.import_module(f"{addon_id}.blender_addon.backend_section")
-install = importlib.import_module(f"{addon_id}.blender_addon.backend_install")
+state = importlib.import_module(f"{addon_id}.blender_addon.backend.backend_state")
+section = importlib.import_module(f"{addon_id}.blender_addon.backend.backend_section")
+install = importlib.import_module(f"{addon_id}.blender_addon.backend.backend_install")
 LONGEST_STALL = 0.05  # seconds
 spent: list[float] = []
 bpy.context.preferences.view.show_splash = False

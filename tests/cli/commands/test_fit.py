@@ -23,7 +23,8 @@ FAKE = """
 import argparse, sys
 sys.path.insert(0, {folder!r})
 from fake_worker import fake_fit
-from mfo_backend.cli import fit, main
+from mfo_backend.cli import main
+from mfo_backend.cli.commands import fit
 def add_parser(subparsers, real=fit.add_parser):
     real(subparsers)
     subparsers.choices["fit"].set_defaults(func=lambda arguments: fit.work(arguments, fake_fit))

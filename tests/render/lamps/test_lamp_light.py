@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Light and densities of single lamps. Oracles: closed forms, and means over uniform directions. Cycles itself is the
-oracle in tests/export/test_lamps.py."""
+oracle in tests/export/lights/test_lamps.py."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The integrator that treats indirect light as Cycles does. Oracles: Mitsuba's `prb` with everything switched off, and
-finite differences. Cycles itself is the oracle in tests/export/test_light_paths.py."""
+finite differences. Cycles itself is the oracle in tests/export/scene/test_light_paths.py."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_five_scenes_hold_no_silent_difference() -> None:
 
 def test_a_planted_difference_is_minimised_to_its_cause(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """A lamp that the export forgets: the setting that brightens it is what remains of three."""
-    from blender_addon.export import read_light
+    from blender_addon.export.lights import read_light
     from studies.differential.study import minimised, try_scene
 
     monkeypatch.setattr(read_light, "light_strength", lambda light: 350.0)

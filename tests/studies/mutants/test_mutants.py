@@ -61,8 +61,8 @@ def test_the_draw_is_large_compiles_and_is_the_same_again() -> None:
     ("path", "first"),
     [
         ("mfo_backend/scene/png_file.py", "tests/scene/test_png_file.py"),
-        ("blender_addon/write_back.py", "tests/addon/test_write_back.py"),
-        ("blender_addon/export/view_lut.py", "tests/export/test_view_lut.py"),
+        ("blender_addon/result/write_back.py", "tests/addon/result/test_write_back.py"),
+        ("blender_addon/export/reference/view_lut.py", "tests/export/reference/test_view_lut.py"),
         ("mfo_backend/fit/alike/simplest.py", "tests/fit/alike/test_simplest.py"),
     ],
 )

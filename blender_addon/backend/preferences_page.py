@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page of the add-on preferences; what is chosen there is read by `preferences`."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+import os
+
+import bpy
+from bpy.props import StringProperty
+
+from ..process.backend_python import VARIABLE
+from . import backend_state
+from .backend_section import draw_setup
+from .preferences import ADDON_ID
+
+
+def _look_again(_self: object, _context: bpy.types.Context) -> None:
+    backend_state.look()
+
+
+class MFO_AP_preferences(bpy.types.AddonPreferences):
+    """Preferences of the extension."""
+
+    bl_idname = ADDON_ID
+
+    backend_python: StringProperty(
+        name="Backend Python",
+        description="A Python of your own that has Mitsuba; empty: the one that Install makes",
+        subtype="FILE_PATH",
+        update=_look_again,
+    )
+    base_python: StringProperty(
+        name="Install With",
+        description="Python 3.10 to 3.14 that carries the installed backend; empty: one is looked for",
+        subtype="FILE_PATH",
+    )
+    wheels: StringProperty(
+        name="Wheels",
+        description="Folder of downloaded packages to install from without network; empty: download them",
+        subtype="DIR_PATH",
+    )
+    job_root: StringProperty(
+        name="Job Folders",
+        description="Folder that gets one folder per fit; empty: the user folder of this extension",
+        subtype="DIR_PATH",
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The state of the backend, the paths, and a line where the variable wins over the first."""
+        layout = self.layout
+        letters = int((context.region.width / context.preferences.system.ui_scale - 140) / 5.8)
+        draw_setup(layout, width=max(16, letters))
+        layout.use_property_split = True
+        layout.prop(self, "base_python")
+        layout.prop(self, "wheels")
+        layout.separator()
+        layout.prop(self, "backend_python")
+        if os.environ.get(VARIABLE):
+            layout.label(text=f"{VARIABLE} is set and used instead: {os.environ[VARIABLE]}", icon="INFO")
+        layout.prop(self, "job_root")
+
+
+CLASSES = (MFO_AP_preferences,)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene camera and the picture's size, as Cycles would use them."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...versions import cycles_settings
+from ..findings import Findings, Fix
+from .camera_model import Camera, PixelFilter
+
+
+def picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
+    """Return width and height in pixels, the percentage applied as Blender does."""
+    percent = render.resolution_percentage
+    return render.resolution_x * percent // 100, render.resolution_y * percent // 100
+
+
+def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings: Findings) -> Camera | None:
+    """Return the scene camera, or None with an error in `findings`."""
+    if not has_camera(scene, findings):
+        return None
+    evaluated = scene.camera.evaluated_get(depsgraph)
+    data = evaluated.data
+    render = scene.render
+    name = scene.camera.name
+    note_picture_settings(scene, findings)
+    width, height = picture_size(render)
+    aspect = render.pixel_aspect_x / render.pixel_aspect_y
+    square_width, square_height = (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
+    if (square_width, square_height) != (width, height):
+        findings.note(
+            f"Pixel aspect {render.pixel_aspect_x:g}:{render.pixel_aspect_y:g}: the reference is stretched from "
+            f"{width}x{height} to {square_width}x{square_height} square pixels."
+        )
+    world = np.array(evaluated.matrix_world, dtype=np.float64)
+    lengths = np.linalg.norm(world[:3, :3], axis=0)
+    if lengths.min() < 1e-12:
+        findings.error(f"Camera '{name}' has a scale of zero: give it and its parents a scale other than zero.")
+        return None
+    world[:3, :3] /= lengths  # Cycles ignores the scale of a camera
+    if not np.allclose(world[:3, :3].T @ world[:3, :3], np.eye(3), atol=1e-4):
+        findings.error(f"Camera '{name}' is sheared by its parents: clear the parent's non-uniform scale.")
+    return Camera(
+        kind=data.type,
+        world=world,
+        width=square_width,
+        height=square_height,
+        fit=data.sensor_fit,
+        sensor_width=data.sensor_width,
+        sensor_height=data.sensor_height,
+        lens=data.lens,
+        ortho_scale=data.ortho_scale,
+        shift_x=data.shift_x,
+        shift_y=data.shift_y,
+        clip_start=data.clip_start,
+        clip_end=data.clip_end,
+    )
+
+
+def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
+    """Report what the scene's camera and output settings do to a picture and the fit does not."""
+    render = scene.render
+    if render.use_border:
+        findings.error(
+            "Render Region is on, so the picture shows a part of the frame: turn Render Region off.", Fix("whole_frame")
+        )
+    if render.use_multiview:
+        findings.error("Stereoscopy is on: turn it off to fit a single picture.", Fix("one_eye"))
+    if scene.camera.data.dof.use_dof:
+        findings.note(f"Camera '{scene.camera.name}': depth of field is left out, everything is sharp.")
+    if render.use_motion_blur:
+        findings.note("Motion blur is left out: the scene is exported at the current frame.")
+
+
+def has_camera(scene: bpy.types.Scene, findings: Findings) -> bool:
+    """Whether the scene camera is one the fit knows; else an error in `findings` says why not."""
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA":
+        names = [item.name for item in scene.objects if item.type == "CAMERA"]
+        fixes = [Fix("camera", name) for name in names[:3]] or [Fix("new_camera")]
+        findings.error("The scene has no camera: add one and make it the active camera.", *fixes)
+        return False
+    if camera.data.type not in ("PERSP", "ORTHO"):
+        sentence = f"Camera '{camera.name}' is of type {camera.data.type.title()}: make it Perspective or Orthographic."
+        findings.error(sentence, Fix("perspective"))
+        return False
+    return True
+
+
+def read_pixel_filter(scene: bpy.types.Scene) -> PixelFilter:
+    """Return Cycles' pixel filter; its default where Cycles is off."""
+    cycles = cycles_settings(scene)
+    if cycles is None:
+        return PixelFilter("BLACKMAN_HARRIS", 1.5)
+    return PixelFilter(cycles.pixel_filter_type, cycles.filter_width)

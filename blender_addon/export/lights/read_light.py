@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender light objects as the numbers of `light_model`."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...versions import cycles_settings, light_color, light_is_normalized, light_strength, node_tree_of
+from ..audit.object_table import LIGHT_CYCLES
+from ..audit.rules import name_settings
+from ..findings import Findings
+from ..images.color_space import to_rec709
+from ..nodes.shader_graph import emission_of
+from .light_model import Light
+
+# cubic metres; a light thinner than any scene needs has no area that light could come from
+LEAST_VOLUME = 1e-18
+
+
+def read_light(
+    evaluated: bpy.types.Object, matrix: NDArray[np.float64], exposure: float, findings: Findings
+) -> Light | None:
+    """Return the light with its power scaled by `exposure`, or None if it gives no light."""
+    data = evaluated.data
+    name = evaluated.name
+    cycles = cycles_settings(data)
+    if data.type == "AREA" and cycles is not None and cycles.is_portal:
+        findings.note(f"Light '{name}' is a portal, which gives no light of its own; it is left out.")
+        return None
+    color = to_rec709(light_color(data))
+    tree = node_tree_of(data)
+    if tree is not None:
+        emission = emission_of(tree)
+        if emission is None:
+            findings.error(
+                f"Light '{name}' has shader nodes other than one Emission with plain values: simplify them or turn "
+                "Use Nodes off."
+            )
+            return None
+        color = color * emission
+    power = light_strength(data) * exposure
+    if power < 0.0 or color.min() < 0.0:
+        findings.error(f"Light '{name}' takes light away (negative power or colour): make it positive.")
+        return None
+    if power == 0.0 or color.max() == 0.0:
+        return None
+    if not data.use_shadow:
+        findings.note(f"Light '{name}' casts no shadows in Blender; in the fit it does.")
+    name_settings(LIGHT_CYCLES, cycles, name, findings)
+    _note_linking(evaluated, findings)
+    _note_rays(evaluated, findings)
+    light = Light(
+        kind=data.type,
+        name=name,
+        world=matrix,
+        color=color,
+        power=power,
+        normalize=light_is_normalized(data),
+        radius=getattr(data, "shadow_soft_size", 0.0) if data.type in ("POINT", "SPOT") else 0.0,
+        soft_falloff=getattr(data, "use_soft_falloff", True),
+        spot_size=getattr(data, "spot_size", 0.0),
+        spot_blend=getattr(data, "spot_blend", 0.0),
+        sun_angle=getattr(data, "angle", 0.0) if data.type == "SUN" else 0.0,
+        shape=getattr(data, "shape", "SQUARE") if data.type == "AREA" else "SQUARE",
+        size_x=getattr(data, "size", 1.0),
+        size_y=getattr(data, "size_y", 1.0),
+        spread=getattr(data, "spread", np.pi) if data.type == "AREA" else np.pi,
+        camera=evaluated.visible_camera,
+    )
+    if light.kind in ("AREA", "SPOT") and abs(np.linalg.det(matrix[:3, :3])) * min(light.sizes) < LEAST_VOLUME:
+        findings.error(f"Light '{name}' is scaled or sized to nothing: give it a size and a scale above 0.")
+        return None
+    return light
+
+
+def _note_rays(evaluated: bpy.types.Object, findings: Findings) -> None:
+    off = [kind for kind in ("diffuse", "glossy", "transmission") if not getattr(evaluated, f"visible_{kind}")]
+    if off:
+        findings.note(f"Light '{evaluated.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
+    cycles = cycles_settings(evaluated.data)
+    if cycles is not None and not cycles.use_multiple_importance_sampling:
+        findings.note(
+            f"Light '{evaluated.name}' is without Multiple Importance Sampling: mirrors do not show it in Cycles, but "
+            "in the fit they do."
+        )
+
+
+def _note_linking(evaluated: bpy.types.Object, findings: Findings) -> None:
+    linking = getattr(evaluated, "light_linking", None)
+    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+        findings.note(f"Light linking of '{evaluated.name}' is left out: it lights and shadows everything.")

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender materials as the numbers of `material_model`."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...versions import (
+    PRINCIPLED,
+    active_output,
+    cycles_settings,
+    default_surface_is_principled,
+    has_diffuse_roughness,
+    node_tree_of,
+)
+from ..audit.rules import name_settings
+from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
+from ..findings import Findings, Fix
+from ..images.color_space import to_rec709
+from ..images.image_pixels import without_pixels
+from ..material_model import Material, Socket, grey
+from ..nodes.graph_findings import graph_problem
+from ..nodes.shader_graph import (
+    MissingPictureError,
+    UnsupportedNodeError,
+    plain_value,
+    read_socket,
+    source_of,
+    surface_of,
+)
+from ..nodes.target_shader import DIRECTIONS, Place, TargetShader, target_shader
+
+SKIPPED_SOCKETS = ("Weight",)
+# sockets without an effect in the fit, whatever is linked to them
+UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
+EMISSION_SOCKETS = ("Emission Color", "Emission Strength")
+# what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
+DEFAULT_SOCKETS = {
+    "Base Color": Socket((0.8, 0.8, 0.8)),
+    "Metallic": Socket(0.0),
+    "Roughness": Socket(0.5),
+    "IOR": Socket(1.5),
+    "Specular IOR Level": Socket(0.5),
+}
+# what of a Principled BSDF makes it a Diffuse BSDF (Roughness has no effect then), and keeps it opaque
+WITHOUT_SPECULAR = {
+    "Metallic": 0.0,
+    "Roughness": 1.0,
+    "IOR": 1.5,
+    "Specular IOR Level": 0.0,
+    "Alpha": 1.0,
+    "Transmission Weight": 0.0,
+}
+# shaders of other objects with a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
+SIMPLE_SHADERS = {
+    "ShaderNodeBsdfDiffuse": ("diffuse", {"Base Color": "Color"}, {}),
+    "ShaderNodeEmission": ("emission", {"Emission Color": "Color", "Emission Strength": "Strength"}, {}),
+    "ShaderNodeBsdfGlossy": ("principled", {"Base Color": "Color", "Roughness": "Roughness"}, {"Metallic": 1.0}),
+    "ShaderNodeBsdfAnisotropic": ("principled", {"Base Color": "Color", "Roughness": "Roughness"}, {"Metallic": 1.0}),
+    "ShaderNodeBsdfMetallic": ("principled", {"Base Color": "Base Color", "Roughness": "Roughness"}, {"Metallic": 1.0}),
+    "ShaderNodeBsdfGlass": (
+        "principled",
+        {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"},
+        {"Transmission Weight": 1.0},
+    ),
+    "ShaderNodeBsdfTransparent": ("null", {}, {}),
+}
+
+
+def read_target(material: bpy.types.Material | None, owner: str, slot: int, findings: Findings) -> Material | None:
+    """Return the material to fit, or None with an error in `findings`."""
+    if material is None:
+        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
+                       Fix("new_material"))  # fmt: skip
+        return None
+    target = target_shader(material)
+    muted = next((each.name for each in _nodes(material) if each.bl_idname == PRINCIPLED and each.mute), None)
+    if target is None and muted is not None:
+        findings.error(f"Node '{muted}' of material '{material.name}' is muted: press M over it in the Shader Editor.")
+        return None
+    if target is None:
+        findings.error(
+            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one, directly "
+            "or in a group.",
+            Fix("principled"),
+        )
+        return None
+    note_volume(material, findings)
+    shared = target.shared_group([name for name, place in target.places.items() if not place.socket.is_linked])
+    if shared is not None:
+        findings.note(
+            f"The group '{shared.name}' of material '{material.name}' is used elsewhere too: an apply gives the "
+            "material a copy of its own."
+        )
+    return _read_diffuse(material, target, findings) if target.is_diffuse else _read_fitted(material, target, findings)
+
+
+def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
+    sockets = {}
+    for name, place in target.places.items():
+        if name in DIRECTIONS:
+            sockets[name] = _read_direction(name, place, material.name, findings)
+        elif name not in SKIPPED_SOCKETS:
+            sockets[name] = _read(name, place, material.name, name not in UNUSED_SOCKETS, findings)
+            if name in EMISSION_SOCKETS and sockets[name].by_graph:
+                findings.note(f"Material '{material.name}': what is linked to {name} counts with its average.")
+    method = getattr(target.node, "subsurface_method", "RANDOM_WALK")
+    found = Material(material.name, "principled", sockets, target.node.distribution, method)
+    found.transparent_shadows = material.use_transparent_shadow
+    _note_default_tangent(found, findings)
+    return found
+
+
+def _read_diffuse(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
+    """A Diffuse BSDF as the Principled BSDF that it is exactly: no specular, and nothing else free."""
+    sockets = {
+        name: _read(target.own_name(name), place, material.name, True, findings)
+        for name, place in target.places.items()
+    }
+    rough = sockets["Diffuse Roughness"]
+    if not has_diffuse_roughness():
+        sockets["Diffuse Roughness"] = Socket(0.0, True)
+        if rough.linked or rough.value > 0.0:
+            findings.note(f"Material '{material.name}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.")
+    findings.note(
+        f"Material '{material.name}' has a Diffuse BSDF, fitted as a Principled BSDF without specular: Base Color is "
+        "its Color, Diffuse Roughness its Roughness."
+    )
+    held = {name: Socket(value, True) for name, value in WITHOUT_SPECULAR.items()}
+    normal = _read_direction("Normal", Place(target.node.inputs["Normal"], target.groups), material.name, findings)
+    return Material(material.name, "principled", {**held, **sockets, "Normal": normal})
+
+
+def _read_direction(name: str, place: Place, material: str, findings: Findings) -> Socket:
+    """What is linked to Normal, Coat Normal or Tangent of the target; Cycles evaluates it."""
+    socket, source = place.socket, source_of(place.socket)
+    by_graph = source is not None and not (name == "Tangent" and _is_uv_tangent(source.node))
+    if by_graph:
+        _refuse(name, place, material, findings, is_copied=True)
+    return Socket(plain_value(socket), source is not None, by_graph=by_graph)
+
+
+def _nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
+    tree = node_tree_of(material)
+    return [] if tree is None else list(tree.nodes)
+
+
+def read_context(material: bpy.types.Material | None, owner: str, findings: Findings) -> Material:
+    """Return the material of something that is not fitted; what is unknown becomes grey, with a note."""
+    if material is None:
+        name = f"{owner} without material"
+        return Material(name, "principled", dict(DEFAULT_SOCKETS)) if default_surface_is_principled() else grey(name)
+    tree = node_tree_of(material)
+    if tree is None:
+        color = [float(value) for value in to_rec709(list(material.diffuse_color)[:3])]
+        return Material(material.name, "diffuse", {"Base Color": Socket(color)})
+    note_volume(material, findings)
+    node = surface_of(tree)
+    if node is None:
+        return Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
+    if node.bl_idname == PRINCIPLED:
+        return _read_principled(material, node, findings)
+    if node.bl_idname not in SIMPLE_SHADERS:
+        findings.note(
+            f"Material '{material.name}' of '{owner}' starts with the node '{node.name}' ({node.bl_label}), which is "
+            "not exported; it is shown as grey."
+        )
+        return grey(material.name)
+    model, renamed, constants = SIMPLE_SHADERS[node.bl_idname]
+    sockets = {name: Socket(value) for name, value in constants.items()}
+    for name, theirs in renamed.items():
+        sockets[name] = _read(theirs, Place(node.inputs[theirs], ()), material.name, False, findings)
+    if model == "null" and list(node.inputs["Color"].default_value)[:3] != [1.0, 1.0, 1.0]:
+        findings.note(f"Material '{material.name}': {node.bl_label} is taken for white.")
+    if model == "principled" or (model == "diffuse" and node.inputs["Roughness"].default_value > 0.0):
+        findings.note(f"Material '{material.name}': {node.bl_label} is approximated by its closest simple equivalent.")
+    return Material(material.name, model, sockets)
+
+
+def needs_bake(material: bpy.types.Material | None) -> bool:
+    """Whether a material holds more than the simple equivalents of `read_context` can say; looks at no pixel."""
+    node = surface_of(node_tree_of(material)) if material is not None else None
+    if node is None:
+        return False
+    if node.bl_idname != PRINCIPLED and node.bl_idname not in SIMPLE_SHADERS:
+        return True
+    names = SIMPLE_SHADERS[node.bl_idname][1].values() if node.bl_idname != PRINCIPLED else None
+    with without_pixels():
+        for socket in node.inputs:
+            if socket.name in DIRECTIONS:
+                if socket.name == "Normal" and source_of(socket) is not None:
+                    return True
+            elif names is None or socket.name in names:
+                try:
+                    read_socket(socket)
+                except UnsupportedNodeError:
+                    return True
+    return False
+
+
+def _read_principled(material: bpy.types.Material, node: bpy.types.Node, findings: Findings) -> Material:
+    """A Principled BSDF that is not fitted."""
+    sockets: dict[str, Socket] = {}
+    for socket in node.inputs:
+        if socket.name in SKIPPED_SOCKETS:
+            continue
+        if socket.name in DIRECTIONS:
+            source = source_of(socket)
+            sockets[socket.name] = Socket(plain_value(socket), source is not None)
+            if source is not None and not (socket.name == "Tangent" and _is_uv_tangent(source.node)):
+                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+            continue
+        sockets[socket.name] = _read(socket.name, Place(socket, ()), material.name, False, findings)
+    method = getattr(node, "subsurface_method", "RANDOM_WALK")
+    found = Material(material.name, "principled", sockets, node.distribution, method)
+    found.transparent_shadows = material.use_transparent_shadow
+    _note_default_tangent(found, findings)
+    return found
+
+
+def _note_default_tangent(material: Material, findings: Findings) -> None:
+    """Without a link Blender's tangent circles the object's Z axis, and that of the fit follows the UV map."""
+    if not material.sockets["Tangent"].linked and material.value("Anisotropic", 0.0) != 0.0:
+        findings.note(
+            f"Material '{material.name}': Tangent has no link, so that Cycles turns the anisotropy about the object's "
+            "Z axis, and the fit along the UV map: link a Tangent node of direction UV Map."
+        )
+
+
+def _is_uv_tangent(node: bpy.types.Node) -> bool:
+    """Whether a node gives the tangent of the object's active UV map."""
+    return node.bl_idname == "ShaderNodeTangent" and node.direction_type == "UV_MAP" and not node.uv_map
+
+
+def _read(name: str, place: Place, material: str, is_target: bool, findings: Findings) -> Socket:
+    try:
+        read = read_socket(place.socket)
+        if is_target:
+            _refuse(name, place, material, findings, is_copied=False)
+        return read
+    except UnsupportedNodeError as problem:
+        if is_target:
+            _refuse(name, place, material, findings, is_copied=True)
+        if isinstance(problem, MissingPictureError) and not is_target:
+            findings.error(f"{name} of material '{material}' is magenta in Cycles: it is linked to {problem}.")
+        elif not is_target:
+            findings.note(
+                f"{name} of material '{material}' is linked to {problem}, which cannot be exported; the "
+                "socket's own value is used."
+            )
+        return Socket(plain_value(place.socket), True, by_graph=is_target)
+
+
+def _refuse(name: str, place: Place, material: str, findings: Findings, *, is_copied: bool) -> None:
+    """An error where Cycles could not evaluate what feeds a socket of the target."""
+    problem = graph_problem(place.socket, groups=place.groups, is_copied=is_copied)
+    if problem is not None:
+        findings.error(
+            f"{name} of material '{material}' is linked to {problem}: mend or unlink it.",
+            Fix("unlink", name),
+        )
+
+
+def note_volume(material: bpy.types.Material, findings: Findings) -> None:
+    """Name what lies below a surface, or moves it: neither is exported."""
+    name_settings(MATERIAL, material, material.name, findings)
+    name_settings(MATERIAL_CYCLES, cycles_settings(material), material.name, findings)
+    output = active_output(node_tree_of(material))
+    if output is None:
+        return
+    if source_of(output.inputs["Volume"]) is not None:
+        findings.note(f"Material '{material.name}': its volume is left out.")
+    if source_of(output.inputs["Displacement"]) is not None:
+        findings.note(f"Material '{material.name}': its displacement is left out.")

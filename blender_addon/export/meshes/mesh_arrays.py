@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From corners of Blender's faces to the shared vertices of Mitsuba's triangles. Knows nothing of bpy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..files.ply_file import TriangleMesh
+
+FARTHEST = 1e18  # metres; the square of a distance must fit into a float32
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, near 2**64 over the golden ratio (Knuth, TAOCP 3, 6.4)
+
+
+@dataclass(frozen=True)
+class CornerMesh:
+    """One triangulated mesh in its own space: three corners a triangle and the material slot of each triangle."""
+
+    positions: NDArray[np.float32]  # (triangles, 3, 3)
+    normals: NDArray[np.float32]  # (triangles, 3, 3)
+    uvs: NDArray[np.float32]  # (triangles, 3, 2)
+    slots: NDArray[np.int32]  # (triangles,)
+    is_closed: bool  # every edge has two faces
+
+
+def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:
+    """Return the triangles selected by `slots` (triangles,) moved by the 4x4 `matrix`, equal corners shared.
+
+    Triangles with a corner at NaN or farther than FARTHEST are left out. Normals move with the inverse
+    transpose. A mirroring matrix turns the winding around, so that the side a normal points to stays the outside, as in
+    Cycles.
+    """
+    # sharing comes first: the corners are six times as many as the vertices of a smooth mesh
+    parts = (mesh.positions, mesh.normals, mesh.uvs)
+    rows, index = _shared(np.concatenate([part[slots].reshape(-1, part.shape[-1]) for part in parts], axis=1))
+    linear = matrix[:3, :3]
+    mirrored = bool(np.linalg.det(linear) < 0.0)
+    # adjugate transpose instead of the inverse: it exists for flat matrices too
+    cofactor = np.stack(
+        [np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])]
+    )
+    if mirrored:
+        cofactor = -cofactor
+    with np.errstate(invalid="ignore", over="ignore"):
+        positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
+        held = (np.abs(positions) < FARTHEST).all(axis=1)  # False for NaN
+        if not held.all():
+            rows, index = _shared(rows[index[np.repeat(held[index].reshape(-1, 3).all(axis=1), 3)]])
+            positions = rows[:, :3].astype(np.float64) @ linear.T + matrix[:3, 3]
+        normals = rows[:, 3:6].astype(np.float64) @ cofactor.T
+        lengths = np.linalg.norm(normals, axis=1)
+    without = ~(lengths > 1e-20)  # True for NaN
+    normals = np.where(without[:, None], 0.0, normals) / np.where(without, 1.0, lengths)[:, None]
+    # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
+    uvs = np.nan_to_num(rows[:, 6:], posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
+    rows = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
+    if without.any():  # such a corner takes the normal of its triangle
+        rows, without = rows[index], without[index]
+        rows[without, 3:6] = _face_normals(positions[index].reshape(-1, 3, 3), mirrored)[without]
+        rows, index = _shared(rows)
+    triangles = index.reshape(-1, 3).astype(np.int32)
+    if mirrored:
+        triangles = triangles[:, ::-1]
+    return TriangleMesh(
+        np.ascontiguousarray(rows[:, :3]),
+        np.ascontiguousarray(rows[:, 3:6]),
+        np.ascontiguousarray(rows[:, 6:]),
+        np.ascontiguousarray(triangles),
+    )
+
+
+def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+    """Return all triangles of `meshes` as one mesh."""
+    if len(meshes) == 1:
+        return meshes[0]
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
+    return TriangleMesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.uvs for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]).astype(np.int32),
+    )
+
+
+def turned(mesh: TriangleMesh, offset: float) -> TriangleMesh:
+    """Return the back of `mesh`: turned around and moved by `offset` metres against its normals."""
+    positions = (mesh.positions - offset * mesh.normals).astype(np.float32)
+    return TriangleMesh(positions, -mesh.normals, mesh.uvs, np.ascontiguousarray(mesh.triangles[:, ::-1]))
+
+
+def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return the distinct rows of `rows` (n, 8) and the index of each row among them."""
+    rows = rows + np.float32(0.0)  # -0.0 and 0.0 are one
+    # sorting 64-bit hashes takes a tenth of the time of sorting rows; two numbers at a time are one of 64 bits
+    pairs = rows.view(np.uint64)
+    hashes = np.zeros(len(rows), np.uint64)
+    for column in range(pairs.shape[1]):
+        hashes = (hashes ^ pairs[:, column]) * _FACTOR
+        hashes ^= hashes >> np.uint64(32)
+    _, first, index = np.unique(hashes, return_index=True, return_inverse=True)
+    if (pairs[first][index] == pairs).all():  # as bits, since NaN is not equal to itself
+        return rows[first], index
+    _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)  # two rows had one hash
+    return rows[first], index.reshape(-1)
+
+
+def _face_normals(triangles: NDArray[np.float64], mirrored: bool) -> NDArray[np.float64]:
+    """Return the geometric normal for each corner, (3 * triangles, 3); +Z for triangles without area."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    if mirrored:
+        normals = -normals
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(lengths > 1e-30, normals / np.maximum(lengths, 1e-30), np.array([0.0, 0.0, 1.0]))
+    return np.repeat(normals, 3, axis=0)

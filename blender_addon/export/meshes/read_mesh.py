@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated geometry of a Blender object, all modifiers applied."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...versions import corner_normals
+from .mesh_arrays import CornerMesh
+
+
+def read_mesh(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> CornerMesh | None:
+    """Return the triangles of an evaluated object in its own space, or None if it has no faces."""
+    # the data of an instance is what geometry nodes have made; in edit mode it is not complete
+    if isinstance(evaluated.data, bpy.types.Mesh) and evaluated.mode != "EDIT":
+        return _corner_mesh(evaluated.data) if len(evaluated.data.polygons) else None
+    try:
+        mesh = evaluated.to_mesh(preserve_all_data_layers=False, depsgraph=depsgraph)
+    except RuntimeError:  # this type has no geometry that converts
+        return None
+    try:
+        return _corner_mesh(mesh) if mesh is not None and len(mesh.polygons) else None
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def material_of_slot(evaluated: bpy.types.Object, slot: int) -> bpy.types.Material | None:
+    """Return the material Cycles gives slot `slot`: the object's where its slot says so, else the mesh's.
+
+    The mesh's are those after all modifiers: geometry nodes may have set others than the object's slots show.
+    """
+    slots = evaluated.material_slots
+    if slot < len(slots) and slots[slot].link == "OBJECT":
+        return slots[slot].material
+    materials = getattr(evaluated.data, "materials", ())
+    if slot < len(materials):
+        return materials[slot]
+    return slots[slot].material if slot < len(slots) else None
+
+
+def slot_count(evaluated: bpy.types.Object) -> int:
+    """Return how many slots faces may name."""
+    return max(len(evaluated.material_slots), len(getattr(evaluated.data, "materials", ())))
+
+
+def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    corners = np.empty(count * 3, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners)
+    slots = np.empty(count, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("material_index", slots)
+    vertex_of_corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", vertex_of_corner)
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    uvs = np.zeros(len(mesh.loops) * 2, dtype=np.float32)
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if layer is not None:
+        layer.uv.foreach_get("vector", uvs)
+    places = positions.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
+    faces_at_edge = np.bincount(_edge_of_corner(mesh), minlength=len(mesh.edges))
+    return CornerMesh(
+        positions=places,
+        normals=_shading_normals(mesh, places, corners, vertex_of_corner),
+        uvs=uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2),
+        slots=slots,
+        is_closed=bool((faces_at_edge == 2).all()),
+    )
+
+
+def _shading_normals(
+    mesh: bpy.types.Mesh, places: NDArray[np.float32], corners: NDArray[np.int32], vertex_of_corner: NDArray[np.int32]
+) -> NDArray[np.float32]:
+    """Normals as Cycles takes them (measured with Blender 5.0), at three corners a triangle.
+
+    Each triangle of a flat face is flat by itself, also where the face is not plane, unless the mesh has custom
+    normals. Faces that only sharp edges make flat are smooth.
+    """
+    if mesh.normals_domain == "FACE":
+        vertex_normals = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+        mesh.vertex_normals.foreach_get("vector", vertex_normals)
+        normals = vertex_normals.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
+    else:
+        normals = corner_normals(mesh)[corners].reshape(-1, 3, 3)
+    if mesh.has_custom_normals:
+        return normals
+    is_smooth = np.empty(len(places), dtype=np.bool_)
+    mesh.loop_triangles.foreach_get("use_smooth", is_smooth)
+    return np.where(is_smooth[:, None, None], normals, _triangle_normals(places))
+
+
+def _triangle_normals(places: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The normal of each triangle at its three corners; zero where it has no area."""
+    sides = places[:, 1:].astype(np.float64) - places[:, :1]
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
+    return np.repeat(normals[:, None, :], 3, axis=1).astype(np.float32)
+
+
+def _edge_of_corner(mesh: bpy.types.Mesh) -> np.ndarray:
+    edges = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("edge_index", edges)
+    return edges

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reference picture: a file that is copied, or an image of the .blend that is written out."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..files.exr_file import REC709, write_exr
+from ..files.png_file import write_png
+from ..findings import ExportError, Fix
+from ..images.image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
+from ..images.picture_header import PictureHeader, read_header
+from .reference_colour import file_notes, image_notes
+from .reference_view import SCENE, needs_table, view_note
+from .turned_picture import turn_notes, turned
+from .view_lut import ViewLut, bake_view_lut
+
+LINEAR_SUFFIXES = (".exr", ".hdr")
+LINEAR_FORMATS = ("OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR")  # other float images are 16-bit display pictures
+DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8).
+
+    `view` is the view of a display picture where no formula has it; `notes` say what was taken for granted. `space` and
+    `primaries` are what the file of linear `pixels` says of their colours.
+    """
+
+    name: str
+    encoding: str  # linear or srgb
+    source: Path | None = None
+    pixels: NDArray[np.float32] | NDArray[np.uint8] | None = None
+    view: ViewLut | None = None
+    notes: tuple[str, ...] = ()
+    space: str = ""
+    primaries: tuple[float, ...] = REC709
+
+    def write(self, folder: Path) -> None:
+        """Put the picture into `folder`.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        if self.view is not None:
+            self.view.write(folder)
+        if self.source is not None:
+            shutil.copyfile(self.source, folder / self.name)
+        elif self.encoding == "linear":
+            pixels = np.asarray(self.pixels, dtype=np.float32)
+            write_exr(folder / self.name, pixels, space=self.space, primaries=self.primaries)
+        else:
+            write_png(folder / self.name, np.asarray(self.pixels, dtype=np.uint8))
+
+
+def read_reference(
+    reference: Path | bpy.types.Image | None,
+    scene: bpy.types.Scene,
+    size: tuple[int, int],
+    *,
+    made: str = SCENE,
+    upright: bool = False,
+) -> Reference | None:
+    """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
+
+    `made` is one of `REFERENCE_VIEWS`. A display picture that was rendered in this scene comes with a table of the
+    scene's view where no formula undoes that. `upright` turns a picture as its EXIF data say; else it is as stored.
+
+    Raises
+    ------
+    ExportError
+        If it is missing, of another size, or a display picture for another display than sRGB.
+    """
+    if reference is None:
+        return None
+    stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
+    if isinstance(reference, bpy.types.Image):
+        found = _from_image(reference, scene, size, stretched, made)
+        return replace(found, notes=(*found.notes, *image_notes(reference)))
+    path = Path(bpy.path.abspath(str(reference)))
+    if not path.is_file():
+        raise ExportError(f"The reference {path} does not exist: choose another file.")
+    suffix = path.suffix.lower()
+    refuse_suffix(path)
+    header = read_header(path)
+    refuse_kind(path, header)
+    turn = header.orientation if header is not None and upright else 1
+    said = (
+        () if header is None or upright else turn_notes(path.name, header, rendered_size(scene), f"reference{suffix}")
+    )
+    is_linear = suffix in LINEAR_SUFFIXES
+    if stretched or turn != 1:
+        image = bpy.data.images.load(str(path), check_existing=False)
+        try:
+            if suffix == ".exr":
+                image.colorspace_settings.name = "Non-Color"  # the numbers as they are, with what the file says of them
+            found = _from_image(image, scene, size, stretched, made, turn)
+        finally:
+            bpy.data.images.remove(image)
+        if suffix == ".exr" and header is not None:
+            found = replace(found, space=header.space, primaries=header.primaries)
+    elif is_linear:
+        found = Reference(f"reference{suffix}", "linear", source=path)
+    else:
+        found = Reference(f"reference{suffix}", "srgb", source=path, **_view(scene, path.name, made))
+    colours = file_notes(path, found.name, header, scene) if is_linear else ()
+    return replace(found, notes=(*found.notes, *said, *colours))
+
+
+def refuse_kind(path: Path, header: PictureHeader | None) -> None:
+    """Raise `ExportError` for a scene-linear file with the name of a display picture, or the other way round."""
+    if header is None:
+        return
+    is_linear = header.kind in ("OpenEXR", "Radiance HDR")
+    if is_linear != (path.suffix.lower() in LINEAR_SUFFIXES):
+        raise ExportError(f"The reference {path.name} is a {header.kind} file: give its name the ending of that kind.")
+
+
+def refuse_suffix(path: Path) -> None:
+    """Raise `ExportError` for the name of something that is no picture the backend reads."""
+    if path.suffix.lower() not in LINEAR_SUFFIXES + DISPLAY_SUFFIXES:
+        raise ExportError(f"The reference {path.name} is no picture we read: use EXR, HDR, PNG, JPEG or TIFF.")
+
+
+def holds_display_colours(image: bpy.types.Image) -> bool:
+    """Whether an image of the .blend went through a view; else it is taken as scene-linear."""
+    if image.is_float and image.source == "GENERATED":
+        return False  # floats that no file has encoded
+    return image.colorspace_settings.name in SRGB_NAMES and image.file_format not in LINEAR_FORMATS
+
+
+def refuse_size(name: str, found: tuple[int, int], wanted: tuple[int, int]) -> None:
+    """Raise `ExportError` where a reference has another size (width, height) than the render."""
+    if found != wanted:
+        raise ExportError(
+            f"The reference '{name}' is {found[0]}x{found[1]}, but the scene renders {wanted[0]}x{wanted[1]}: set the "
+            "output resolution to the reference's.",
+            Fix("resolution", f"{found[0]}x{found[1]}"),
+        )
+
+
+def rendered_size(scene: bpy.types.Scene) -> tuple[int, int]:
+    """Width and height of the pictures that the scene renders, in pixels as they are, square or not."""
+    render = scene.render
+    share = render.resolution_percentage
+    return render.resolution_x * share // 100, render.resolution_y * share // 100
+
+
+def _from_image(
+    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, made: str, turn: int = 1
+) -> Reference:
+    try:
+        pixels = np.ascontiguousarray(read_pixels(image)[:, :, :3])
+    except UnreadableImageError as problem:
+        raise ExportError(f"The reference '{image.name}' {problem}.") from None
+    pixels = turned(pixels, turn)
+    height, width = pixels.shape[:2]
+    refuse_size(image.name, (width, height), rendered_size(scene) if stretched else size)
+    if stretched:
+        pixels = _stretch(pixels, size)
+    if not holds_display_colours(image):
+        return Reference("reference.exr", "linear", pixels=pixels)
+    encoded = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055)
+    levels = np.rint(encoded.clip(0.0, 1.0) * 255.0).astype(np.uint8)
+    return Reference("reference.png", "srgb", pixels=levels, **_view(scene, image.name, made))
+
+
+def _view(scene: bpy.types.Scene, name: str, made: str) -> dict[str, Any]:
+    """The fields `view` and `notes` of a display picture."""
+    view = bake_view_lut(scene) if needs_table(scene, name, made) else None
+    said = view_note(scene, name, made)
+    return {"view": view, "notes": (said,) if said else ()}
+
+
+def _stretch(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """Resample to `size` (width, height) with linear interpolation between pixel centres."""
+    for axis, count in ((1, size[0]), (0, size[1])):
+        old = pixels.shape[axis]
+        if old == count:
+            continue
+        place = np.clip((np.arange(count) + 0.5) * old / count - 0.5, 0, old - 1)
+        low = np.minimum(place.astype(int), max(old - 2, 0))
+        weight = (place - low).astype(np.float32)
+        shape = [1, 1, 1]
+        shape[axis] = count
+        weight = weight.reshape(shape)
+        high = np.minimum(low + 1, old - 1)
+        pixels = np.take(pixels, low, axis) * (1 - weight) + np.take(pixels, high, axis) * weight
+    return np.ascontiguousarray(pixels, dtype=np.float32)

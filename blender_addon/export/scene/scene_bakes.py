@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Cycles renders and bakes for an export, from the asking to the scene it goes into."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import bpy
+import numpy as np
+from mathutils import Vector  # pyright: ignore[reportMissingImports]
+from numpy.typing import NDArray
+
+from ...bake.baker import BakeError, Baker
+from ...bake.light_path import OF_CAMERA
+from ...bake.panorama import LEAST_WIDTH, MOST_WIDTH
+from ...bake.requests import name_of
+from ...versions import node_tree_of
+from ..camera.camera_model import Camera
+from ..files.ply_file import TriangleMesh
+from ..findings import Findings
+from ..images.color_space import to_rec709
+from ..lights.light_model import Light
+from ..material_model import grey
+from ..materials.baked_material import Baked
+from ..materials.read_material import read_context
+from ..meshes.mesh_arrays import CornerMesh, world_mesh
+from ..meshes.read_mesh import material_of_slot
+from ..render_state import rendered_layer
+from .scene_data import SceneData, Shape
+
+MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
+LEAST_SIZE, MOST_SIZE = 256, 2048  # texels along each side
+TEXELS_A_PIXEL = 1.5  # along each side, where a surface is nearest to the camera
+USED = 0.6  # of a map's side by the faces in it, about
+POINTS = 2000  # of a surface that are looked at for its size in the picture
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The faces of one material slot of something the depsgraph shows."""
+
+    instance: bpy.types.DepsgraphObjectInstance
+    slot: int
+    mesh: CornerMesh
+    faces: NDArray[np.bool_]  # (triangles,)
+    matrix: NDArray[np.float64]
+
+    @property
+    def material(self) -> bpy.types.Material:
+        """Its material, which is there."""
+        material = material_of_slot(self.instance.object, self.slot)
+        assert material is not None
+        return material.original
+
+    @property
+    def owner(self) -> str:
+        """Name of its object."""
+        return self.instance.object.name
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A shape of the scene that a bake is for."""
+
+    shape: str
+    mesh: CornerMesh
+    faces: NDArray[np.bool_]
+    matrix: NDArray[np.float64]
+
+
+@dataclass
+class _Asked:
+    """A surface that is to be baked, and the request that says so."""
+
+    material: bpy.types.Material
+    owner: str
+    request: dict[str, Any]
+    shown: list[_Shown] = field(default_factory=list)
+
+
+class SceneBakes:
+    """Requests to a Blender beside this one, which is started with the first; on leaving it ends."""
+
+    def __init__(self, context: bpy.types.Context) -> None:
+        self._baker = Baker(context.scene.name, rendered_layer(context.scene, context.view_layer).name)
+        self._world: tuple[int, bpy.types.World] | None = None
+        self._failed: list[str] = []  # errors of what was asked
+        self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
+        self._ids: dict[tuple[str, int, int], str] = {}  # those ids, by object, its data and slot
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._baker.close()
+
+    def ask_world(self, world: bpy.types.World, findings: Findings) -> None:
+        """Have the world rendered; `finish` puts it into the scene."""
+        _note_missing(f"World '{world.name}'", node_tree_of(world), findings)
+        try:
+            self._world = self._baker.ask("world", width=_panorama_width(world)), world
+        except BakeError as problem:
+            self._failed.append(_of_world(world, problem))
+
+    def ask_surface(self, data: SceneData, shape: Shape, surface: Surface, findings: Findings) -> Shape:
+        """Have a surface baked; returns `shape` with a BSDF that `finish` describes. Instances share one."""
+        item = surface.instance.object
+        key = (item.name_full, item.data.as_pointer(), surface.slot)
+        if key not in self._ids:
+            material = surface.material
+            _note_missing(f"Material '{material.name}'", node_tree_of(material), findings)
+            identifier = f"baked_{len(self._ids) + 1:04d}"
+            try:
+                if len(self._surfaces) >= MOST_SURFACES:
+                    raise BakeError(f"It would be one of more than {MOST_SURFACES}.")
+                self._baker.start()
+                request = {"instance": name_of(surface.instance), "slot": surface.slot}
+                request["size"] = _texels(data.camera, shape.mesh)
+                data.materials[identifier] = grey(material.name)
+                self._surfaces[identifier] = _Asked(material, item.name, request)
+            except BakeError as problem:
+                _give_up(data, identifier, material, item.name, problem, findings)
+            self._ids[key] = identifier
+        identifier = self._ids[key]
+        if identifier in self._surfaces:
+            shown = _Shown(shape.identifier, surface.mesh, surface.faces, surface.matrix)
+            self._surfaces[identifier].shown.append(shown)
+        return replace(shape, bsdf=identifier)
+
+    def finish(self, data: SceneData, findings: Findings) -> None:
+        """Wait for everything that was asked and put it into `data`; what failed is an error in `findings`."""
+        for sentence in self._failed:
+            findings.error(sentence)
+        if self._world is not None:
+            self._put_world(data, findings, *self._world)
+        if self._surfaces:
+            self._put_surfaces(data, findings)
+
+    def _put_surfaces(self, data: SceneData, findings: Findings) -> None:
+        try:
+            number = self._baker.ask("surfaces", surfaces=[asked.request for asked in self._surfaces.values()])
+            answer, folder = self._baker.wait(number, len(self._surfaces))
+            found = answer["surfaces"]
+        except BakeError as problem:
+            found, folder = [{"status": "failed", "sentence": str(problem)}] * len(self._surfaces), Path()
+        for index, (identifier, asked) in enumerate(self._surfaces.items()):
+            try:
+                if found[index]["status"] != "ok":
+                    raise BakeError(found[index]["sentence"])
+                self._put_surface(data, findings, identifier, asked, Baked(found[index], folder / str(index)))
+            except BakeError as problem:
+                _give_up(data, identifier, asked.material, asked.owner, problem, findings)
+
+    def _put_surface(self, data: SceneData, findings: Findings, identifier: str, asked: _Asked, baked: Baked) -> None:
+        corners = baked.corners
+        if any(len(corners) != len(shown.mesh.uvs) for shown in asked.shown):
+            raise BakeError("Its object has other faces in the second Blender.")
+        pieces = {
+            shown.shape: world_mesh(replace(shown.mesh, uvs=corners), shown.faces, shown.matrix)
+            for shown in asked.shown
+        }
+        if len(asked.shown) > 1 and baked.place:
+            findings.note(
+                f"Material '{asked.material.name}': {', '.join(baked.place)} may differ between the {len(asked.shown)} "
+                f"instances of '{asked.owner}'; all have the bake of the first."
+            )
+        data.materials |= baked.materials(identifier, asked.material.name, findings)
+        data.shapes[:] = [
+            replace(shape, mesh=pieces[shape.identifier]) if shape.identifier in pieces else shape
+            for shape in data.shapes
+        ]
+
+    def _put_world(self, data: SceneData, findings: Findings, number: int, world: bpy.types.World) -> None:
+        try:
+            answer, folder = self._baker.wait(number)
+        except BakeError as problem:
+            findings.error(_of_world(world, problem))
+            return
+        exposure = data.settings.exposure
+
+        def picture(name: str) -> NDArray[np.float32]:
+            radiance = to_rec709(np.load(folder / name)).clip(0.0) * exposure
+            return np.ascontiguousarray(radiance, dtype=np.float32)
+
+        light = picture(answer["light"])
+        suns = [
+            _sun(f"{world.name} sun {index + 1}", sun, exposure, "camera" not in answer)
+            for index, sun in enumerate(answer["suns"])
+        ]
+        camera = picture(answer["camera"]) if "camera" in answer else None
+        data.world = replace(data.world, color=np.ones(3), pixels=light, lookup=None, camera_pixels=camera)
+        data.lights += suns
+        other = [name for name in answer["paths"] if name not in OF_CAMERA]
+        if other:
+            findings.note(
+                f"World '{world.name}' asks Light Path for {', '.join(other)}: the fit takes it as diffuse rays see it."
+            )
+
+
+def _texels(camera: Camera, mesh: TriangleMesh) -> int:
+    """Texels along each side of a bake: about as fine as the pixels where the surface is nearest to the camera."""
+    triangles = mesh.positions.astype(np.float64)[mesh.triangles]
+    areas = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    total = float(areas.sum())
+    if total <= 0.0:
+        return LEAST_SIZE
+    chance = np.random.default_rng(0)
+    chosen = triangles[chance.choice(len(triangles), POINTS, p=areas / total)]
+    a, b = chance.random((2, POINTS, 1))
+    a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
+    points = chosen[:, 0] + a * (chosen[:, 1] - chosen[:, 0]) + b * (chosen[:, 2] - chosen[:, 0])
+    places, depths = camera.project(points)
+    seen = (places > 0.0).all(axis=1) & (places < (camera.width, camera.height)).all(axis=1) & (depths > 0.0)
+    if not seen.any():
+        return LEAST_SIZE
+    right = camera.world[:3, 0] / np.linalg.norm(camera.world[:3, 0])
+    step = 1e-4 * total**0.5
+    moved, _ = camera.project(points[seen] + step * right)
+    pixels_a_metre = np.linalg.norm(moved - places[seen], axis=1) / step
+    side = TEXELS_A_PIXEL * float(np.quantile(pixels_a_metre, 0.9)) * total**0.5 / USED
+    return int(np.clip(2 ** math.ceil(math.log2(max(side, 1.0))), LEAST_SIZE, MOST_SIZE))
+
+
+def _note_missing(owner: str, tree: bpy.types.NodeTree | None, findings: Findings) -> None:
+    """Name images without pixels, which Cycles shows as magenta."""
+    for node in tree.nodes if tree is not None else []:
+        if node.bl_idname == "ShaderNodeGroup":
+            _note_missing(owner, node.node_tree, findings)
+        if node.bl_idname not in ("ShaderNodeTexImage", "ShaderNodeTexEnvironment"):
+            continue
+        image, is_used = node.image, any(output.is_linked for output in node.outputs)
+        if is_used and (image is None or (image.source == "FILE" and not min(image.size))):
+            named = "image" if image is None else f"image '{image.name}'"
+            findings.note(f"{owner}: the {named} of the node '{node.name}' is missing; it is magenta, as in Blender.")
+
+
+def _give_up(
+    data: SceneData,
+    identifier: str,
+    material: bpy.types.Material,
+    owner: str,
+    problem: BakeError,
+    findings: Findings,
+) -> None:
+    findings.note(f"Material '{material.name}' of '{owner}' could not be baked by Cycles: {problem}")
+    data.materials[identifier] = read_context(material, owner, findings)
+
+
+def _sun(name: str, found: dict[str, Any], exposure: float, camera: bool) -> Light:
+    """A sun lamp that gives what a disc in the sky does."""
+    matrix = np.eye(4)
+    # a sun shines along its local -Z
+    matrix[:3, :3] = np.array(Vector(found["direction"]).to_track_quat("Z", "Y").to_matrix())
+    color = to_rec709(found["irradiance"]).clip(0.0)
+    return Light("SUN", name, matrix, color, exposure, sun_angle=float(found["angle"]), camera=camera)
+
+
+def _of_world(world: bpy.types.World, problem: BakeError) -> str:
+    return f"World '{world.name}' could not be rendered by Cycles: {problem}"
+
+
+def _panorama_width(world: bpy.types.World) -> int:
+    """Pixels around: as fine as the pictures that the world is made of."""
+    widths = [float(LEAST_WIDTH), *_picture_widths(node_tree_of(world))]
+    return min(2 ** math.ceil(math.log2(max(widths))), MOST_WIDTH)
+
+
+def _picture_widths(tree: bpy.types.NodeTree) -> list[float]:
+    widths: list[float] = []
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeTexEnvironment" and node.image is not None:
+            widths.append(float(node.image.size[0]))
+        elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            widths += _picture_widths(node.node_tree)
+    return widths

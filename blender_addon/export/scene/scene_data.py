@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything an export takes out of Blender, as plain data. Knows nothing of bpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera_model import Camera, PixelFilter
+from ..files.ply_file import TriangleMesh
+from ..lights.light_model import Light
+from ..material_model import Material
+from .world_model import World
+
+TARGET_SHAPE = "target"
+TARGET_BSDF = "target_bsdf"
+
+
+@dataclass(frozen=True)
+class Terminator:
+    """What Cycles does to shadows of smooth-shaded facets: Blender's Geometry Offset and Shading Offset, in [0, 1]."""
+
+    geometry_offset: float = 0.1
+    shading_offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One mesh with one material; `identifier` is its id in the scene file."""
+
+    identifier: str
+    mesh: TriangleMesh
+    bsdf: str
+    is_closed: bool
+    terminator: Terminator = Terminator()
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """What the picture needs beside the scene. `exposure` is Cycles' film exposure, already in every light.
+
+    `light_paths` is that object of request.json: what Cycles does to indirect light.
+    """
+
+    pixel_filter: PixelFilter
+    max_depth: int
+    film_transparent: bool
+    exposure: float
+    spp: int
+    light_paths: dict[str, float | int] = field(default_factory=dict)
+
+
+@dataclass
+class SceneData:
+    """A whole scene: target shape and BSDF have the ids `target` and `target_bsdf`."""
+
+    camera: Camera
+    settings: RenderSettings
+    world: World
+    lights: list[Light] = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
+    materials: dict[str, Material] = field(default_factory=dict)
+
+    @property
+    def target(self) -> Shape | None:
+        """The shape whose material is fitted, None if it has no faces."""
+        return next((shape for shape in self.shapes if shape.identifier == TARGET_SHAPE), None)
+
+    @property
+    def emitting(self) -> list[Shape]:
+        """Shapes whose material gives light."""
+        return [shape for shape in self.shapes if self.materials[shape.bsdf].emission.max(initial=0.0) > 0.0]
+
+    def bounds(self) -> tuple[NDArray[np.float64], float]:
+        """Return middle and radius of a sphere around all geometry."""
+        if not self.shapes:
+            return np.zeros(3), 1.0
+        low = np.min([shape.mesh.positions.min(axis=0) for shape in self.shapes], axis=0).astype(np.float64)
+        high = np.max([shape.mesh.positions.max(axis=0) for shape in self.shapes], axis=0).astype(np.float64)
+        return 0.5 * (low + high), max(float(np.linalg.norm(high - low)) / 2.0, 1e-6)

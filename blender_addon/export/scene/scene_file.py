@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene's data as scene.xml, with the meshes and pictures it refers to. Knows nothing of bpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera_model import sensor_element
+from ..files.exr_file import write_exr
+from ..files.ply_file import TriangleMesh, write_ply
+from ..files.xml_scene import Element, add, boolean, integer, plugin, reference, scalar, scene_text, string
+from ..findings import Findings
+from ..lights.light_elements import light_element
+from ..lights.light_model import irradiance_at
+from ..material_model import Texture
+from ..materials.material_elements import bsdf_element, emission_element
+from ..meshes.mesh_arrays import turned
+from .scene_data import TARGET_BSDF, SceneData, Shape
+from .world_model import camera_world_element, world_element, world_irradiance
+
+# the back of an open emitter lies this part of the scene's radius behind its front
+BACK_OFFSET = 1e-5
+# a weak emitter may still matter elsewhere: it is sampled at least this often, relative to the strongest
+LEAST_WEIGHT = 0.1
+
+
+@dataclass
+class SceneFiles:
+    """The text of scene.xml and the files beside it, by their path in the job folder."""
+
+    text: str = ""
+    meshes: dict[str, TriangleMesh] = field(default_factory=dict)
+    pictures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    _names: dict[tuple[tuple[int, ...], bytes], str] = field(default_factory=dict)
+
+    def picture(self, pixels: NDArray[np.float32]) -> str:
+        """Keep `pixels` and return their path; equal pictures are kept once."""
+        key = (pixels.shape, pixels.tobytes())
+        if key not in self._names:
+            self._names[key] = f"textures/tex_{len(self._names) + 1:04d}.exr"
+            self.pictures[self._names[key]] = pixels
+        return self._names[key]
+
+    def texture(self, texture: Texture) -> str:
+        """Keep a socket's picture and return its path."""
+        return self.picture(texture.pixels)
+
+    def write(self, folder: Path) -> None:
+        """Write everything below `folder`.
+
+        Raises
+        ------
+        OSError
+            If something cannot be written.
+        """
+        for name in ("meshes", "textures"):
+            (folder / name).mkdir(exist_ok=True)
+        (folder / "scene.xml").write_text(self.text, encoding="utf-8")
+        for path, mesh in self.meshes.items():
+            write_ply(folder / path, mesh)
+        for path, pixels in self.pictures.items():
+            write_exr(folder / path, pixels)
+
+
+def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
+    """Return scene.xml and its files; what had to be approximated goes into `findings`."""
+    files = SceneFiles()
+    center, radius = scene.bounds()
+    target = scene.target
+    middle = center if target is None else target.mesh.positions.mean(axis=0).astype(np.float64)
+    children: list[Element] = [
+        add(
+            plugin("integrator", "path"),
+            integer("max_depth", scene.settings.max_depth),
+            boolean("hide_emitters", _hide_emitters(scene, findings)),
+        ),
+        sensor_element(scene.camera, scene.settings.pixel_filter, scene.settings.spp),
+    ]
+    emitters: list[tuple[Element, float]] = []
+    world = world_element(scene.world, files.picture)
+    if world is not None:
+        emitters.append((world, world_irradiance(scene.world)))
+    for index, light in enumerate(scene.lights):
+        emitters.append((light_element(light, f"light_{index + 1:04d}"), irradiance_at(light, middle)))
+    _weigh(emitters)
+    children += [element for element, _ in emitters]
+    camera_world = None if scene.settings.film_transparent else camera_world_element(scene.world, files.picture)
+    if camera_world is not None:
+        children.append(camera_world)
+    for identifier, material in scene.materials.items():
+        is_target = identifier == TARGET_BSDF
+        children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
+    for shape in scene.shapes:
+        children += _shape_elements(shape, scene, radius * BACK_OFFSET, files)
+    files.text = scene_text(children)
+    return files
+
+
+def _weigh(emitters: list[tuple[Element, float]]) -> None:
+    """Let Mitsuba sample each emitter in proportion to what it gives the target, not all equally often."""
+    most = max((irradiance for _, irradiance in emitters), default=0.0)
+    for element, irradiance in emitters if len(emitters) > 1 else []:
+        add(element, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
+
+
+def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneFiles) -> list[Element]:
+    material = scene.materials[shape.bsdf]
+    sides = [(shape.identifier, shape.mesh)]
+    # an area emitter of Mitsuba shines on one side, a surface of Blender on both
+    if not shape.is_closed and material.emission.max(initial=0.0) > 0.0:
+        sides.append((f"{shape.identifier}_back", turned(shape.mesh, offset)))
+    elements = []
+    for identifier, mesh in sides:
+        path = f"meshes/{identifier}.ply"
+        files.meshes[path] = mesh
+        element = add(plugin("shape", "ply", identifier), string("filename", path), reference(shape.bsdf))
+        add(element, *_terminator(shape))
+        emitter = emission_element(material, scene.settings.exposure, files.texture)
+        elements.append(element if emitter is None else add(element, emitter))
+    return elements
+
+
+def _terminator(shape: Shape) -> list[Element]:
+    """What the backend reads about shadows of smooth facets (`mfo_backend/render/transport/smooth_facets.py`)."""
+    numbers = {
+        "shadow_geometry_offset": shape.terminator.geometry_offset,
+        "shadow_shading_offset": shape.terminator.shading_offset,
+    }
+    return [add(plugin("texture", "uniform", name=name), scalar("value", v)) for name, v in numbers.items() if v > 0.0]
+
+
+def _hide_emitters(scene: SceneData, findings: Findings) -> bool:
+    """Whether camera rays may pass through glowing objects and miss the world; both or none: Mitsuba has one switch."""
+    hidden = scene.settings.film_transparent or not scene.world.camera
+    world_is_seen = scene.world.is_lit and not hidden
+    if not world_is_seen and not scene.emitting:
+        return scene.world.is_lit
+    if hidden and scene.world.is_lit:
+        what = "The film is transparent" if scene.settings.film_transparent else "The world is hidden from the camera"
+        findings.note(f"{what}, but glowing objects are in view: the world shows behind them.")
+    return False

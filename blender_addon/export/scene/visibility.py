@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the camera sees the target at all."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Vector  # pyright: ignore[reportMissingImports]
+from numpy.typing import NDArray
+
+from ..findings import Findings
+from .scene_data import SceneData
+
+# rays towards as many points of the target are tried before it counts as hidden
+PROBES = 2000
+
+
+def check_visible(
+    data: SceneData,
+    target: bpy.types.Object,
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    findings: Findings,
+) -> None:
+    """Report an error if no part of the target lies in the frame, or everything in the frame is hidden."""
+    shape = data.target
+    assert shape is not None
+    points = _points(shape.mesh.positions.astype(np.float64)[shape.mesh.triangles])
+    camera = data.camera
+    places, depths = camera.project(points)
+    inside = (places > 0.0).all(axis=1) & (places < (camera.width, camera.height)).all(axis=1)
+    inside &= (depths > camera.clip_start) & (depths < camera.clip_end)
+    if not inside.any():
+        corners, corner_depths = camera.project(shape.mesh.positions.astype(np.float64))
+        outside = (corners < 0.0).all(axis=0) | (corners > (camera.width, camera.height)).all(axis=0)
+        behind = (corner_depths < camera.clip_start).all() or (corner_depths > camera.clip_end).all()
+        if behind or outside.any():
+            findings.error(f"The camera does not see '{target.name}': move it into the frame.")
+        return
+    seen = points[inside]
+    seen = seen[np.linspace(0, len(seen) - 1, min(len(seen), PROBES)).astype(int)]
+    blocker = ""
+    for point in seen:
+        hit = _first_hit(point, data, scene, depsgraph)
+        if hit is None or hit.original == target:
+            return
+        blocker = hit.name
+        if _lets_light_through(hit):
+            return
+    findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
+
+
+def _points(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points on triangles (n, 3, 3): the middles, and more of each the fewer there are."""
+    steps = [(1 / 3, 1 / 3)]
+    if len(triangles) < PROBES:
+        count = int(np.ceil(np.sqrt(2 * PROBES / len(triangles))))
+        grid = (np.arange(count) + 0.5) / count
+        steps += [(a, b) for a in grid for b in grid if a + b < 1.0]
+    a, b = np.array(steps).T[:, None, :, None]
+    first, second, third = triangles[:, 0, None], triangles[:, 1, None], triangles[:, 2, None]
+    return (first + (second - first) * a + (third - first) * b).reshape(-1, 3)
+
+
+def _first_hit(
+    point: NDArray[np.float64], data: SceneData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
+) -> bpy.types.Object | None:
+    world = data.camera.world
+    forward = -world[:3, 2]
+    if data.camera.kind == "ORTHO":
+        origin, direction = point - forward * (forward @ (point - world[:3, 3])), forward
+    else:
+        origin, direction = world[:3, 3], point - world[:3, 3]
+    unit = direction / np.linalg.norm(direction)
+    start = origin + unit * data.camera.clip_start / max(float(unit @ forward), 1e-6)
+    hit, _, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(unit))
+    return item if hit else None
+
+
+def _lets_light_through(item: bpy.types.Object) -> bool:
+    """Whether something behind `item` may still be seen: its material transmits, or the render does not show it."""
+    if item.hide_render or not item.visible_camera:
+        return True
+    for slot in item.material_slots:
+        for node in slot.material.node_tree.nodes if slot.material and slot.material.node_tree else []:
+            if node.bl_idname in ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction"):
+                return True
+            for name, opaque in (("Transmission Weight", 0.0), ("Alpha", 1.0)):
+                socket = node.inputs.get(name)
+                if socket is not None and (socket.is_linked or socket.default_value != opaque):
+                    return True
+    return False

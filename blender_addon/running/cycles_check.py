@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders by a Blender of their own, beside this one: the result judged in Cycles, and the reference as an EXR.
+
+The one task that runs is looked after by a timer in windows and by `wait` in background mode.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..check.preflight import redraw
+from ..process.backend_python import EXTENSION_ROOT, backend_environment
+from ..process.background_task import BackgroundTask, Step, environment_for
+from ..result import previews, shown_result
+
+TICK = 0.3  # seconds between two looks
+
+
+@dataclass(frozen=True)
+class _Running:
+    task: BackgroundTask
+    folder: Path  # temporary
+    done: Callable[[list[dict[str, Any]]], None]
+
+
+_current: _Running | None = None
+
+
+def is_running() -> bool:
+    """Whether a Blender renders for us."""
+    return _current is not None
+
+
+def check_result(job: Path, material: str, python: Path) -> None:
+    """Render the scene as it is with the values of a job in Cycles and measure it against the job's reference.
+
+    Raises
+    ------
+    OSError
+        If no copy of the scene can be written or no Blender can be started.
+    """
+
+    def done(answers: list[dict[str, Any]]) -> None:
+        runtime = _runtime()
+        flip = float(answers[1]["metrics"]["flip"])
+        runtime.cycles_text, runtime.cycles_flip = f"FLIP in Cycles: {flip:.4f}", flip
+        if shown_result.result is not None and shown_result.result.folder == job:
+            for name in ("cycles", "cycles_difference"):
+                previews.show(name, job / "pictures" / f"{name}.png")
+
+    folder = Path(tempfile.mkdtemp(prefix="material_fit_"))
+    picture = folder / "cycles.exr"
+    words = ["--job", str(job), "--material", material, "--out", str(picture)]
+    judge = [str(python), "-m", "mfo_backend", "judge", str(job), str(picture), "--json"]
+    _begin(folder, [
+        _blender_step(folder, "check", words, "Rendering in Cycles"),
+        Step(judge, backend_environment(EXTENSION_ROOT), "Comparing"),
+    ], done)  # fmt: skip
+
+
+def render_reference(out: Path) -> None:
+    """Render the scene as it is in Cycles into the scene-linear EXR `out` and make it the reference.
+
+    Raises
+    ------
+    OSError
+        If no copy of the scene can be written or no Blender can be started.
+    """
+
+    def done(_answers: list[dict[str, Any]]) -> None:
+        _runtime().cycles_text = ""
+        window = next(iter(bpy.context.window_manager.windows), None)
+        with bpy.context.temp_override(**({"window": window} if window else {})):
+            bpy.ops.mfo.use_reference("EXEC_DEFAULT", True, filepath=str(out))
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="material_fit_"))
+    _begin(folder, [_blender_step(folder, "render", ["--out", str(out)], "Rendering the reference")], done)
+
+
+def step() -> bool:
+    """See how far it is; False when nothing runs any more."""
+    global _current
+    if _current is None:
+        return False
+    running, runtime = _current, _runtime()
+    running.task.poll()
+    if running.task.is_running:
+        text = running.task.progress()
+        if text != runtime.cycles_text:
+            runtime.cycles_text = text
+            redraw()
+        return True
+    _current = None
+    atexit.unregister(close)
+    if running.task.sentence:
+        runtime.cycles_text, runtime.cycles_flip = running.task.sentence, -1.0
+    else:
+        running.done(running.task.answers)
+    shutil.rmtree(running.folder, ignore_errors=True)
+    redraw()
+    return False
+
+
+def wait() -> None:
+    """Step until it has ended."""
+    while step():
+        time.sleep(0.1)
+
+
+def close() -> None:
+    """Kill what runs and remove its files."""
+    global _current
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    atexit.unregister(close)
+    if _current is not None:
+        _current.task.close()
+        shutil.rmtree(_current.folder, ignore_errors=True)
+        _current = None
+
+
+def _begin(folder: Path, steps: list[Step], done: Callable[[list[dict[str, Any]]], None]) -> None:
+    global _current
+    try:
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"), copy=True, check_existing=False)
+        except RuntimeError as error:
+            raise OSError(str(error).strip()) from error
+        _current = _Running(BackgroundTask(steps, folder), folder, done)
+    except OSError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    atexit.register(close)
+    runtime = _runtime()
+    runtime.cycles_text, runtime.cycles_flip = steps[0].label, -1.0
+    if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+    redraw()
+
+
+def _blender_step(folder: Path, command: str, words: list[str], label: str) -> Step:
+    """One command of `headless.py` on a copy of the scene, by this Blender's program or module."""
+    arguments = [command, str(folder / "scene.blend"), *words, "--samples", "0", "--parent", str(os.getpid())]
+    if bpy.app.binary_path:
+        script = str(Path(__file__).resolve().parents[1] / "headless.py")
+        options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", script, "--"]
+        return Step([bpy.app.binary_path, *options, *arguments], environment_for(EXTENSION_ROOT), label)
+    module = [sys.executable, "-m", "blender_addon.headless"]
+    return Step([*module, *arguments], environment_for(EXTENSION_ROOT), label)
+
+
+def _tick() -> float | None:
+    return TICK if step() else None
+
+
+def _runtime() -> bpy.types.PropertyGroup:
+    return bpy.context.window_manager.mfo_runtime

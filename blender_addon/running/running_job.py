@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The one fit of this Blender: drives its process and tells the panel through WindowManager.mfo_runtime.
+
+In windows a timer calls `step`; in background mode, where timers never fire, `wait` does. Nothing here keeps a Blender
+object between two steps, because undo and file load replace them.
+"""
+
+from __future__ import annotations
+
+import atexit
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ..check.preflight import redraw
+from ..process.job_process import Event, JobProcess, Outcome
+from ..result import history, previews, shown_result
+from ..result.job_result import JobResult, JobResultError, read_job_result
+from ..result.local_copy import unwritable
+from ..result.shown_result import add_message
+from ..result.write_back import WriteBackError
+from ..versions import is_modal_operator_running
+from . import fit_queue
+from .fit_queue import PreparedFit
+
+TICK = 0.15  # seconds between two looks at the process
+PATIENCE = 60  # looks at a modal operator before a result goes into its history without an undo step
+_FIRST_STAGES = ("scan", "start")  # they look for a place to begin; every other stage refines
+_FIRST_GUESS = 0.05  # share from which on the time left is more than a guess
+_GOOD = {"converged", "stale", "unchanged", "max_iterations"}
+_ENDED = _GOOD | {"different"}  # the fit came to its end, whatever it found
+
+
+@dataclass
+class RunningJob:
+    """A fit in progress."""
+
+    process: JobProcess
+    fit: PreparedFit
+
+
+current: RunningJob | None = None
+unrecorded: list[tuple[JobResult, int]] = []  # results with their material's session_uid, not in its history yet
+_patience = PATIENCE
+
+
+def start(fit: PreparedFit, *, timer: bool) -> None:
+    """Start the backend on a job folder; with `timer` look after it, and then the queue, while Blender runs.
+
+    Raises
+    ------
+    OSError
+        If the backend cannot be started.
+    """
+    global current
+    current = RunningJob(JobProcess(fit.python, fit.folder), fit)
+    atexit.register(close)
+    runtime = _runtime()
+    shown_result.clear(runtime)
+    runtime.state, runtime.material, runtime.job_folder = "RUNNING", fit.material_name, str(fit.folder)
+    runtime.progress_text = "Starting"
+    previews.warm_up()
+    previews.show("reference", fit.reference)
+    for note in fit.notes:
+        add_message(runtime, note, "INFO")
+    if timer and not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+    redraw()
+
+
+def step() -> Outcome | None:
+    """Handle what the backend said since the last step; its outcome when it has ended, else None."""
+    job = current
+    if job is None:
+        return None
+    for event in job.process.poll():
+        _handle(job, event)
+    outcome = job.process.outcome
+    if outcome is not None:
+        _finish(job, outcome)
+    return outcome
+
+
+def wait(tell: Callable[[str], None]) -> Outcome:
+    """Step until the fit ends; `tell` gets a line of progress about every second."""
+    told, seen = 0.0, ""
+    while (outcome := step()) is None:
+        text = f"{_runtime().progress_text} · {_runtime().detail}"
+        if text != seen and time.monotonic() - told > 1.0:
+            told, seen = time.monotonic(), text
+            tell(text)
+        time.sleep(0.05)
+    return outcome
+
+
+def cancel() -> None:
+    """Ask the fit to stop; what it has found so far is kept."""
+    if current is not None:
+        current.process.cancel()
+        runtime = _runtime()
+        runtime.state, runtime.progress_text = "CANCELLING", "Cancelling"
+        redraw()
+
+
+def close() -> None:
+    """End a running fit within about a second, empty the queue and stop the timer."""
+    global current
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    atexit.unregister(close)
+    fit_queue.clear()
+    unrecorded.clear()
+    if current is not None:
+        current.process.close()
+        current = None
+
+
+def reset() -> None:
+    """Forget the last fit: its result, pictures and messages."""
+    shown_result.clear(_runtime())
+
+
+def fail(sentences: Sequence[str]) -> None:
+    """Show errors that kept a fit from starting."""
+    runtime = _runtime()
+    if current is None:
+        shown_result.clear(runtime)
+        runtime.state = "FAILED"
+    runtime.sentence = sentences[0] if sentences else ""
+    for sentence in sentences[1:]:
+        add_message(runtime, sentence, "ERROR")
+    redraw()
+
+
+def record_results() -> int:
+    """Put the results that are not there yet into the histories of their materials; returns how many found theirs."""
+    count = 0
+    materials = {material.session_uid: material for material in bpy.data.materials}
+    for result, uid in unrecorded:
+        material = materials.get(uid)
+        if material is not None and not unwritable(material):
+            history.record(material, result)
+            count += 1
+    unrecorded.clear()
+    return count
+
+
+def _tick() -> float | None:
+    if current is not None:
+        step()
+    if current is None:
+        _record_as_undo_step()
+        _start_next()
+    return TICK if current is not None or fit_queue.waiting or unrecorded else None
+
+
+def _record_as_undo_step() -> None:
+    """A change from a timer that undo does not know would be lost with the next undo."""
+    global _patience
+    window = next(iter(bpy.context.window_manager.windows), None)
+    if not unrecorded or window is None:
+        return
+    if not is_modal_operator_running():
+        with bpy.context.temp_override(window=window):
+            bpy.ops.mfo.record_results("EXEC_DEFAULT", True)
+    elif _patience > 0:  # an undo step in the middle of somebody's drag would cut it in two
+        _patience -= 1
+        return
+    else:
+        record_results()
+    _patience = PATIENCE
+
+
+def _start_next() -> None:
+    fit = None if unrecorded else fit_queue.take()
+    if fit is None:
+        return
+    try:
+        start(fit, timer=True)
+    except OSError as error:
+        fit_queue.ended(fit.material_name, f"The backend could not be started ({error.strerror or error}).", "ERROR")
+        redraw()
+
+
+def _handle(job: RunningJob, event: Event) -> None:
+    runtime = _runtime()
+    try:
+        if event["event"] == "progress":
+            runtime.fraction = float(event["fraction"])
+            if not job.process.cancelling:
+                runtime.progress_text = progress_text(event)
+            runtime.detail = f"{event['stage']} · step {event['iteration']} · error {float(event['best']):.3g}"
+        elif event["event"] == "preview":
+            _show_preview(job, "current", event["path"])
+            if "difference" in event:
+                _show_preview(job, "difference", event["difference"])
+    except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
+        return  # a newer backend says less or more than we know; its result is what counts
+    redraw()
+
+
+def _show_preview(job: RunningJob, name: str, relative: str) -> None:
+    path = (job.process.folder / relative).resolve()
+    if path.is_relative_to(job.process.folder.resolve()):
+        previews.show(name, path, now=True)
+
+
+def progress_text(event: Event) -> str:
+    """What is done, percent and time left of a progress event, short enough for a progress bar."""
+    text = f"{'Exploring' if event['stage'] in _FIRST_STAGES else 'Refining'} · {event['fraction']:.0%}"
+    left = event.get("remaining_seconds")
+    known = left is not None and float(event["fraction"]) >= _FIRST_GUESS
+    return f"{text} · {_duration(float(left))} left" if known else text
+
+
+def _finish(job: RunningJob, outcome: Outcome) -> None:
+    global current
+    runtime = _runtime()
+    current = None
+    atexit.unregister(close)
+    _remove_unfinished(job.process.folder)
+    runtime.state = "DONE" if outcome.status in _ENDED else "FAILED"
+    runtime.sentence = outcome.sentence
+    runtime.progress_text, runtime.detail = "", ""
+    try:
+        if outcome.status in _ENDED or (job.process.folder / "result.json").is_file():
+            found = read_job_result(job.process.folder)
+            shown_result.show(found, job.fit.material_uid)
+            unrecorded.append((found, job.fit.material_uid))
+            died = found.partial and found.status == "failed"  # its sentence says so beside what can be applied
+            runtime.state = "FAILED" if died else "DONE"
+    except (JobResultError, WriteBackError) as error:
+        runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
+    icon = shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO") if runtime.state == "DONE" else "ERROR"
+    fit_queue.ended(job.fit.material_name, runtime.sentence, icon)
+    if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:
+        shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
+        runtime.job_folder = ""
+    if bpy.app.background:
+        record_results()
+    redraw()
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove files that the backend was killed in the middle of."""
+    for parent in (folder, folder / "pictures"):
+        for path in parent.glob(".*.tmp"):
+            with suppress(OSError):
+                path.unlink()
+
+
+def _runtime() -> bpy.types.PropertyGroup:
+    return bpy.context.window_manager.mfo_runtime
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(max(0.0, seconds)), 60)
+    return f"{minutes} m {rest:02d} s" if minutes else f"{rest} s"

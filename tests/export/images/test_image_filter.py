@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures between their pixels and with alpha. Oracle: Cycles on an emitting plane that shows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from blender_addon.export.images.image_filter import filtered_pixels
+
+from ..scenes import add_camera, add_quad, new_material
+
+MODES = ("STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE")
+
+
+def picture(path: Path, size: int = 8) -> Any:
+    """A file of random colours and alphas below 1 on its right half, 8 bits."""
+    values = np.ones((size, size, 4), np.float32)
+    values[..., :3] = np.random.default_rng(3).uniform(0.0, 1.0, (size, size, 3))
+    values[:, size // 2 :, 3] = 0.5
+    image = bpy.data.images.new("made", size, size, alpha=True)
+    image.pixels.foreach_set(values.ravel())
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+    return bpy.data.images.load(str(path))
+
+
+def shown_by_cycles(scene: Any, image: Any, interpolation: str, alpha_read: bool, render: Any) -> np.ndarray:
+    """What a plane that fills the frame glows with."""
+    material = new_material("Target", Emission_Strength=1.0, Base_Color=(0, 0, 0), Specular_IOR_Level=0.0)
+    tree = material.node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = image, interpolation
+    principled = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    tree.links.new(texture.outputs["Color"], principled.inputs["Emission Color"])
+    if alpha_read:
+        tree.links.new(texture.outputs["Alpha"], principled.inputs["Roughness"])
+    item = add_quad("Target", 2.0, 0.0, material)
+    if not item.data.uv_layers:
+        item.data.uv_layers.new()
+    for loop, uv in zip(item.data.loops, item.data.uv_layers[0].data, strict=True):
+        x, y, _ = item.data.vertices[loop.vertex_index].co
+        uv.uv = (0.5 + 0.5 * x, 0.5 + 0.5 * y)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=2.0)
+    scene.cycles.samples = 16
+    return render()
+
+
+def blocks(pixels: np.ndarray, count: int) -> np.ndarray:
+    step = len(pixels) // count
+    return pixels[:, :, :3].reshape(count, step, count, step, 3).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("alpha_read", [False, True])
+def test_colours_have_the_alpha_cycles_gives_them(
+    mode: str, alpha_read: bool, scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    image = picture(tmp_path / "picture.png")
+    image.alpha_mode = mode
+    theirs = shown_by_cycles(scene, image, "Closest", alpha_read, render_cycles)
+    ours = filtered_pixels(image, "Closest", "repeat", alpha_read=alpha_read)
+    assert blocks(theirs, 8) == pytest.approx(blocks(ours, 8), abs=0.02)  # Cycles rounds to 8 bits in between
+
+
+@pytest.mark.parametrize("interpolation", ["Linear", "Cubic"])
+@pytest.mark.parametrize("space", ["sRGB", "Non-Color"])
+def test_between_pixels_it_is_cycles(
+    interpolation: str, space: str, scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    image = picture(tmp_path / "picture.png")
+    image.alpha_mode, image.colorspace_settings.name = "NONE", space
+    theirs = shown_by_cycles(scene, image, interpolation, False, render_cycles)
+    ours = filtered_pixels(image, interpolation, "repeat", alpha_read=False)
+    if len(ours) == 8:  # linear numbers are left to Mitsuba
+        assert (interpolation, space) == ("Linear", "Non-Color")
+        return
+    assert blocks(theirs, 16) == pytest.approx(blocks(ours, 16), abs=0.015)  # decoded before filtering 0.2

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sockets that nodes give: what a second Blender tells, and the picture of recorded paths with it, against Cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from blender_addon.probe.client import PREFIX  # noqa: E402
+from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
+from mfo_backend.job.folder.request import read_request  # noqa: E402
+from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
+
+from ..scenes import add_camera, add_light, new_material  # noqa: E402
+
+
+def ball(material: Any) -> Any:
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    item = bpy.context.object
+    item.data.materials.append(material)
+    bpy.ops.object.shade_smooth()
+    return item
+
+
+def principled(material: Any) -> Any:
+    return material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+
+
+def lit_scene(scene: Any) -> None:
+    scene.render.resolution_x = scene.render.resolution_y = 48
+    add_camera("PERSP", location=(0.0, 0.0, 4.0))
+    add_light("POINT", location=(1.5, 1.0, 3.0), energy=300.0, shadow_soft_size=0.0)
+
+
+def coordinates(tree: Any) -> Any:
+    """Generated coordinates of a ball of radius 1 are (position + 1) / 2."""
+    return tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+
+
+def test_values_are_those_of_the_positions(scene: Any, export: Any) -> None:
+    """Through a group two deep, a muted node and an output of the user's own, on a mesh that another object shares."""
+    lit_scene(scene)
+    material = new_material("Target")
+    tree = material.node_tree
+    inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    outer = bpy.data.node_groups.new("Outer", "ShaderNodeTree")
+    for group in (inner, outer):
+        group.interface.new_socket("In", in_out="INPUT", socket_type="NodeSocketVector")
+        group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketVector")
+    passing = inner.nodes.new("ShaderNodeVectorMath")
+    passing.mute = True
+    for group, node in ((inner, passing), (outer, outer.nodes.new("ShaderNodeGroup"))):
+        if group is outer:
+            node.node_tree = inner
+        group.links.new(group.nodes.new("NodeGroupInput").outputs[0], node.inputs[0])
+        group.links.new(node.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = outer
+    tree.links.new(coordinates(tree), node.inputs[0])
+    tree.links.new(node.outputs[0], principled(material).inputs["Base Color"])
+    own = tree.nodes.new("ShaderNodeOutputAOV")
+    own.aov_name = "mfo mask"
+    target = ball(material)
+    other = bpy.data.objects.new("Other", target.data)
+    other.location = (0.0, 0.0, -3.0)
+    scene.collection.objects.link(other)
+    bpy.context.view_layer.objects.active = target
+    before = {name: len(getattr(bpy.data, name)) for name in ("materials", "node_groups", "images", "worlds")}
+    report = export(target)
+    assert {name: len(getattr(bpy.data, name)) for name in before} == before
+    assert report.notes == ()
+    entry = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]
+    positions = np.load(report.folder / report.request["graph"]["positions"])
+    values = np.load(report.folder / entry["graph"])
+    seen = np.isfinite(positions).all(axis=2)
+    np.testing.assert_allclose(values[seen], (positions[seen] + 1.0) / 2.0, atol=2e-5)
+    np.testing.assert_allclose(entry["value"], values[seen].mean(axis=0), rtol=1e-4)
+    assert np.linalg.norm(positions[seen], axis=1).max() < 1.001  # nothing of the other object
+    # the camera's matrix leads from each position back to its subpixel
+    matrix = np.array(report.request["graph"]["camera"])
+    column, row, w = (np.concatenate([positions[seen], np.ones((seen.sum(), 1))], axis=1) @ matrix.T).T
+    rows, columns = np.nonzero(seen)
+    assert np.abs(column / w - columns - 0.5).mean() < 0.15
+    assert np.abs(row / w - rows - 0.5).mean() < 0.15
+
+
+def noise_ramp(tree: Any, node: Any) -> None:
+    noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+    noise.inputs["Scale"].default_value = 3.0
+    low, high = ramp.color_ramp.elements
+    low.color, low.position, high.color, high.position = (0.8, 0.1, 0.05, 1.0), 0.4, (0.05, 0.2, 0.7, 1.0), 0.6
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], node.inputs["Base Color"])
+
+
+def bump(socket: str) -> Callable[[Any, Any], None]:
+    def build(tree: Any, node: Any) -> None:
+        noise, bumped = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeBump")
+        noise.inputs["Scale"].default_value = 4.0
+        bumped.inputs["Strength"].default_value, bumped.inputs["Distance"].default_value = 1.0, 0.2
+        tree.links.new(noise.outputs[0], bumped.inputs["Height"])
+        tree.links.new(bumped.outputs[0], node.inputs[socket])
+
+    return build
+
+
+def brushed(tree: Any, node: Any) -> None:
+    tangent = tree.nodes.new("ShaderNodeTangent")
+    tangent.direction_type, tangent.axis = "RADIAL", "X"
+    tree.links.new(tangent.outputs[0], node.inputs["Tangent"])
+
+
+@pytest.mark.parametrize(
+    ("build", "values", "most"),
+    [
+        (noise_ramp, {"Roughness": 0.4}, 0.01),
+        (bump("Normal"), {"Base_Color": (0.4, 0.3, 0.2), "Roughness": 0.4, "Sheen_Weight": 0.5}, 0.015),
+        (bump("Coat Normal"), {"Base_Color": (0.4, 0.3, 0.2), "Coat_Weight": 1.0, "Coat_Roughness": 0.3}, 0.01),
+        (brushed, {"Metallic": 1.0, "Roughness": 0.5, "Anisotropic": 0.8}, 0.01),
+    ],
+    ids=["ramp", "bump", "coat", "tangent"],
+)
+def test_the_recorded_picture_is_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, build: Any, values: Any, most: float
+) -> None:
+    """Level and root mean square difference of pixels inside the ball, as a share of its mean."""
+    lit_scene(scene)
+    material = new_material("Target", **values)
+    build(material.node_tree, principled(material))
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
+    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < most
+
+
+def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
+    """Pixels inside the target, by the recorded paths of the exported job and by Cycles."""
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures.renderer import load_renderer
+
+    wanted = render_cycles()
+    report = export(target, reference=None)
+    (report.folder / "request.json").write_text(
+        (report.folder / "request.json").read_text().replace('"view":', '"reference": {"path": "scene.xml", '
+        '"encoding": "linear"}, "view":')
+    )  # fmt: skip
+    folder = JobFolder.open(report.folder)
+    request = read_request(folder)
+    parameters = request.fit.parameters if isinstance(request.fit.parameters, tuple) else ["ior"]
+    renderer = load_renderer(
+        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=parameters,
+        materials=request_materials(folder, request), light_paths=request.light_paths,
+    )  # fmt: skip
+    recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    paths = recorded.record(renderer.start, grid=4, seed=0, near=True)
+    groups = paths.pixel_groups(paths.interior)
+    found = np.asarray(recorded.pictures(paths, groups)(renderer.start))[:, :, 0]
+    return found, wanted.reshape(-1, 3)[groups.pixels]
+
+
+def test_nothing_is_left_in_the_temporary_folder() -> None:
+    import os
+    import tempfile
+
+    assert not list(Path(tempfile.gettempdir()).glob(f"{PREFIX}{os.getpid()}_*"))

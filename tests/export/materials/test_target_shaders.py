@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The recorded picture of a bare Diffuse BSDF, and of one and a Principled BSDF inside groups, against Cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from ..scenes import diffuse_material, new_material  # noqa: E402
+from .test_node_graphs import ball, lit_scene, noise_ramp, principled, recorded_and_cycles  # noqa: E402
+
+
+def grouped(material: Any, linked: str) -> Any:
+    """The material with its shader two groups deep, and Generated coordinates through both groups on a socket."""
+    shader = principled(material)
+    tree, output = material.node_tree, material.node_tree.get_output_node("CYCLES")
+    values = {s.identifier: s.default_value for s in shader.inputs if s.type in ("VALUE", "RGBA")}
+    kept = {name: tuple(v) if hasattr(v, "__len__") else v for name, v in values.items()}
+    kind, inside = shader.bl_idname, None
+    for name in ("Inner", "Outer"):
+        group = bpy.data.node_groups.new(name, "ShaderNodeTree")
+        group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketVector")
+        group.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+        node = group.nodes.new(kind if inside is None else "ShaderNodeGroup")
+        if inside is None:
+            for socket in node.inputs:
+                if socket.identifier in kept:
+                    socket.default_value = kept[socket.identifier]
+        else:
+            node.node_tree = inside
+        paint = node.inputs[linked if inside is None else "Paint"]
+        group.links.new(group.nodes.new("NodeGroupInput").outputs[0], paint)
+        group.links.new(node.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+        inside = group
+    top = tree.nodes.new("ShaderNodeGroup")
+    top.node_tree = inside
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], top.inputs["Paint"])
+    tree.links.new(top.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def rough_diffuse() -> Any:
+    material = diffuse_material("Target", (0.6, 0.3, 0.2))
+    principled(material).inputs["Roughness"].default_value = 0.8
+    return material
+
+
+def painted_diffuse() -> Any:
+    material = rough_diffuse()
+    node = principled(material)
+    twin = type("Twin", (), {"inputs": {"Base Color": node.inputs["Color"]}})
+    noise_ramp(material.node_tree, twin)
+    return material
+
+
+def glossy_in_groups() -> Any:
+    return grouped(
+        new_material("Target", Metallic=0.5, Roughness=0.4, Coat_Weight=0.5, Coat_Roughness=0.3), "Base Color"
+    )
+
+
+def diffuse_in_groups() -> Any:
+    return grouped(rough_diffuse(), "Color")
+
+
+@pytest.mark.parametrize("build", [rough_diffuse, painted_diffuse, glossy_in_groups, diffuse_in_groups])
+def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, build: Any) -> None:
+    lit_scene(scene)
+    found, truth = recorded_and_cycles(export, render_cycles, ball(build()))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
+    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.01

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Graphs that cannot be evaluated are refused in one sentence before a second Blender starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from blender_addon.export.job import check_export  # noqa: E402
+
+from ..scenes import add_camera, add_quad, new_material, world_color  # noqa: E402
+
+Tree = Any
+
+
+def empty_group(tree: Tree) -> Any:
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = bpy.data.node_groups.new("Empty", "ShaderNodeTree")
+    node.node_tree.interface.new_socket("Value", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    return node.outputs[0]
+
+
+def circle(tree: Tree) -> Any:
+    first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
+    tree.links.new(first.outputs[0], second.inputs[0])
+    tree.links.new(second.outputs[0], first.inputs[0])
+    return first.outputs[0]
+
+
+def unsaved_picture(tree: Tree) -> Any:
+    image = bpy.data.images.new("Painted", 4, 4)
+    image.pixels[0] = 0.5
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.projection = image, "BOX"
+    return node.outputs[0]
+
+
+def inside_a_group(tree: Tree) -> Any:
+    """A circle two groups down."""
+    inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    inner.interface.new_socket("Value", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    output = inner.nodes.new("NodeGroupOutput")
+    inner.links.new(circle(inner), output.inputs[0])
+    outer = bpy.data.node_groups.new("Outer", "ShaderNodeTree")
+    outer.interface.new_socket("Value", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    node = outer.nodes.new("ShaderNodeGroup")
+    node.node_tree = inner
+    outer.links.new(node.outputs[0], outer.nodes.new("NodeGroupOutput").inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = outer
+    return node.outputs[0]
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (empty_group, "the group 'Empty' without an output"),
+        (circle, "by a link in a circle or of a wrong kind"),
+        (inside_a_group, "by a link in a circle or of a wrong kind"),
+        (unsaved_picture, "the image 'Painted' with changes that are not saved (save or pack it)"),
+    ],
+)
+def test_one_sentence(scene: Any, build: Callable[[Tree], Any], words: str) -> None:
+    world_color(scene, 1.0)
+    material = new_material("Target")
+    tree = material.node_tree
+    principled = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    add_camera("ORTHO", ortho_scale=2.0)
+    tree.links.new(build(tree), principled.inputs["Roughness"])
+    errors, _ = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
+    assert len(errors) == 1
+    assert errors[0].startswith("Roughness of material 'Target' is linked to ")
+    assert errors[0].endswith(f"{words}: mend or unlink it.")
+
+
+def test_a_node_of_another_blender(scene: Any) -> None:
+    class Later(bpy.types.ShaderNode):
+        bl_idname, bl_label = "ShaderNodeOfLater", "Later"
+
+        def init(self, _context: Any) -> None:
+            self.outputs.new("NodeSocketFloat", "Value")
+
+    world_color(scene, 1.0)
+    material = new_material("Target")
+    tree = material.node_tree
+    principled = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    bpy.utils.register_class(Later)
+    tree.links.new(tree.nodes.new("ShaderNodeOfLater").outputs[0], principled.inputs["Roughness"])
+    bpy.utils.unregister_class(Later)
+    add_camera("ORTHO", ortho_scale=2.0)
+    errors, _ = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
+    assert len(errors) == 1
+    assert "which this Blender does not know" in errors[0]

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Surfaces of nodes: what Cycles bakes is, at every point of the mesh, what the nodes say there."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import bpy
+import numpy as np
+import pytest
+
+from mfo_backend.scene.image_file import read_image
+
+from ..scenes import add_camera, add_quad, new_material, world_color
+
+
+class Nodes:
+    """Nodes of a material in a few words."""
+
+    def __init__(self, material: Any) -> None:
+        self.tree = material.node_tree
+        self.principled = next(node for node in self.tree.nodes if node.type == "BSDF_PRINCIPLED")
+        self.surface = self.tree.get_output_node("CYCLES").inputs["Surface"]
+
+    def new(self, kind: str) -> Any:
+        return self.tree.nodes.new(f"ShaderNode{kind}")
+
+    def place(self) -> Any:
+        """Half of (x + 1, y + 1, z + 1) in world space."""
+        half = self.new("VectorMath")
+        half.operation = "MULTIPLY_ADD"
+        half.inputs[1].default_value = half.inputs[2].default_value = (0.5, 0.5, 0.5)
+        self.tree.links.new(self.new("NewGeometry").outputs["Position"], half.inputs[0])
+        return half.outputs[0]
+
+
+@pytest.fixture
+def stage(scene: Any) -> tuple[Any, Any, Nodes]:
+    """A target, and a turned and scaled ball with a material of nodes: target, ball, nodes."""
+    world_color(scene, 1.0)
+    scene.render.resolution_x = scene.render.resolution_y = 256  # bakes are about as fine as the picture
+    add_camera("ORTHO", ortho_scale=4.0)
+    target = add_quad("Target", 1.0, 1.5, new_material("Target"))
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12, radius=0.5, rotation=(0.4, 0.2, 0.9))
+    ball = bpy.context.object
+    ball.name, ball.scale = "Ball", (1.0, 1.5, 1.0)
+    bpy.ops.object.shade_smooth()
+    ball.data.materials.append(new_material("Ball"))
+    return target, ball, Nodes(ball.data.materials[0])
+
+
+def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Position and UV of the vertices."""
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    mesh = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
+    return np.array(mesh["vertex_positions"]).reshape(-1, 3), np.array(mesh["vertex_texcoords"]).reshape(-1, 2)
+
+
+def at_vertices(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """The texel that each vertex lies in; uv counts rows from the top."""
+    height, width = picture.shape[:2]
+    column, row = (np.clip((uv * (width, height)).astype(int), 0, (width - 1, height - 1))).T
+    return picture[row, column]
+
+
+def shape_of(report: Any) -> tuple[str, np.ndarray, np.ndarray]:
+    """The BSDF of the one shape that is baked, its vertices and their UV."""
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    shape = next(shape for shape in scene.iterfind("shape") if shape.find("ref").get("id").startswith("baked"))
+    return shape.find("ref").get("id"), *read_ply(report.folder / shape.find("string").get("value"))
+
+
+def texture(report: Any, bsdf: str, socket: str) -> np.ndarray:
+    path = report.request["materials"][bsdf]["sockets"][socket]["texture"]
+    return np.asarray(read_image(report.folder / path).pixels)
+
+
+def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
+    target, _, nodes = stage
+    place = nodes.place()
+    apart, bump = nodes.new("SeparateXYZ"), nodes.new("Bump")
+    nodes.tree.links.new(place, apart.inputs[0])
+    nodes.tree.links.new(place, nodes.principled.inputs["Base Color"])
+    nodes.tree.links.new(bump.outputs[0], nodes.principled.inputs["Coat Normal"])
+    nodes.tree.links.new(place, nodes.tree.get_output_node("CYCLES").inputs["Displacement"])
+    for axis, socket in (("X", "Roughness"), ("Y", "Metallic")):
+        nodes.tree.links.new(apart.outputs[axis], nodes.principled.inputs[socket])
+    report = export(target)
+    bsdf, positions, uv = shape_of(report)
+    expected = 0.5 * positions + 0.5
+    # a vertex lies within a texel of its place, and a texel is about a hundredth of the ball wide
+    for socket, values in (("Base Color", expected), ("Roughness", expected[:, :1]), ("Metallic", expected[:, 1:2])):
+        found = at_vertices(texture(report, bsdf, socket), uv)[:, : values.shape[1]]
+        assert np.sqrt(np.mean((found - values) ** 2)) < 0.01, socket
+    for left in ("what is linked to Coat Normal is", "its displacement is"):
+        assert f"Material 'Ball': {left} left out." in report.notes
+    assert report.request["materials"][bsdf]["sockets"]["IOR"] == {"value": 1.5, "linked": False}
+
+
+def test_instances_share_one_bake_and_say_so(stage: Any, export: Any) -> None:
+    target, ball, nodes = stage
+    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    prefab = bpy.data.collections.new("Prefab")
+    bpy.context.scene.collection.children.link(prefab)
+    prefab.objects.link(ball)
+    bpy.context.scene.collection.objects.unlink(ball)
+    bpy.context.view_layer.layer_collection.children["Prefab"].exclude = True
+    for x in (-1.0, 1.0):
+        empty = bpy.data.objects.new("Instance", None)
+        empty.instance_type, empty.instance_collection, empty.location.x = "COLLECTION", prefab, x
+        bpy.context.scene.collection.objects.link(empty)
+    report = export(target)
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    refs = [shape.find("ref").get("id") for shape in scene.iterfind("shape")]
+    assert refs.count("baked_0001") == 2
+    said = "Geometry may differ between the 2 instances of 'Ball'; all have the bake of the first."
+    assert f"Material 'Ball': {said}" in report.notes
+    bsdf, positions, uv = shape_of(report)  # of the first
+    found = at_vertices(texture(report, bsdf, "Base Color"), uv)
+    assert np.sqrt(np.mean((found - (0.5 * positions + 0.5).clip(0.0)) ** 2)) < 0.01
+
+
+def test_generated_coordinates_are_those_of_the_object_without_its_modifiers(stage: Any, export: Any) -> None:
+    target, ball, nodes = stage
+    ball.modifiers.new("Array", "ARRAY").count = 2
+    coordinate = nodes.new("TexCoord")
+    nodes.tree.links.new(coordinate.outputs["Generated"], nodes.principled.inputs["Base Color"])
+    report = export(target)
+    bsdf, positions, uv = shape_of(report)
+    local = positions @ np.linalg.inv(np.array(ball.matrix_world.to_3x3())).T
+    first = local[:, 0] < 0.49  # of the two copies
+    found = at_vertices(texture(report, bsdf, "Base Color"), uv)
+    assert np.sqrt(np.mean((found[first] - (local[first] + 0.5)) ** 2)) < 0.03  # of the copies together it is 0.25
+
+
+@pytest.mark.parametrize(
+    ("modifier", "source", "is_said"),
+    [
+        ("SIMPLE_DEFORM", "TexCoord", True),
+        ("SIMPLE_DEFORM", "TexNoise", True),
+        ("SIMPLE_DEFORM", "VertexColor", False),
+        ("ARRAY", "TexCoord", False),
+    ],
+)
+def test_generated_coordinates_of_a_deformed_mesh_are_said(
+    modifier: str, source: str, is_said: bool, stage: Any
+) -> None:
+    from blender_addon.export.job import check_export
+
+    target, ball, nodes = stage
+    ball.modifiers.new("Bend", modifier)
+    mixed = nodes.new("MixRGB")
+    nodes.tree.links.new(nodes.new(source).outputs[0], mixed.inputs[1])
+    nodes.tree.links.new(mixed.outputs[0], nodes.principled.inputs["Base Color"])
+    said = (
+        "Material 'Ball' of 'Ball': the bake takes Generated coordinates after the mesh is deformed (Bend), Cycles "
+        "before."
+    )
+    assert (said in check_export(bpy.context, target)[1]) == is_said
+
+
+def test_shape_keys_deform_too(stage: Any) -> None:
+    from blender_addon.export.job import check_export
+
+    target, ball, nodes = stage
+    ball.shape_key_add(name="Basis")
+    ball.shape_key_add(name="Grown").value = 1.0
+    nodes.tree.links.new(nodes.new("TexNoise").outputs[0], nodes.principled.inputs["Roughness"])
+    assert any("is deformed (shape keys), Cycles before" in note for note in check_export(bpy.context, target)[1])
+
+
+def test_mix_in_a_group_becomes_a_blend(stage: Any, export: Any) -> None:
+    target, _, nodes = stage
+    group = bpy.data.node_groups.new("Mix", "ShaderNodeTree")
+    for name, direction in (("First", "INPUT"), ("Factor", "INPUT"), ("Shader", "OUTPUT")):
+        kind = "NodeSocketFloat" if name == "Factor" else "NodeSocketShader"
+        group.interface.new_socket(name, in_out=direction, socket_type=kind)
+    given, out = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    mixed, matte = group.nodes.new("ShaderNodeMixShader"), group.nodes.new("ShaderNodeBsdfDiffuse")
+    matte.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1.0)
+    for source, socket in (
+        (given.outputs["Factor"], mixed.inputs[0]),
+        (given.outputs["First"], mixed.inputs[1]),
+        (matte.outputs[0], mixed.inputs[2]),
+        (mixed.outputs[0], out.inputs[0]),
+    ):
+        group.links.new(source, socket)
+    node = nodes.new("Group")
+    node.node_tree = group
+    apart = nodes.new("SeparateXYZ")
+    nodes.tree.links.new(nodes.place(), apart.inputs[0])
+    nodes.tree.links.new(apart.outputs["X"], node.inputs["Factor"])
+    nodes.tree.links.new(nodes.principled.outputs[0], node.inputs["First"])
+    nodes.tree.links.new(node.outputs[0], nodes.surface)
+    report = export(target)
+    bsdf, positions, uv = shape_of(report)
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    blend = next(element for element in scene.iterfind("bsdf") if element.get("id") == bsdf)
+    assert blend.get("type") == "blendbsdf"
+    assert [ref.get("id") for ref in blend.iterfind("ref")] == [f"{bsdf}_0", f"{bsdf}_1"]
+    weight = np.asarray(read_image(report.folder / blend.find("texture/string").get("value")).pixels)
+    found = at_vertices(weight, uv)[:, 0]
+    assert np.sqrt(np.mean((found - (0.5 * positions[:, 0] + 0.5)) ** 2)) < 0.01
+    sockets = report.request["materials"][f"{bsdf}_1"]["sockets"]
+    np.testing.assert_allclose(sockets["Base Color"]["value"], (0.1, 0.2, 0.3), rtol=1e-5)
+
+
+def test_a_tilted_normal_is_tilted_in_the_frame_of_the_map(stage: Any, export: Any) -> None:
+    """The smooth normal turned by a known angle has that angle in the normal map, and a Normal Map of blue has none."""
+    target, _, nodes = stage
+    turned = nodes.new("VectorMath")
+    turned.operation = "ADD"
+    geometry, tangent = nodes.new("NewGeometry"), nodes.new("Tangent")
+    scaled = nodes.new("VectorMath")
+    scaled.operation, scaled.inputs["Scale"].default_value = "SCALE", 0.5
+    for source, socket in (
+        (tangent.outputs[0], scaled.inputs[0]),
+        (geometry.outputs["Normal"], turned.inputs[0]),
+        (scaled.outputs[0], turned.inputs[1]),
+        (turned.outputs[0], nodes.principled.inputs["Normal"]),
+    ):
+        nodes.tree.links.new(source, socket)
+    report = export(target)
+    bsdf, _, uv = shape_of(report)
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    bumped = next(element for element in scene.iterfind("bsdf") if element.get("id") == bsdf)
+    assert bumped.get("type") == "normalmap"
+    normals = 2.0 * np.asarray(read_image(report.folder / bumped.find("texture/string").get("value")).pixels) - 1.0
+    found = at_vertices(normals, uv)[:, 2]
+    np.testing.assert_allclose(np.median(found), np.cos(np.arctan(0.5)), atol=0.005)
+
+
+def test_glow_of_any_tree_is_emission(stage: Any, export: Any) -> None:
+    target, _, nodes = stage
+    glow, added = nodes.new("Emission"), nodes.new("AddShader")
+    nodes.tree.links.new(nodes.place(), glow.inputs["Color"])
+    glow.inputs["Strength"].default_value = 3.0
+    nodes.tree.links.new(nodes.principled.outputs[0], added.inputs[0])
+    nodes.tree.links.new(glow.outputs[0], added.inputs[1])
+    nodes.tree.links.new(added.outputs[0], nodes.surface)
+    report = export(target)
+    bsdf, positions, uv = shape_of(report)
+    found = at_vertices(texture(report, bsdf, "Emission Color"), uv)
+    assert np.sqrt(np.mean((found - 3.0 * (0.5 * positions + 0.5)) ** 2)) < 0.03
+    assert report.request["materials"][bsdf]["sockets"]["Emission Strength"]["value"] == 1.0
+
+
+def test_a_missing_image_is_magenta_and_named(stage: Any, export: Any) -> None:
+    target, _, nodes = stage
+    image = bpy.data.images.new("Lost", 8, 8)
+    image.source, image.filepath = "FILE", "//nowhere.png"
+    picture, mixed = nodes.new("TexImage"), nodes.new("MixRGB")
+    picture.image = image
+    mixed.inputs["Fac"].default_value = 0.5
+    mixed.inputs["Color1"].default_value = (0.0, 0.0, 0.0, 1.0)
+    nodes.tree.links.new(picture.outputs[0], mixed.inputs["Color2"])
+    nodes.tree.links.new(mixed.outputs[0], nodes.principled.inputs["Base Color"])
+    report = export(target)
+    bsdf = shape_of(report)[0]
+    color = report.request["materials"][bsdf]["sockets"]["Base Color"]
+    np.testing.assert_allclose(color["value"], (0.5, 0.0, 0.5), atol=1e-4)
+    assert "texture" not in color  # the same everywhere
+    said = "Material 'Ball': the image 'Lost' of the node 'Image Texture' is missing; it is magenta, as in Blender."
+    assert said in report.notes
+
+
+def _circle(nodes: Nodes) -> None:
+    first, second = nodes.new("MixShader"), nodes.new("MixShader")
+    nodes.tree.links.new(first.outputs[0], second.inputs[1])
+    nodes.tree.links.new(second.outputs[0], first.inputs[1])
+    nodes.tree.links.new(first.outputs[0], nodes.surface)
+
+
+def _group_without_output(nodes: Nodes) -> None:
+    node = nodes.new("Group")
+    node.node_tree = bpy.data.node_groups.new("Empty", "ShaderNodeTree")
+    node.node_tree.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    nodes.tree.links.new(node.outputs[0], nodes.surface)
+
+
+@pytest.mark.parametrize("build", [_circle, _group_without_output])
+def test_broken_trees_end_in_a_material(build: Callable[[Nodes], None], stage: Any, export: Any) -> None:
+    target, ball, nodes = stage
+    build(nodes)
+    before = sorted(node.name for node in nodes.tree.nodes)
+    report = export(target)
+    assert any("'Ball' is baked" in note for note in report.notes)
+    assert shape_of(report)[0] == "baked_0001"
+    assert sorted(node.name for node in nodes.tree.nodes) == before
+    assert ball.name == "Ball"
+
+
+def test_without_a_second_blender_the_nearest_model_stays(
+    stage: Any, export: Any, monkeypatch: Any, tmp_path: Path
+) -> None:
+    from blender_addon.bake import baker
+    from blender_addon.probe import client
+
+    target, _, nodes = stage
+    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    monkeypatch.setattr(client.tempfile, "tempdir", str(tmp_path))
+    ask = baker.Baker.ask
+
+    def killed(self: Any, *words: Any, **more: Any) -> int:
+        number = ask(self, *words, **more)
+        client.signal_group(self._probe.pid, signal.SIGKILL)
+        return number
+
+    monkeypatch.setattr(baker.Baker, "ask", killed)
+    report = export(target)
+    assert any("'Ball' of 'Ball' could not be baked by Cycles: The second Blender" in note for note in report.notes)
+    assert any(note.startswith("Base Color of material 'Ball' is linked to") for note in report.notes)
+    assert [path.name for path in tmp_path.iterdir()] == ["job"]

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Light over other surfaces as Blender's settings change it. Oracle: Cycles' render of the same scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from ..scenes import add_camera, add_light, add_quad, diffuse_material, new_material
+
+SETTINGS = {
+    "filter glossy": {"blur_glossy": 1.0},
+    "strong filter glossy": {"blur_glossy": 5.0},
+    "few bounces": {"diffuse_bounces": 0, "glossy_bounces": 0},
+    "clamp": {"sample_clamp_indirect": 0.02},
+}
+
+
+def corner(scene: Any) -> Any:
+    """A matt floor beside a metal wall that throws the light of a small sun on it."""
+    add_camera("ORTHO", (-1.5, 0, 5), (0, -0.3, 0), ortho_scale=3.0)
+    add_quad("Floor", 4.0, 0.0, diffuse_material("Floor", (0.8, 0.8, 0.8)))
+    wall = add_quad("Wall", 4.0, 0.0, new_material("Wall", Base_Color=(0.9, 0.6, 0.4), Metallic=1.0, Roughness=0.2))
+    wall.location, wall.rotation_euler = (1.5, 0, 1.0), (0, -1.57, 0)
+    add_light("SUN", rotation=(0.2, -0.7, 0), energy=3.0, angle=0.4)
+    return wall
+
+
+def picture_of(report: Any, rounds: int = 6) -> np.ndarray:
+    from studies.parity.cycles_parity import render_job
+
+    halves = render_job(report.folder, rounds * 64)
+    return (halves[0] + halves[1]) / 2
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_equals_cycles(scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any, name: str) -> None:
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    cycles = scene.cycles
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = 4
+    cycles.samples = 1024
+    wall = corner(scene)
+    plain = render_cycles()
+    for setting, value in SETTINGS[name].items():
+        setattr(cycles, setting, value)
+    cycles_picture = render_cycles()
+    reference = scene_reference(cycles_picture)
+    ours = picture_of(export(wall, reference=reference))
+    difference = np.abs(ours.mean(axis=(0, 1)) / cycles_picture.mean(axis=(0, 1)) - 1).max()
+    effect = np.abs(plain.mean(axis=(0, 1)) / cycles_picture.mean(axis=(0, 1)) - 1).max()
+    assert difference < 0.003  # noise of both; the lobe choice, by which Filter Glossy goes, is not exactly Cycles'
+    assert effect > 0.2
+
+
+def scene_reference(pixels: np.ndarray) -> Any:
+    """An image of Blender with these pixels: a job needs a reference."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new("Reference", width, height, float_buffer=True, is_data=True)
+    rgba = np.ones((height, width, 4), np.float32)
+    rgba[:, :, :3] = pixels[::-1]
+    image.pixels.foreach_set(rgba.ravel())
+    return image
+
+
+def test_what_stays_different_is_said(scene: Any, export: Any) -> None:
+    wall = corner(scene)
+    scene.cycles.blur_glossy, scene.cycles.sample_clamp_indirect, scene.cycles.film_exposure = 1.0, 10.0, 2.0
+    scene.cycles.caustics_reflective = False
+    report = export(wall)
+    assert report.request["light_paths"] == {
+        "filter_glossy": 1.0,
+        "clamp_indirect": 20.0,
+        "diffuse_bounces": 4,
+        "glossy_bounces": 4,
+        "transmission_bounces": 12,
+    }
+    assert report.notes == (
+        "Clamping of indirect light (10) works on single samples, and those of the fit are not Cycles': how much light "
+        "it takes away may differ.",
+        "Cycles removes caustics; the fit does not.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("glossy", "total", "is_said"), [(0, 4, True), (1, 4, True), (2, 4, False), (1, 1, False), (0, 0, False)]
+)
+def test_few_glossy_bounces_are_said(scene: Any, export: Any, glossy: int, total: int, is_said: bool) -> None:
+    """Unless the limit of all bounces is as low, where that of glossy ones takes nothing away."""
+    wall = corner(scene)
+    scene.cycles.glossy_bounces, scene.cycles.max_bounces = glossy, total
+    said = [note for note in export(wall).notes if note.startswith(f"The limit of glossy bounces is {glossy}: ")]
+    assert len(said) == is_said

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of a scene is exported: layers, instances, geometry nodes, muted nodes. Oracles: Cycles, and known scenes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from blender_addon.export.job import ExportError, check_export
+
+from ..scenes import add_camera, add_light, add_quad, diffuse_material, emission_material, new_material, world_color
+
+
+def lit_quad(scene: Any) -> Any:
+    item = add_quad("Target", 2.0, 0.0, new_material("Target"))
+    add_light("POINT", (0, 0, 3), energy=100.0)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=3.0)
+    bpy.context.view_layer.update()
+    return item
+
+
+def test_an_object_that_only_an_instance_shows_is_fitted(scene: Any, export: Any, render_cycles: Any,
+                                                         render_mitsuba: Any) -> None:  # fmt: skip
+    item = lit_quad(scene)
+    prefab = bpy.data.collections.new("Prefab")
+    prefab.objects.link(item)
+    scene.collection.objects.unlink(item)
+    scene.collection.children.link(prefab)
+    bpy.context.view_layer.layer_collection.children["Prefab"].exclude = True
+    for x in (-0.6, 0.6):
+        empty = bpy.data.objects.new("Instance", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", prefab
+        empty.location, empty.scale = (x, 0, 0), (0.5, 0.5, 0.5)
+        scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    item.data.materials[0] = emission_material("Glow", (1.0, 0.5, 0.2))
+    theirs = render_cycles()
+    item.data.materials[0] = new_material("Target", Emission_Color=(1.0, 0.5, 0.2), Emission_Strength=1.0,
+                                          Base_Color=(0, 0, 0), Specular_IOR_Level=0.0)  # fmt: skip
+    assert render_mitsuba(export(item)).mean() == pytest.approx(theirs.mean(), rel=0.02)
+
+
+def scatter(item: Any, material: Any) -> None:
+    """Put a small cube that the tree makes itself, with a material of its own, on every vertex of `item`."""
+    group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    nodes, link = group.nodes, group.links.new
+    start, end, join = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput"), nodes.new("GeometryNodeJoinGeometry")
+    cube, painted = nodes.new("GeometryNodeMeshCube"), nodes.new("GeometryNodeSetMaterial")
+    instances = nodes.new("GeometryNodeInstanceOnPoints")
+    cube.inputs["Size"].default_value = (0.4, 0.4, 0.4)
+    painted.inputs["Material"].default_value = material
+    link(cube.outputs["Mesh"], painted.inputs["Geometry"])
+    link(painted.outputs[0], instances.inputs["Instance"])
+    link(start.outputs[0], instances.inputs["Points"])
+    link(instances.outputs[0], join.inputs[0])
+    link(start.outputs[0], join.inputs[0])
+    link(join.outputs[0], end.inputs[0])
+    item.modifiers.new("Scatter", "NODES").node_group = group
+
+
+def test_meshes_that_geometry_nodes_make_are_instanced_with_their_material(scene: Any, export: Any, render_cycles: Any,
+                                                                           render_mitsuba: Any) -> None:  # fmt: skip
+    item = lit_quad(scene)
+    scatter(item, emission_material("Sprinkle", (0.2, 0.5, 1.0)))
+    bpy.context.view_layer.update()
+    theirs = render_cycles()
+    report = export(item)
+    assert len(list((report.folder / "meshes").glob("*.ply"))) == 1 + 4
+    ours = render_mitsuba(report)
+    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.02)
+
+
+def test_the_view_layer_that_renders_is_exported(scene: Any, export: Any) -> None:
+    item = lit_quad(scene)
+    other = add_quad("Other", 1.0, -1.0, diffuse_material("Other", (0.5, 0.5, 0.5)))
+    hidden = bpy.data.collections.new("Hidden")
+    scene.collection.children.link(hidden)
+    for collection in list(other.users_collection):
+        collection.objects.unlink(other)
+    hidden.objects.link(other)
+    second = scene.view_layers.new("Second")
+    second.layer_collection.children["Hidden"].exclude = True
+    scene.view_layers[0].use = False
+    report = export(item)
+    assert any("'Second' is exported" in note for note in report.notes)
+    assert len(list((report.folder / "meshes").glob("*.ply"))) == 1
+
+
+def test_muted_nodes_are_as_in_cycles(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
+    item = lit_quad(scene)
+    floor = add_quad("Floor", 6.0, -0.1, diffuse_material("Floor", (0.9, 0.2, 0.1)))
+    tree = floor.data.materials[0].node_tree
+    gamma = tree.nodes.new("ShaderNodeGamma")
+    gamma.inputs["Gamma"].default_value, gamma.mute = 4.0, True
+    colour = tree.nodes.new("ShaderNodeRGB")
+    colour.outputs[0].default_value = (0.1, 0.8, 0.3, 1.0)
+    tree.links.new(colour.outputs[0], gamma.inputs["Color"])
+    diffuse = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    tree.links.new(gamma.outputs[0], diffuse.inputs["Color"])
+    world_color(scene, 0.5)
+    next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND").mute = True
+    bpy.context.view_layer.update()
+    theirs, ours = render_cycles(), render_mitsuba(export(item))
+    for channel in range(3):  # of the frame around the target
+        assert ours[:2, :, channel].mean() == pytest.approx(theirs[:2, :, channel].mean(), rel=0.03)
+    item.data.materials[0].node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node.mute = True
+    with pytest.raises(ExportError, match="is muted"):
+        export(item, "muted")
+
+
+def test_faces_in_the_same_place_are_named(scene: Any) -> None:
+    item = lit_quad(scene)
+    for name in ("A", "B"):
+        add_quad(name, 1.0, -1.0, new_material(name))
+    bpy.context.view_layer.update()
+    _, notes = check_export(bpy.context, item)
+    assert sum("'A' and 'B' have faces in the same place" in note for note in notes) == 1
+
+
+def test_a_world_that_the_camera_does_not_see(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
+    item = lit_quad(scene)
+    world_color(scene, 0.5)
+    scene.world.cycles_visibility.camera = False
+    theirs, ours = render_cycles(), render_mitsuba(export(item))
+    assert theirs[0, 0].max() == ours[0, 0].max() == 0.0
+    assert np.abs(ours.mean() / theirs.mean() - 1.0) < 0.03
