@@ -12,6 +12,7 @@ from .backend import backend_state, preferences_page
 from .check import preflight
 from .operators import CLASSES as OPERATORS
 from .panel import menu
+from .process import waiting_backend
 from .result import comparison, previews
 from .running import cycles_check, handlers, running_job
 from .versions import is_module
@@ -37,6 +38,7 @@ def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
     running_job.close()
+    waiting_backend.close()
     backend_state.close()
     cycles_check.close()
     handlers.unregister()

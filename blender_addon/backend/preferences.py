@@ -12,6 +12,7 @@ import bpy
 from ..process.backend_python import backend_python
 from .backend_folder import installed_python
 
+IDLE_MINUTES = 5  # a loaded backend waits so long; it holds some 200 MB
 # bl_ext.<repository>.material_fit_mfo as an extension, blender_addon when imported by itself
 ADDON_ID = (__package__ or "").removesuffix(".backend").removesuffix(".blender_addon")
 
@@ -20,6 +21,12 @@ def preference(context: bpy.types.Context, name: str) -> str:
     """A preference's value, empty where the package runs without being enabled as an add-on."""
     addon = context.preferences.addons.get(ADDON_ID)
     return getattr(addon.preferences, name, "") if addon else ""
+
+
+def idle_seconds(context: bpy.types.Context) -> float:
+    """How long a backend waits, loaded, for the next fit; 0: it does not."""
+    addon = context.preferences.addons.get(ADDON_ID)
+    return 60.0 * (addon.preferences.idle_minutes if addon else IDLE_MINUTES)
 
 
 def new_job_folder(context: bpy.types.Context, label: str) -> Path:

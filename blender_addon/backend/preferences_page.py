@@ -7,12 +7,13 @@
 import os
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import IntProperty, StringProperty
 
+from ..process import waiting_backend
 from ..process.backend_python import VARIABLE
 from . import backend_state
 from .backend_section import draw_setup
-from .preferences import ADDON_ID
+from .preferences import ADDON_ID, IDLE_MINUTES
 
 
 def _look_again(_self: object, _context: bpy.types.Context) -> None:
@@ -46,6 +47,14 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
 
+    idle_minutes: IntProperty(
+        name="Keep Ready",
+        description="Minutes that a loaded backend waits for the next fit, which then begins at once; 0: none waits",
+        default=IDLE_MINUTES,
+        min=0,
+        max=120,
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         """The state of the backend, the paths, and a line where the variable wins over the first."""
         layout = self.layout
@@ -59,6 +68,10 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
         if os.environ.get(VARIABLE):
             layout.label(text=f"{VARIABLE} is set and used instead: {os.environ[VARIABLE]}", icon="INFO")
         layout.prop(self, "job_root")
+        layout.prop(self, "idle_minutes")
+        held = waiting_backend.memory_mb()
+        if held is not None:
+            layout.label(text=f"A backend waits and holds {held} MB" if held else "A backend is loading", icon="TIME")
 
 
 CLASSES = (MFO_AP_preferences,)

@@ -8,10 +8,12 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..backend.backend_section import needs_setup
+from ..backend.preferences import idle_seconds
+from ..process import waiting_backend
 from ..result import shown_result
 from ..running import fit_queue, running_job
 from .check import thorough_check
-from .fit_options import FitError, FitOptions, selected_targets, target_of
+from .fit_options import FitError, FitOptions, python_of, selected_targets, target_of
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -47,6 +49,8 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Export the job and start the backend or, while another fit runs, queue it; wait in background mode."""
         try:
+            if not bpy.app.background:  # it loads while the job is exported
+                waiting_backend.prepare(python_of(context), idle_seconds(context))
             fit = self.prepare(context, target_of(context, self.object), self.job_folder)
             if running_job.current is not None:
                 fit_queue.add(fit)

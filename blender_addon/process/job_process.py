@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The backend as a child process: start, read its JSON lines, cancel, say in one sentence how it ended. No bpy here.
+"""A job in a backend process: start, cancel, say in one sentence how it ended. No bpy here.
 
-`poll` never blocks; a timer calls it in windows, a loop in background mode. The only thread here reads a pipe.
+`poll` never blocks; a timer calls it in windows, a loop in background mode.
 """
 
 from __future__ import annotations
@@ -9,27 +9,20 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import subprocess
-import threading
 import time
-from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-from .backend_python import EXTENSION_ROOT, backend_environment
-from .process_group import KILL, TERMINATE, own_group, signal_group
-from .progress_lines import Event, read_events
+from .backend_process import LOG, PIPE_GRACE, BackendProcess
+from .backend_python import EXTENSION_ROOT
+from .process_group import KILL, TERMINATE, signal_group
+from .progress_lines import Event
 
-LOG = "backend.log"
 RESULT, PARTIAL = "result.json", "partial.json"
 
 CANCEL_GRACE = 5.0  # seconds from the cancel command to SIGTERM; the backend promises to need one
 TERMINATE_GRACE = 3.0  # seconds from SIGTERM to SIGKILL
-PIPE_GRACE = 1.0  # seconds a dead process' pipe may stay open (a grandchild can hold it) before we stop reading
-QUEUE_LIMIT = 1000  # events besides progress and preview, of which only the newest is kept
 
-_LAST_EVENTS = ("finished", "failed")
-_COALESCED = ("progress", "preview")
 _EXIT_SENTENCES = {
     0: "The backend ended without a result",
     1: "The backend failed",
@@ -61,6 +54,8 @@ class JobProcess:
         Job folder with request.json; stderr goes to backend.log in it.
     root
         Folder that holds the package `mfo_backend`.
+    waiting
+        A backend that waits for a job, and gets this one; where it has ended meanwhile another is started.
 
     Raises
     ------
@@ -68,34 +63,22 @@ class JobProcess:
         If the log cannot be written or the interpreter cannot be started.
     """
 
-    def __init__(self, python: Path, folder: Path, *, root: Path = EXTENSION_ROOT) -> None:
+    def __init__(
+        self, python: Path, folder: Path, *, root: Path = EXTENSION_ROOT, waiting: BackendProcess | None = None
+    ) -> None:
         self.folder = folder
         self.outcome: Outcome | None = None
-        self._lock = threading.Lock()
-        self._events: deque[Event] = deque(maxlen=QUEUE_LIMIT)
-        self._newest: dict[str, Event] = {}
-        self._last: Event | None = None
         self._deadlines: list[tuple[float, int]] = []
         self._cancelled = False
         self._exit_seen: float | None = None
-        command = [str(python), "-m", "mfo_backend", "run", str(folder), "--progress", "json", "--control", "stdin"]
-        with open(folder / LOG, "wb") as log:
-            self._process = subprocess.Popen(
-                [*command, "--parent", str(os.getpid())],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                cwd=root,  # not the job folder: `-m` imports from here, and a job may come from a stranger
-                env=backend_environment(root),
-                **own_group(),
-            )
-        self._reader = threading.Thread(target=self._read, name="mfo-reader", daemon=True)
-        self._reader.start()
+        if waiting is not None:
+            waiting.give(folder)
+        self.backend = waiting or BackendProcess(python, folder, root=root)
 
     @property
     def pid(self) -> int:
         """Process id, which is also its group's."""
-        return self._process.pid
+        return self.backend.process.pid
 
     @property
     def cancelling(self) -> bool:
@@ -107,62 +90,52 @@ class JobProcess:
         if self.outcome is None:
             self._escalate()
             self._check_end()
-        with self._lock:
-            events = [*self._events, *self._newest.values()]
-            self._events.clear()
-            self._newest.clear()
-        return events
+        return self.backend.take_events()
 
     def cancel(self) -> None:
         """Ask the backend to stop and keep its best values; it is terminated and then killed if it does not."""
         if self._cancelled or self.outcome is not None:
             return
         self._cancelled = True
-        self._send(b'{"cmd": "cancel"}\n')
+        self.backend.send({"cmd": "cancel"})
         self._stop_after(CANCEL_GRACE)
 
     def close(self, grace: float = 1.0) -> None:
         """End the process within `grace` seconds (it may still write its best values) and release the pipes."""
         if self.outcome is None:
             self.cancel()
-            self._close_stdin()
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(grace)
-            if self._process.poll() is None:
-                signal_group(self.pid, KILL)
-                self._process.wait()
-            self._reader.join(PIPE_GRACE)
+            self.backend.close(grace)
             self._end()
 
-    def _read(self) -> None:
-        stdout = self._process.stdout
-        assert stdout is not None
-        for event in read_events(stdout):
-            with self._lock:
-                if event["event"] in _COALESCED:
-                    self._newest[event["event"]] = event
-                else:
-                    self._events.append(event)
-                if event["event"] in _LAST_EVENTS:
-                    self._last = event
-
     def _check_end(self) -> None:
-        if self._process.poll() is None:
-            if self._last is not None and not self._deadlines:
+        if self.backend.is_alive:
+            if self.backend.last is not None and not self._deadlines:
                 self._stop_after(CANCEL_GRACE)  # it said it was done and hangs in its own shutdown
             return
         self._exit_seen = self._exit_seen or time.monotonic()
-        if not self._reader.is_alive() or time.monotonic() - self._exit_seen > PIPE_GRACE:
+        if self.backend.reader.is_alive() and time.monotonic() - self._exit_seen <= PIPE_GRACE:
+            return
+        if self.backend.has_accepted or self._cancelled:
             self._end()
+        else:
+            self._start_anew()
+
+    def _start_anew(self) -> None:
+        """The one that waited has ended before it took the job."""
+        self.backend.release()
+        self._exit_seen = None
+        try:
+            self.backend = BackendProcess(self.backend.python, self.folder, root=self.backend.root)
+        except OSError as error:
+            sentence = f"The backend could not be started with {self.backend.python} ({error.strerror or error})."
+            self.outcome = Outcome("failed", sentence)
 
     def _end(self) -> None:
-        self._close_stdin()
-        if self._process.stdout is not None and not self._reader.is_alive():
-            self._process.stdout.close()
-        self.outcome = self._judge(self._process.returncode)
+        self.backend.release()
+        self.outcome = self._judge(self.backend.process.returncode)
 
     def _judge(self, code: int) -> Outcome:
-        last = self._last
+        last = self.backend.last
         if last is not None:
             fallback = _EXIT_SENTENCES.get(code, "The backend ended") + "."
             return Outcome(str(last.get("status", "failed")), str(last.get("sentence") or fallback))
@@ -194,24 +167,12 @@ class JobProcess:
                 return True
         return False
 
-    def _send(self, line: bytes) -> None:
-        stdin = self._process.stdin
-        if stdin is not None and not stdin.closed:
-            with contextlib.suppress(OSError):  # it is gone already, or never listens
-                stdin.write(line)
-                stdin.flush()
-
-    def _close_stdin(self) -> None:
-        if self._process.stdin is not None:
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
-
     def _stop_after(self, seconds: float) -> None:
         now = time.monotonic()
         self._deadlines = [(now + seconds, TERMINATE), (now + seconds + TERMINATE_GRACE, KILL)]
 
     def _escalate(self) -> None:
-        if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self._process.poll() is None:
+        if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self.backend.is_alive:
             signal_group(self.pid, self._deadlines.pop(0)[1])
 
 

@@ -17,8 +17,11 @@ from pathlib import Path
 
 import bpy
 
+from ..backend.preferences import idle_seconds
 from ..check.preflight import redraw
-from ..process.job_process import Event, JobProcess, Outcome
+from ..process import waiting_backend
+from ..process.job_process import JobProcess, Outcome
+from ..process.progress_lines import Event
 from ..result import history, previews, shown_result
 from ..result.job_result import JobResult, JobResultError, read_job_result
 from ..result.local_copy import unwritable
@@ -58,7 +61,7 @@ def start(fit: PreparedFit, *, timer: bool) -> None:
         If the backend cannot be started.
     """
     global current
-    current = RunningJob(JobProcess(fit.python, fit.folder), fit)
+    current = RunningJob(JobProcess(fit.python, fit.folder, waiting=waiting_backend.take(fit.python)), fit)
     atexit.register(close)
     runtime = _runtime()
     shown_result.clear(runtime)
@@ -214,8 +217,9 @@ def progress_text(event: Event) -> str:
     """What is done, percent and time left of a progress event, short enough for a progress bar."""
     text = f"{'Exploring' if event['stage'] in _FIRST_STAGES else 'Refining'} · {event['fraction']:.0%}"
     left = event.get("remaining_seconds")
-    known = left is not None and float(event["fraction"]) >= _FIRST_GUESS
-    return f"{text} · {_duration(float(left))} left" if known else text
+    if left is None or float(event["fraction"]) < _FIRST_GUESS:
+        return text
+    return f"{text} · {_duration(float(left))} left"
 
 
 def _finish(job: RunningJob, outcome: Outcome) -> None:
@@ -243,6 +247,8 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
         runtime.job_folder = ""
     if bpy.app.background:
         record_results()
+    else:
+        waiting_backend.prepare(job.fit.python, idle_seconds(bpy.context))
     redraw()
 
 

@@ -65,7 +65,8 @@ def main(arguments: list[str]) -> int:
         print(json.dumps({"works": True, "checks": checks}))
         return 0
     assert arguments[:3] == ["-m", "mfo_backend", "run"], arguments
-    folder, control = Path(arguments[3]), json.loads(os.environ.get("MFO_FAKE", "{}"))
+    folder = Path(arguments[3]) if arguments[3] != "--wait" else wait_for_job()
+    control = json.loads(os.environ.get("MFO_FAKE", "{}"))
     request = json.loads((folder / "request.json").read_text("utf-8"))
     cancelled = threading.Event()
 
@@ -131,6 +132,18 @@ def main(arguments: list[str]) -> int:
     write_result(folder, "result", status, sentence, request, partial=partial)
     say(event="finished", status=status, sentence=sentence, result="result.json")
     return 4 if partial else 0
+
+
+def wait_for_job() -> Path:
+    """Act as `python -m mfo_backend run --wait SECONDS`."""
+    say(event="waiting", memory_mb=210)
+    line = sys.stdin.readline()
+    if not line:
+        sys.exit(0)
+    folder = Path(json.loads(line)["job"])
+    os.dup2(os.open(folder / "backend.log", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+    say(event="accepted")
+    return folder
 
 
 def write_result(folder: Path, name: str, status: str, sentence: str, request: dict, *, partial: bool) -> None:

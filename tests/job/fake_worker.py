@@ -88,4 +88,4 @@ if __name__ == "__main__":
     command.add_parser(parser.add_subparsers())
     grace = float(os.environ.get("MFO_TEST_ORPHAN_GRACE", "10"))
     parsed = parser.parse_args(["run", *sys.argv[1:]])
-    sys.exit(command.leave(command.work(parsed, fake_fit, orphan_grace=grace)))
+    sys.exit(command.leave(command.work(parsed, fake_fit, orphan_grace=grace, prepare=lambda: print("prepared"))))

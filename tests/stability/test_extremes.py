@@ -51,7 +51,7 @@ def mesh(normal: tuple[float, float, float] | None = None, more: tuple[tuple[int
     )
 
 
-def run(
+def write_job(
     folder: Path,
     *,
     width: int = 16,
@@ -61,8 +61,9 @@ def run(
     ply: str = "",
     reference: Any = None,
     preset: str = "fast",
-) -> tuple[Status, str, dict[str, Any]]:
-    """A job with a smooth reference of about the picture's brightness: its status, sentence and result."""
+) -> Path:
+    """The folder of a job with a smooth reference of about the picture's brightness, `job` in `folder`."""
+    folder.mkdir(exist_ok=True)
     shape = '<shape type="sphere" id="target"><ref id="b"/></shape>'
     if ply:
         (folder / "t.ply").write_text(ply + "\n")
@@ -74,9 +75,15 @@ def run(
     write_exr(folder / "r.exr", np.reshape(reference, (height, width, 3)).astype(np.float32))
     settings = FitSettings(preset=preset, verify_spp=4, spp=2, max_iterations=4)
     make_job(folder / "scene.xml", "target", folder / "r.exr", settings, folder / "job")
+    return folder / "job"
+
+
+def run(folder: Path, **options: Any) -> tuple[Status, str, dict[str, Any]]:
+    """Run the job of `write_job`: its status, sentence and result."""
+    job = write_job(folder, **options)
     events = EventWriter(stream=io.StringIO())
-    status = run_job(folder / "job", events, StopSignal())
-    file = folder / "job" / "result.json"
+    status = run_job(job, events, StopSignal())
+    file = job / "result.json"
     return status, events.last_sentence, json.loads(file.read_text()) if file.exists() else {}
 
 

@@ -7,21 +7,24 @@ import argparse
 import contextlib
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
 from ...job.output.progress import EventWriter
 from ...job.output.protocol_stream import take_stdout
-from ...job.run.fit_scene import Fitter, fit_scene
+from ...job.run.fit_scene import Fitter, fit_scene, load_everything
 from ...job.run.run_job import run_job
 from ...job.run.stop import ORPHAN_GRACE, StopSignal
+from ...job.run.waiting import wait_for_job
+from ...types.errors import BadInputError
 from ...types.status import Status
 
 
 def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
     """Add `mfo run`."""
     parser = subparsers.add_parser("run", help="run a job folder", description="Run the job in a folder.")
-    parser.add_argument("job", type=Path, help="folder with a request.json")
+    parser.add_argument("job", type=Path, nargs="?", help="folder with a request.json")
     parser.add_argument(
         "--progress",
         choices=("json", "bar", "none"),
@@ -30,6 +33,12 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("--parent", type=int, metavar="PID", help="stop when this process is gone")
     parser.add_argument("--control", choices=("stdin",), help="read commands from stdin and stop at its end")
+    parser.add_argument(
+        "--wait",
+        type=float,
+        metavar="SECONDS",
+        help='instead of JOB: load everything and wait so long for a line {"cmd": "run", "job": FOLDER} on stdin',
+    )
     add_trust_option(parser)
     parser.set_defaults(func=run)
 
@@ -47,7 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
     Nothing is left to do: Python would take a tenth of a second to take the renderer down, and after a cancel native
     code may still be at work.
     """
-    end_process(work(arguments, fit_scene))
+    if (arguments.job is None) == (arguments.wait is None):
+        raise BadInputError("mfo run needs either the folder of a job, or --wait: give one of them.")
+    end_process(work(arguments, fit_scene, prepare=load_everything))
 
 
 def leave(status: Status) -> int:
@@ -64,9 +75,23 @@ def end_process(status: Status) -> NoReturn:
     os._exit(status.exit_code)
 
 
-def work(arguments: argparse.Namespace, fitter: Fitter, *, orphan_grace: float = ORPHAN_GRACE) -> Status:
-    """Run the job with a given fit; an orphan that does not stop within `orphan_grace` seconds is ended."""
+def work(
+    arguments: argparse.Namespace,
+    fitter: Fitter,
+    *,
+    orphan_grace: float = ORPHAN_GRACE,
+    prepare: Callable[[], object] = lambda: None,
+) -> Status:
+    """Run the job with a given fit; an orphan that does not stop within `orphan_grace` seconds is ended.
+
+    With ``--wait`` the job is named later, and `prepare` is run before it is.
+    """
     stream = take_stdout() if arguments.progress == "json" else None
+    if arguments.wait is not None:
+        arguments.control = "stdin"
+        arguments.job = wait_for_job(
+            sys.stdin.fileno(), stream, idle_seconds=arguments.wait, parent=arguments.parent, prepare=prepare
+        )
     events = EventWriter(stream=stream, bar=arguments.progress == "bar")
     stop = StopSignal(
         cancel_file=arguments.job / "cancel",

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -36,6 +37,12 @@ if TYPE_CHECKING:
     from ...render.models.prepared_material import Materials
     from ...render.pictures.renderer import Renderer
 
+# imported where they are needed, as `mfo --help` needs none of them
+_OF_EVERY_FIT = (
+    *("...fit.recover_material", "...render.pictures.renderer"),
+    *("...render.paths.recorded_scene", "...render.paths.traced_paths"),
+    *("scipy.ndimage", "scipy.optimize", "PIL.Image", "PIL.ImageDraw", "PIL.ImageFont"),
+)
 _WITHOUT_LIGHT_PATHS = (
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
     "limits for one kind of bounce."
@@ -101,12 +108,8 @@ def fit_scene(
     Interrupted
         If it was asked to stop before there was anything to keep.
     """
-    from ...render.machine.llvm import configure_llvm, needs_llvm
-
-    if needs_llvm():
-        configure_llvm()  # before the first import of drjit, so the imports below stay here
+    variant = load_native_code()
     from ...fit.recover_material import recover_material
-    from ...render.machine.variant import load_variant
     from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
     from ...render.pictures.renderer import load_renderer
 
@@ -132,7 +135,6 @@ def fit_scene(
         )  # fmt: skip
         return _Fitted(outcome.result, outcome.start_image, outcome.result_image, outcome.counted)
 
-    variant = load_variant()
     if request.fit.preset == "paper":
         thread = NativeThread(should_stop)
         fitted = fit(InterruptibleRenderer(thread.call(lambda: load(materials, request.fit.parameters)), thread))
@@ -157,6 +159,39 @@ def fit_scene(
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
     result = replace(result, notes=(*result.notes, *_graph_notes(request, result)))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant)
+
+
+def load_everything() -> None:
+    """Load what every fit loads, before it is known which one is to come.
+
+    Raises
+    ------
+    SetupError
+        If Mitsuba or LLVM is missing.
+    """
+    load_native_code()
+    from ...render.machine.variant import warm_up
+
+    for module in _OF_EVERY_FIT:
+        importlib.import_module(module, __package__)
+    warm_up()
+
+
+def load_native_code() -> str:
+    """Import Mitsuba and choose its variant; returns the variant's name.
+
+    Raises
+    ------
+    SetupError
+        If Mitsuba or LLVM is missing.
+    """
+    from ...render.machine.llvm import configure_llvm, needs_llvm
+
+    if needs_llvm():
+        configure_llvm()  # before the first import of drjit, so the imports below stay here
+    from ...render.machine.variant import load_variant
+
+    return load_variant()
 
 
 def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:

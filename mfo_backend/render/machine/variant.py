@@ -53,6 +53,15 @@ def load_variant(name: str | None = None) -> str:
     raise SetupError(f"No Mitsuba variant works here ({'; '.join(reasons)}): {cure}.")
 
 
+def warm_up() -> None:
+    """Start Dr.Jit's threads and Mitsuba's plugins with a kernel and a scene of nothing; choose the variant before."""
+    import drjit as dr
+    import mitsuba as mi
+
+    dr.eval(dr.arange(mi.Float, 2))
+    mi.load_dict({"type": "scene", "sensor": {"type": "perspective"}, "light": {"type": "constant"}})
+
+
 def use_threads(count: int) -> None:
     """Limit the threads of this process' kernels, for several processes on one machine; choose the variant before."""
     import drjit as dr

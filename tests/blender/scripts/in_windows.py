@@ -20,11 +20,11 @@ import bpy
 
 addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
-running_job, panel, preflight, fit_queue, handlers, cycles_check, shown_result = (
+running_job, panel, preflight, fit_queue, handlers, cycles_check, shown_result, waiting_backend = (
     importlib.import_module(f"{addon_id}.blender_addon.{name}")
     for name in (
         *("running.running_job", "panel", "check.preflight", "running.fit_queue", "running.handlers"),
-        *("running.cycles_check", "result.shown_result"),
+        *("running.cycles_check", "result.shown_result", "process.waiting_backend"),
     )
 )
 LONGEST_STALL = 0.05  # seconds
@@ -124,6 +124,7 @@ def settings():
 
 def fit(seconds, **control):
     os.environ["MFO_FAKE"] = json.dumps({"seconds": seconds, **control})
+    waiting_backend.close()  # one that waits has the environment of an earlier fit
     do(bpy.ops.mfo.fit)
     return running_job.current.process
 
@@ -136,7 +137,7 @@ def until(condition, seconds):
 
 
 def alive(process):
-    return process._process.poll() is None
+    return process.backend.is_alive
 
 
 def stops():
@@ -234,6 +235,16 @@ def look_back():
             bpy.ops.wm.window_close()
 
 
+def waits():
+    """After a fit a backend waits for the next one, which takes it."""
+    fit(1)
+    yield from until(lambda: runtime().state == "DONE" and waiting_backend.memory_mb() == 210, 20)
+    backend = waiting_backend._waiting
+    do(bpy.ops.mfo.fit)
+    assert running_job.current.process.backend is backend
+    yield from until(lambda: runtime().state == "DONE", 20)
+
+
 def queue():
     """Three materials, one after the other, each result in the history of its own."""
     for i in (1, 2):
@@ -246,6 +257,7 @@ def queue():
     for name in ("Cube", "Cube 1", "Cube 2"):
         bpy.data.objects[name].select_set(True)
     os.environ["MFO_FAKE"] = json.dumps({"seconds": 6})
+    waiting_backend.close()
     do(bpy.ops.mfo.fit_selected)
     assert len(fit_queue.waiting) == 2
     yield from until(lambda: len(fit_queue.finished) == 1 and runtime().fraction > 0.3, 20)
@@ -335,6 +347,7 @@ def story():
     do(bpy.ops.mfo.revert)
     assert roughness() == 0.5
     assert not bpy.ops.mfo.toggle.poll()
+    yield from waits()
     yield from queue()
     yield from survive()
     slowest = [f"{name} {wall * 1e3:.1f} ({work * 1e3:.1f})" for wall, work, name in sorted(spent)[:-9:-1]]
