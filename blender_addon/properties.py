@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from .result import comparison
+from .result import comparison, overlay
 from .versions import RELATIVE_PATH
 
 # name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance
@@ -83,6 +83,10 @@ class MFO_PG_bound(bpy.types.PropertyGroup):
     upper: FloatProperty(name="Most", description="The fit goes no higher", precision=3, step=1, default=1.0)
 
 
+def _opacity_changed(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    overlay.set_opacity(settings.id_data.camera, settings.overlay_opacity)
+
+
 class MFO_PG_settings(bpy.types.PropertyGroup):
     """Settings of the next fit, one set per scene."""
 
@@ -103,6 +107,15 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         description="Image of this file to reproduce",
         type=bpy.types.Image,
         poll=_has_pixels,
+    )
+    overlay_opacity: FloatProperty(
+        name="Opacity",
+        description="How much of the reference is seen over the camera's view",
+        min=0.0,
+        max=1.0,
+        default=0.5,
+        subtype="FACTOR",
+        update=_opacity_changed,
     )
     preset: EnumProperty(name="Preset", description="How the values are searched", items=PRESET_ITEMS)
     parameter_set: EnumProperty(

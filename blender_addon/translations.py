@@ -16,6 +16,10 @@ _GERMAN = {
     "A backend is loading": "Ein Backend lädt",
     "Keep Ready": "Bereithalten",
     "Minutes that a loaded backend waits for the next fit, which then begins at once; 0: none waits": "Minuten, die ein geladenes Backend auf die nächste Anpassung wartet, die dann sofort beginnt; 0: keines wartet",
+    "How much of the reference is seen over the camera's view": "Wie viel der Referenz über der Kameraansicht zu sehen ist",
+    "Opacity": "Deckkraft",
+    "Show the reference over the camera's view, or take it away": "Die Referenz über der Kameraansicht zeigen oder wegnehmen",
+    "Use as Reference of Material Fit": "Als Referenz von Material Fit nehmen",
     "A picture on disk": "Ein Bild auf der Festplatte",
     "Adam on the mean squared error until it stops improving, then a new optimisation on FLIP": "Adam auf dem mittleren quadratischen Fehler, bis er nicht mehr sinkt, dann eine neue Optimierung auf FLIP",
     "Advanced": "Erweitert",
@@ -160,6 +164,8 @@ _GERMAN_OPERATORS = {
     "Limit Value": "Wert begrenzen",
     "Mend": "Beheben",
     "Open Installation Log": "Installationsprotokoll öffnen",
+    "Over the View": "Über der Ansicht",
+    "Reference over the View": "Referenz über der Ansicht",
     "Copy Values": "Werte kopieren",
     "Error over Time": "Fehler über die Zeit",
     "Load Result": "Ergebnis laden",
@@ -181,7 +187,7 @@ _GERMAN_OPERATORS = {
     "Test Backend": "Backend prüfen",
     "Test": "Prüfen",
     "Toggle Own and Recovered Values": "Eigene und gefundene Werte umschalten",
-    "Use Reference": "Als Referenz nehmen",
+    "Match This Picture (Material Fit)": "Dieses Bild nachbilden (Material Fit)",
 }
 # fmt: on
 

@@ -35,6 +35,7 @@ from ..export.scene.read_scene import MESH_TYPES
 from ..properties import SOCKET_ITEMS, crossed_limits
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
+from ..result.overlay import background_of
 from ..versions import overrides_of
 
 FINE, IGNORED, TO_CHOOSE, STOPS = "fine", "ignored", "to_choose", "stops"
@@ -168,7 +169,10 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
     is_image = settings.reference_source == "IMAGE"
     if not (settings.reference_image if is_image else settings.reference_path):
         kind = "an image of this file" if is_image else "a file"
-        return [Finding(TO_CHOOSE, f"Choose the picture to match: {kind}.")]  # no fault: every scene begins like this
+        behind = background_of(scene.camera)
+        fixes = (Fix("background", behind.name),) if behind is not None else ()
+        # no fault: every scene begins like this
+        return [Finding(TO_CHOOSE, f"Choose the picture to match: {kind}.", fixes)]
     try:
         found = _image_reference(settings.reference_image) if is_image else _file_reference(scene)
     except ExportError as problem:

@@ -5,22 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
-import numpy as np
 from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 
-from ..backend.preferences import new_job_folder
-from ..export.files.png_file import write_png
-from ..export.images.image_pixels import UnreadableImageError, read_pixels
-from ..export.images.picture_header import read_header
 from ..export.nodes.shader_graph import surface_of
 from ..export.nodes.target_shader import make_own, target_shader
-from ..export.reference.turned_picture import turned
 from ..result.animated_sockets import REPLACE, remove_driver
 from ..result.local_copy import LocalCopyError, make_local
 from ..versions import PRINCIPLED, active_output, nodes_enabled
+from .picture_copy import PictureCopyError, scale_to_frame, turn_upright
 
 # sockets of other shaders that mean the same on a Principled BSDF
 _CARRIED = {"Color": "Base Color", "Base Color": "Base Color", "Roughness": "Roughness", "IOR": "IOR"}
@@ -119,25 +113,25 @@ def _reference_view(context: bpy.types.Context, made: str) -> None:
 
 
 def _upright(context: bpy.types.Context, _argument: str) -> None:
-    """Write a turned copy beside the jobs and make it the reference; the picture itself stays as it is."""
-    settings = context.scene.mfo
-    path = Path(bpy.path.abspath(settings.reference_path))
     try:
-        header = read_header(path)
-        image = bpy.data.images.load(str(path), check_existing=False)
-    except (OSError, RuntimeError) as error:
-        raise MendingError(f"The reference {path.name} cannot be read ({error}): choose another file.") from error
+        turn_upright(context)
+    except PictureCopyError as error:
+        raise MendingError(str(error)) from error
+
+
+def _scale(context: bpy.types.Context, size: str) -> None:
+    width, height = (int(number) for number in size.split("x"))
     try:
-        image.colorspace_settings.name = "Non-Color"  # the display values as they are
-        pixels = turned(read_pixels(image)[:, :, :3], header.orientation if header is not None else 1)
-        copy = new_job_folder(context, "reference") / f"{path.stem} upright.png"
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        write_png(copy, np.rint(pixels.clip(0.0, 1.0) * 255.0).astype(np.uint8))
-    except (OSError, UnreadableImageError) as error:
-        raise MendingError(f"The turned copy of {path.name} cannot be written ({error}).") from error
-    finally:
-        bpy.data.images.remove(image)
-    settings.reference_path = str(copy)
+        scale_to_frame(context, (width, height))
+    except PictureCopyError as error:
+        raise MendingError(str(error)) from error
+
+
+def _background(context: bpy.types.Context, name: str) -> None:
+    settings, image = context.scene.mfo, bpy.data.images.get(name)
+    if image is None:
+        raise MendingError(f"The picture '{name}' is not in this file any more: choose another.")
+    settings.reference_source, settings.reference_image = "IMAGE", image
 
 
 def _colorspace(context: bpy.types.Context, name: str) -> None:
@@ -240,6 +234,8 @@ KINDS = {
     "upright": Kind(
         "Turn Upright", "Write a copy that is turned as the picture's EXIF data say, and use that", _upright
     ),
+    "scale": Kind("Scale to {}", "Write a copy that covers the frame, cut evenly where its shape differs", _scale),
+    "background": Kind("Use {}", "Match the picture that lies behind the camera's view", _background),
     "colorspace": Kind("{}", "Give the reference image this colour space", _colorspace),
     "new_material": Kind("Add Material", "Put a new material with a Principled BSDF into the slot", _new_material),
     "principled": Kind("Use Principled", "Link a Principled BSDF to the output; the other nodes stay", _principled),

@@ -5,7 +5,6 @@
 # Blender reads properties from annotations
 
 import bpy
-from bpy.props import StringProperty
 
 from ..backend.preferences import new_job_folder
 from ..check import preflight
@@ -82,23 +81,6 @@ class MFO_OT_render_reference(bpy.types.Operator):
         return _wait_in_background(self, context)
 
 
-class MFO_OT_use_reference(bpy.types.Operator):
-    """Make this picture the reference"""
-
-    bl_idname = "mfo.use_reference"
-    bl_label = "Use Reference"
-    bl_options = {"UNDO", "INTERNAL"}
-
-    filepath: StringProperty(subtype="FILE_PATH", options=_SCRIPT)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set the path in the scene's settings."""
-        settings = context.scene.mfo
-        settings.reference_source, settings.reference_path = "FILE", self.filepath
-        preflight.request()
-        return {"FINISHED"}
-
-
 class MFO_OT_cancel_cycles(bpy.types.Operator):
     """Stop the render in Cycles"""
 
@@ -135,6 +117,5 @@ def _wait_in_background(operator: bpy.types.Operator, context: bpy.types.Context
 CLASSES = (
     MFO_OT_check_in_cycles,
     MFO_OT_render_reference,
-    MFO_OT_use_reference,
     MFO_OT_cancel_cycles,
 )

@@ -7,6 +7,7 @@ import bpy
 
 from ..check import preflight
 from ..check.checks import asks_view
+from ..result import overlay
 from ..running import running_job
 from .layout import letters
 
@@ -31,6 +32,13 @@ class Reference:
             column.prop(settings, "reference_path", text="")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
+        shown = overlay.is_shown(context.scene.camera)
+        row = layout.row(align=True)
+        row.operator(
+            "mfo.overlay_reference", text="Over the View", icon="HIDE_OFF" if shown else "HIDE_ON", depress=shown
+        )
+        if shown:
+            row.prop(settings, "overlay_opacity", text="", slider=True)
         if asks_view(context.scene):
             question = column.column(align=True)
             question.label(text="How was it made?")

@@ -146,6 +146,7 @@ def refuse_size(name: str, found: tuple[int, int], wanted: tuple[int, int]) -> N
             f"The reference '{name}' is {found[0]}x{found[1]}, but the scene renders {wanted[0]}x{wanted[1]}: set the "
             "output resolution to the reference's.",
             Fix("resolution", f"{found[0]}x{found[1]}"),
+            Fix("scale", f"{wanted[0]}x{wanted[1]}"),
         )
 
 

@@ -115,7 +115,7 @@ def nothing_chosen(scene: SimpleNamespace) -> None:
 SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
     (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (render_region, "whole_frame"),
     (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
-    (another_size, "resolution"), (another_display, "reference_view"),
+    (another_size, "resolution"), (another_size, "scale"), (another_display, "reference_view"),
     (no_material, "new_material"), (glossy, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
     (the_light_is_active, "select"), (nothing_chosen, "all_parameters"),
 ]  # fmt: skip
