@@ -78,7 +78,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
             bpy.context,
             obj,
             Path(chosen.job).absolute(),
-            reference=chosen.reference.absolute(),
+            reference=_pictures(chosen),
             fit=fit,
             reference_view=chosen.reference_view,
             upright=chosen.upright,
@@ -86,6 +86,19 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     except ExportError as error:
         raise HeadlessError(str(error)) from error
     return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
+
+
+def _pictures(chosen: argparse.Namespace) -> Any:
+    """The reference, or the pictures of --picture."""
+    from .export.picture_setup import PictureSetup
+
+    if chosen.reference is not None:
+        return chosen.reference.absolute()
+    try:
+        given = [json.loads(text) for text in chosen.picture]
+        return [PictureSetup(**{**one, "reference": Path(one["reference"]).absolute()}) for one in given]
+    except (ValueError, TypeError, KeyError) as error:
+        raise HeadlessError(f"--picture is no JSON object with the fields of a PictureSetup ({error}).") from error
 
 
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:
@@ -206,7 +219,9 @@ def _parser() -> argparse.ArgumentParser:
 
     command = add("export", export)
     command.add_argument("--object", required=True)
-    command.add_argument("--reference", required=True, type=Path)
+    reference = command.add_mutually_exclusive_group(required=True)
+    reference.add_argument("--reference", type=Path)
+    reference.add_argument("--picture", action="append", help="fields of a PictureSetup as JSON; once for each picture")
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--fit", default="{}", help="the `fit` object of request.json")
     command.add_argument("--reference-view", default="scene", help="scene or standard: how a display picture was made")

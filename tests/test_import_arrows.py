@@ -72,7 +72,7 @@ FIT_FLOORS = [
     {"squares"},
     {"search", "certainty"},
     {"judge"},
-    {"alike"},
+    {"alike", "pictures"},
     {"recorded", "traced", "paper"},
     {"recover_material"},
 ]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,13 @@ import tomllib
 
 from ..result.animated_sockets import animation_notes
 from ..result.local_copy import unwritable
-from .files.job_folder import GENERATOR, new_job_folder
+from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .material_model import Material
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import evaluate_graph, probe_for
 from .nodes.target_shader import TargetShader, target_shader
+from .reference.picture_setup import PictureSetup, check_setups, shown
 from .reference.reference import Reference, read_reference
 from .reference.reference_view import SCENE, output_view
 from .scene.read_scene import read_scene
@@ -28,6 +29,9 @@ from .scene.scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
 from .scene.scene_file import SceneFiles, scene_files
 
 SCHEMA_VERSION = 1
+MOVING_VALUES = (
+    "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
+)
 
 __all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job"]
 
@@ -46,7 +50,7 @@ def export_job(
     obj: bpy.types.Object,
     folder: Path,
     *,
-    reference: Path | bpy.types.Image | None,
+    reference: Path | bpy.types.Image | Sequence[PictureSetup] | None,
     fit: dict[str, Any],
     reference_view: str = SCENE,
     upright: bool = False,
@@ -54,15 +58,83 @@ def export_job(
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
-    `reference_view` says how a display picture was made: "scene", rendered in this scene, or "standard", a photograph
-    or a render under Standard. `upright` turns a picture as its EXIF data say. `tell` gets the share that is done, of
-    work that a million triangles make some seconds long.
+    `reference` is one picture of the scene as it is, or pictures with what each of them shows. `reference_view` says
+    how a display picture was made: "scene", rendered in this scene, or "standard", a photograph or a render under
+    Standard. `upright` turns a picture as its EXIF data say. `tell` gets the share that is done, of work that a million
+    triangles make some seconds long.
 
     Raises
     ------
     ExportError
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
+    if not isinstance(reference, Sequence):
+        with new_job_folder(Path(folder)) as partial:
+            part = partial_export(context, obj, partial, reference, fit, reference_view, upright, tell)
+            part.write_request(partial)
+        return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
+    check_setups(reference)
+    first: PartialExport | None = None
+    notes: list[str] = []
+    with new_job_folder(Path(folder)) as partial:
+        paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in reference[1:])]
+        for done, (setup, path) in enumerate(zip(reference, paths, strict=True)):
+            here = partial / path
+            here.mkdir(parents=True, exist_ok=True)
+            try:
+                with shown(context, setup, obj, own_size=len(reference) > 1) as there:
+                    part = partial_export(there, obj, here, setup.reference, fit, reference_view, upright)
+                    part.request["picture"] = setup.request(there)
+            except ExportError as error:
+                if len(reference) == 1:
+                    raise
+                raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
+            if first is None:
+                first, notes = part, list(part.findings.notes)
+                first.request["more_pictures"] = paths[1:]
+            else:
+                notes += [f"Picture {setup.label}: {note}" for note in part.findings.notes if note not in notes]
+                if part.values != first.values:
+                    notes.append(MOVING_VALUES.format(label=setup.label))
+                    part.request["notes"].append(MOVING_VALUES.format(label=setup.label))
+                part.write_request(here)
+                share_files(partial, here)
+            tell((done + 1) / len(reference))
+        assert first is not None
+        first.write_request(partial)
+    return ExportReport(Path(folder), first.request, tuple(notes))
+
+
+@dataclass(frozen=True)
+class PartialExport:
+    """One picture's part of a job, all written but its request."""
+
+    request: dict[str, Any]
+    findings: Findings
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The target's values by socket, without what is linked."""
+        sockets = self.request["materials"].get(TARGET_BSDF, {"sockets": {}})["sockets"]
+        return {name: socket["value"] for name, socket in sockets.items() if not socket["linked"]}
+
+    def write_request(self, folder: Path) -> None:
+        """Write request.json."""
+        text = json.dumps(self.request, indent=2, ensure_ascii=False)
+        (folder / "request.json").write_text(text + "\n", encoding="utf-8")
+
+
+def partial_export(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    folder: Path,
+    reference: Path | bpy.types.Image | None,
+    fit: dict[str, Any],
+    reference_view: str,
+    upright: bool,
+    tell: Callable[[float], None] = lambda _share: None,
+) -> PartialExport:
+    """Write what one picture needs, as the context shows it, into an existing folder; all but request.json."""
     findings = Findings()
     with probe_for(obj) as probe:
         with SceneBakes(context) as bakes:
@@ -90,17 +162,13 @@ def export_job(
         request = _request(context, obj, data, files, picture, fit, findings)
         if graph is not None:
             request["graph"] = graph.request()
-        with new_job_folder(Path(folder)) as partial:
-            files.write(partial)
-            tell(0.9)
-            if picture is not None:
-                picture.write(partial)
-            if graph is not None:
-                graph.write(partial)
-            (partial / "request.json").write_text(
-                json.dumps(request, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
-            )
-    return ExportReport(Path(folder), request, tuple(findings.notes))
+        files.write(folder)
+        tell(0.9)
+        if picture is not None:
+            picture.write(folder)
+        if graph is not None:
+            graph.write(folder)
+    return PartialExport(request, findings)
 
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:

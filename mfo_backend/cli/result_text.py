@@ -15,6 +15,9 @@ def result_text(result: Mapping[str, Any]) -> str:
         level = certainty.get("words") or certainty.get("level", "")
         rows.append((name, _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " ")))
     rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
+    for picture in result.get("pictures", []):
+        name = f"FLIP of picture {picture['number']} {picture['name']}".rstrip()
+        rows.append((name, *map(_numbers, picture["errors"]["flip"]), picture["verdict"] or ""))
     if result.get("model_gap"):
         gap = result["model_gap"]
         rows.append(("model gap", "", f"{100 * gap['relative']:.2g} %", f"at most {100 * gap['at_most']:.2g} %"))

@@ -6,11 +6,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 from ..metrics.display.tone_mapping import View
 from ..render.pictures.mitsuba_renderer import MitsubaRenderer
 from ..render.pictures.renderer import Interrupted, Renderer
+from ..render.sheet.sheet_renderer import SheetRenderer
 from ..types.errors import UnrecordableError
 from ..types.event import Listener, Preview, Started
 from ..types.image import Image, Pixels
@@ -22,6 +24,7 @@ from .judge.model_gap import model_gap
 from .judge.picture_errors import picture_errors
 from .judge.verification import VerifiedEnd, Verifier
 from .paper.fit import PaperRoute
+from .pictures.each_picture import SheetJudge
 from .plans import RecordedPlan
 from .random_streams import Stream
 from .recorded.fit import RecordedRoute
@@ -45,6 +48,10 @@ class Route(Protocol):
         ...
 
 
+_ONE_PICTURE = (
+    "Several pictures are fitted together on recorded light paths only: leave out all pictures but one, or choose the "
+    "preset 'paper'."
+)
 _Says = Callable[[tuple[str, ...]], str]  # what a route does that stands in for another, by its stages' names
 _Way = tuple[Callable[[], Route], _Says]
 
@@ -98,14 +105,20 @@ def recover_material(
             return _fit_along(make(), task, reasons, why, noted=noted)
         except UnrecordableError as error:
             reasons.append(str(error))
+    if task.sheet is not None:
+        reasons.append(_ONE_PICTURE)
     raise UnrecordableError(" ".join(reasons))
 
 
 def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Iterator[_Way]:
     """The routes by their order."""
     renderer, settings = task.renderer, task.settings
+    several = renderer if settings.preset != "paper" and isinstance(renderer, SheetRenderer) else None
     ours = renderer if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer) else None
     no_losses = ""
+    if several is not None:  # nothing stands in: whole light paths are traced for one picture, and the loop takes long
+        yield lambda: RecordedRoute(task, several, plan), lambda stages: ""
+        return
     if ours is not None:
         yield lambda: RecordedRoute(task, ours, plan), lambda stages: ""
         if settings.losses is None:
@@ -140,16 +153,19 @@ def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says,
         pictures = [*pictures[:best], route.verification.finished(pictures[best]), *pictures[best + 1 :]]
         task.listener(Preview(pictures[best].image))
     first, end = pictures[0], pictures[best]
+    each = None if task.sheet is None else SheetJudge(task, task.sheet, first.image, end.image)
     result = final_result(
         renderer,
         found,
         choice,
         status=Status.CANCELLED if task.should_stop() else status,
-        errors=picture_errors(task.reference, first.image, end.image, task.mask, task.counted, task.display),
+        errors=picture_errors(task.reference, first.image, end.image, task.mask, task.counted, task.display)
+        if each is None
+        else each.mean_errors,
         began=task.began,
         notes=[" ".join([*reasons, says(route.stages)])] if reasons else [],
     )
-    return _judged(task, result, first, end, noted=noted)
+    return _judged(task, result, first, end, each, noted=noted)
 
 
 def _verified(verification: Verifier, start: Callable[[], Any], found: RouteEnds) -> tuple[Status, Sequence[Candidate]]:
@@ -181,14 +197,19 @@ def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:
     return first, second
 
 
-def _judged(task: FitTask, result: FitResult, first: Candidate, end: Candidate, *, noted: bool) -> FitOutcome:
+def _judged(
+    task: FitTask, result: FitResult, first: Candidate, end: Candidate, each: SheetJudge | None, *, noted: bool
+) -> FitOutcome:
     """The result with what its pictures say of it, from the start where the end is visibly worse.
 
     All verdicts on a result belong here: reference, result and two pictures of it with independent noise are at hand.
     """
     stopped = result.status is Status.CANCELLED or task.should_stop()
     if not stopped:
-        result, shown = judged_result(result, task.reference, first.image, end.image, task.mask, task.view, noted=noted)
+        result, shown = judged_result(
+            result, task.reference, first.image, end.image, task.mask, task.view, noted=noted,
+            judge_all=None if each is None else partial(each.results, noted=noted),
+        )  # fmt: skip
         end = first if shown is first.image else end  # the gap below is that of what is shown
     halves = _halves(task, end)
     if halves is not None and not stopped:

@@ -28,12 +28,16 @@ _VERDICT_TONES = {Verdict.SAME: "good", Verdict.CLOSE: "warn", Verdict.DIFFERENT
 
 @dataclass(frozen=True)
 class ReportContent:
-    """What a report shows; `pictures` are PNG files by the names reference, start, result and difference."""
+    """What a report shows; `pictures` are PNG files by the names reference, start, result and difference.
+
+    Of a fit of several pictures `more_pictures` has those of each, by what it is called.
+    """
 
     title: str
     result: FitResult
     pictures: Mapping[str, bytes]
     subtitle: str = ""
+    more_pictures: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
     notes: Sequence[str] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
 
@@ -43,7 +47,7 @@ def report_html(content: ReportContent) -> str:
     style = Path(__file__).with_name("report.css").read_text("utf-8")
     result = content.result
     sections = [
-        _section("Pictures", f'<div class="pictures">{_pictures(content.pictures)}</div>'),
+        _section("Pictures", _all_pictures(content)),
         _section("Values", _value_table(result)),
         _section("Loss over time", _plot(result)),
         _section("Stages", _stage_table(result)),
@@ -103,6 +107,21 @@ def _figures(result: FitResult) -> str:
     figures.append((f"{result.passes:.0f}", "passes of one full render"))
     inner = "".join(f'<div><b>{escape(value)}</b><span class="soft">{label}</span></div>' for value, label in figures)
     return f'<div class="figures">{inner}</div>'
+
+
+def _all_pictures(content: ReportContent) -> str:
+    """The pictures of a fit; of several with what is said of each."""
+    if not content.more_pictures:
+        return f'<div class="pictures">{_pictures(content.pictures)}</div>'
+    parts = []
+    for (label, files), found in zip(content.more_pictures.items(), content.result.pictures, strict=True):
+        judgement = found.judgement
+        said = "" if judgement is None else escape(judgement.sentence)
+        flip = "mean FLIP {:.3f} → {:.3f}".format(*found.errors["flip"])
+        parts.append(
+            f'<h3>{escape(label)}</h3><p class="soft">{said} {flip}</p><div class="pictures">{_pictures(files)}</div>'
+        )
+    return "".join(parts)
 
 
 def _pictures(pictures: Mapping[str, bytes]) -> str:

@@ -38,13 +38,23 @@ class StageReport:
 
 
 @dataclass(frozen=True)
+class PictureResult:
+    """What a fit of several pictures reports of one: what it is called, errors as those of `FitResult`, its verdict."""
+
+    label: str
+    errors: dict[str, tuple[float, float]]
+    judgement: Judgement | None
+
+
+@dataclass(frozen=True)
 class FitResult:
     """The recovered values and how they came about.
 
     `errors` holds named image differences of start and result, e.g. ``{"flip": (0.21, 0.012)}``. `certainty` says how
     well the picture determines each value, where the preset finds out, and `weak_combinations` which values it
     determines together only; `notes` are sentences on what was left out or
-    kept. `model_gap` and `judgement` are None where they could not be measured.
+    kept. `model_gap` and `judgement` are None where they could not be measured. `pictures` are those of a fit of
+    several, whose verdict is the worst of theirs.
     """
 
     status: Status
@@ -62,3 +72,4 @@ class FitResult:
     weak_combinations: tuple[WeakCombination, ...] = ()
     model_gap: ModelGap | None = None
     judgement: Judgement | None = None
+    pictures: tuple[PictureResult, ...] = ()

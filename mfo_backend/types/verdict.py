@@ -70,18 +70,21 @@ class Difference:
 class Judgement:
     """The verdict on a result, its likely cause where it can be told, and the differences it rests on.
 
-    `around` is the difference outside of the target; None where there is nothing to compare.
+    `around` is the difference outside of the target; None where there is nothing to compare. `picture` says which
+    of several pictures has decided.
     """
 
     verdict: Verdict
     cause: Cause | None
     target: Difference
     around: Difference | None = None
+    picture: str | None = None
 
     @property
     def sentence(self) -> str:
         """Verdict and cause for a user."""
-        return self.verdict.sentence if self.cause is None else f"{self.verdict.sentence} {self.cause.sentence}"
+        verdict = self.verdict.sentence if self.picture is None else f"Picture {self.picture}: {self.verdict.sentence}"
+        return verdict if self.cause is None else f"{verdict} {self.cause.sentence}"
 
 
 _SENTENCES = {

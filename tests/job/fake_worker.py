@@ -22,7 +22,7 @@ from mfo_backend.types.result import CurvePoint, FitResult, StageReport
 from mfo_backend.types.status import Status
 
 
-def fake_fit(folder, request, reference, view, *, listener, should_stop):
+def fake_fit(folder, request, reference, view, *, listener, should_stop, more=()):
     plan = {"iterations": 5, "seconds": 0.01, "load_seconds": 0.0, "problem": "", "deaf": False}
     if (folder.root / "fake.json").exists():
         plan |= json.loads((folder.root / "fake.json").read_text())

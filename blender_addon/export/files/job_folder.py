@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import errno
+import filecmp
 import json
 import os
 import re
@@ -18,11 +19,26 @@ from ..findings import ExportError
 
 GENERATOR = "material_fit_mfo"
 _ABANDONED = re.compile(r"\..+\.(\d+)\.[a-z0-9_]+\.(partial|old)")  # hidden, process id, mkdtemp's letters
+MORE_PICTURES = "more_pictures"  # folder of the further pictures of a job, each a job folder of its own
 # what a job folder may hold; a folder with anything else is somebody's own
 OWN_NAMES = {
-    "request.json", "scene.xml", "meshes", "textures", "graph", "view_lut.exr", "progress.jsonl", "cancel",
-    "result.json", "partial.json", "pictures", "index.html", "backend.log",
+    "request.json", "scene.xml", "meshes", "textures", "graph", MORE_PICTURES, "view_lut.exr", "progress.jsonl",
+    "cancel", "result.json", "partial.json", "pictures", "index.html", "backend.log",
 }  # fmt: skip
+
+
+def share_files(job: Path, inner: Path) -> None:
+    """Let the meshes and textures of a further picture be the first's files where they hold the same.
+
+    Where a file system has no hard links they stay copies.
+    """
+    for path in [*inner.glob("meshes/*"), *inner.glob("textures/*")]:
+        twin = job / path.relative_to(inner)
+        if twin.is_file() and filecmp.cmp(twin, path, shallow=False):
+            spare = path.with_suffix(".link")
+            with suppress(OSError):
+                os.link(twin, spare)
+                os.replace(spare, path)
 
 
 @contextmanager

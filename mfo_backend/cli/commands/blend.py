@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ...types.status import Status
 from ...types.verdict import Verdict
 from ..blender_host import BlenderHost, find_blender_host
 from ..fit_options import add_fit_options, fit_from_options
+from ..picture_option import HELP, PictureOption, is_plain, picture_options
 from ..result_text import result_text
 from ..run_folder import run_folder
 from .run import leave
@@ -45,7 +46,11 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("file", type=Path, help="the .blend file; it is not changed unless --apply is given alone")
     parser.add_argument("--object", required=True, metavar="NAME", help="object whose active material is fitted")
-    parser.add_argument("--reference", required=True, type=Path, help="the picture: EXR, HDR, PNG, JPEG or TIFF")
+    parser.add_argument("--reference", required=True, action="append", metavar="PATH[@KEY=VALUE,...]", help=HELP)
+    parser.add_argument(
+        "--leave-out", action="append", type=int, default=[], metavar="NUMBER",
+        help="fit without this one of the pictures, the first of which is 1",
+    )  # fmt: skip
     parser.add_argument(
         "--reference-view",
         choices=REFERENCE_VIEWS,
@@ -89,6 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.save_as and not arguments.apply:
         raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
     options = fit_from_options(arguments)
+    pictures = picture_options(arguments.reference, arguments.leave_out)
     FitSettings.from_request(options)  # a wrong option is known before Blender is started
     host = find_blender_host(arguments.blender)
     stream = take_stdout() if arguments.json else None
@@ -97,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
         host,
         arguments.file,
         arguments.object,
-        arguments.reference,
+        Path(pictures[0].reference) if is_plain(pictures) else pictures,
         job,
         options,
         reference_view=arguments.reference_view,
@@ -138,7 +144,7 @@ def fit_blend(
     host: BlenderHost,
     blend: Path,
     object_name: str,
-    reference: Path,
+    reference: Path | Sequence[PictureOption],
     job: Path,
     fit: Mapping[str, Any],
     *,
@@ -149,8 +155,9 @@ def fit_blend(
 ) -> BlendFit:
     """Export a job from a .blend file and run it with a progress bar on stderr.
 
-    `reference_view` says how a display picture was made: one of `REFERENCE_VIEWS`; `upright` turns it as its EXIF data
-    say. With `will_apply` a material that cannot be changed is refused before the fit, unless it is to be made local.
+    `reference` is a picture of the file as it is, or pictures with what each shows. `reference_view` says how a display
+    picture was made: one of `REFERENCE_VIEWS`; `upright` turns it as its EXIF data say. With `will_apply` a material
+    that cannot be changed is refused before the fit, unless it is to be made local.
 
     Raises
     ------
@@ -162,7 +169,11 @@ def fit_blend(
         "export",
         blend,
         f"--object={object_name}",  # one word, since a name may begin with a dash
-        f"--reference={reference}",
+        *(
+            [f"--reference={reference}"]
+            if isinstance(reference, Path)
+            else [f"--picture={json.dumps(picture.fields())}" for picture in reference]
+        ),
         f"--job={job}",
         f"--fit={json.dumps(fit)}",
         f"--reference-view={reference_view}",

@@ -14,6 +14,7 @@ from ...metrics.display.baked_view import HALF_LEVEL, BakedView
 from ...metrics.display.tone_mapping import DisplayView, View
 from ...metrics.pixels.pixel_check import check_finite
 from ...render.pictures.renderer import Renderer
+from ...render.sheet.contact_sheet import ContactSheet
 from ...types.event import Listener
 from ...types.image import Encoding, Image, Pixels
 from ..settings import FitSettings
@@ -54,6 +55,11 @@ class FitTask:
     listener: Listener
     should_stop: Callable[[], bool]
     began: float
+
+    @property
+    def sheet(self) -> ContactSheet | None:
+        """Where the pictures are, if these are several on one sheet."""
+        return getattr(self.renderer, "sheet", None)
 
     @property
     def linear(self) -> bool:

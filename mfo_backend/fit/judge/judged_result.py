@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,11 @@ from ...metrics.display.tone_mapping import View
 from ...types.certainty import Certainty, Level
 from ...types.image import Image, Pixels
 from ...types.parameter import Value
-from ...types.result import FitResult
+from ...types.result import FitResult, PictureResult
 from ...types.status import Status
 from ...types.verdict import Verdict
 from ..result.outcome import START_KEPT
-from .verdict import is_worse, judge
+from .verdict import is_worse, judge, worst_judgement
 
 MOVED = 1e-6  # relative to a value and to 1: float32 from file to file
 
@@ -30,20 +31,27 @@ def judged_result(
     view: View,
     *,
     noted: bool = False,
+    judge_all: Callable[[Pixels], tuple[PictureResult, ...]] | None = None,
 ) -> tuple[FitResult, Pixels]:
     """The result with its verdict, and its picture: of the start where the end is farther from the reference.
 
-    Pictures are scene-linear, `mask` sees the target, `noted` says that the export has left something out. Under a
-    verdict of `different` the status says so too, and no value is called determined.
+    Pictures are scene-linear, `mask` sees the target, `noted` says that the export has left something out. Where the
+    picture is a sheet of several, `judge_all` says what the result is in each of them. Under a verdict of `different`
+    the status says so too, and no value is called determined.
     """
-    if _has_moved(result) and is_worse(reference, start, end, mask, view):
+    may_be_worse = judge_all is None or result.errors["flip"][1] > result.errors["flip"][0]
+    if may_be_worse and _has_moved(result) and is_worse(reference, start, end, mask, view):
         errors = {name: (before, before) for name, (before, _) in result.errors.items()}
         result = replace(
             result, recovered=dict(result.initial), errors=errors, certainty={}, weak_combinations=(),
             message=f"{result.status.sentence} {START_KEPT}",
         )  # fmt: skip
         end = start
-    judgement = judge(reference, end, mask, view, noted=noted)
+    if judge_all is None:
+        judgement = judge(reference, end, mask, view, noted=noted)
+    else:
+        result = replace(result, pictures=judge_all(end))
+        judgement = worst_judgement(result.pictures)
     if judgement is None:
         return replace(result, certainty=_said(result, doubted=False)), end
     different = judgement.verdict is Verdict.DIFFERENT

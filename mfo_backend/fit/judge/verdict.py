@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from ...metrics.display.tone_mapping import DisplayView, View
 from ...metrics.flip.block_means import block_side, block_sums
 from ...render.camera.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
+from ...types.result import PictureResult
 from ...types.verdict import Difference, Judgement, Verdict
 from .beyond_noise import NEXT, beyond_noise
 from .likely_cause import likely_cause
@@ -29,6 +31,8 @@ BESIDE = 3  # pixels next to the target that are not its surroundings
 PLAIN = 0.004  # deviation of display values: so even a background was cut out, not rendered
 BRIGHTEST = 4.0  # times a display's white: fireflies count as if they were so bright
 WORSE = 0.01  # FLIP more than that of the start from which on a result is worse
+
+_FROM_BEST = (Verdict.SAME, Verdict.CLOSE, Verdict.DIFFERENT)
 
 Mask = NDArray[np.bool_]
 
@@ -60,6 +64,15 @@ def judge(reference: Image, result: Pixels, mask: Mask, view: View, *, noted: bo
     shown, result_shown = (_display(light) for light in target)
     cause = likely_cause(shown, result_shown, inside, (first, second, outside) if differs else None, noted=noted)
     return Judgement(verdict, cause, difference, around)
+
+
+def worst_judgement(pictures: tuple[PictureResult, ...]) -> Judgement | None:
+    """The verdict on all pictures: the worst one, with the name of its picture; None where there is none."""
+    judged = [(p.label, p.judgement) for p in pictures if p.judgement is not None]
+    if not judged:
+        return None
+    label, worst = max(judged, key=lambda pair: (_FROM_BEST.index(pair[1].verdict), pair[1].target.visible))
+    return worst if worst.verdict is Verdict.SAME else replace(worst, picture=label)
 
 
 def is_worse(reference: Image, start: Pixels, result: Pixels, mask: Mask, view: View) -> bool:

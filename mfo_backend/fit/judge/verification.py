@@ -18,6 +18,7 @@ from ...metrics.flip.flip_error import shown
 from ...render.camera.widened_mask import widened
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Vector
+from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.image import Encoding, Image, Pixels
 from ..random_streams import Stream
 from ..result.outcome import Candidate
@@ -123,7 +124,7 @@ class Verification:
 
     def __init__(
         self,
-        renderer: MitsubaRenderer,
+        renderer: MitsubaRenderer | SheetRenderer,
         reference: Image,
         mask: NDArray[np.bool_],
         view: View,

@@ -11,6 +11,7 @@ import numpy as np
 from ...metrics.display.baked_view import BakedView
 from ...metrics.display.tone_mapping import DisplayView
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.image import Pixels
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.weak_combinations import weak_combinations
@@ -61,8 +62,9 @@ class RecordedRoute:
         If one of the settings' losses is not defined for the reference.
     """
 
-    def __init__(self, task: FitTask, renderer: MitsubaRenderer, plan: RecordedPlan | None) -> None:
+    def __init__(self, task: FitTask, renderer: MitsubaRenderer | SheetRenderer, plan: RecordedPlan | None) -> None:
         from ...render.paths.recorded_scene import RecordedScene
+        from ...render.sheet.recorded_sheet import RecordedSheet
 
         settings = task.settings
         self._task, self._renderer = task, renderer
@@ -70,7 +72,8 @@ class RecordedRoute:
         named = None if settings.losses is None else settings.stage_names(task.reference.encoding)
         self._measure = named[-1] if named else task.measure
         self._finishing = finishing_residuals(settings, task.reference.encoding, task.light, task.mask, task.view)
-        self._scene = RecordedScene(renderer, int(task.mask.sum()))
+        several = isinstance(renderer, SheetRenderer)
+        self._scene = RecordedSheet(renderer) if several else RecordedScene(renderer, int(task.mask.sum()))
         self.stages = (*STAGES, *self._finishing, *(["flip"] if settings.preset == "best" else []))
         self.verification = Verification(
             renderer,

@@ -13,6 +13,7 @@ from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_image import RECALLED, RecordedImage
 from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
 from ...render.paths.recorded_scene import MOST_LANES, RecordedScene
+from ...render.sheet.recorded_sheet import RecordedSheet
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..plans import RecordedPlan
@@ -46,7 +47,7 @@ class Setting:
         1 where the radiance is only known to be the reference's or more, else 0; None where it is known everywhere.
     """
 
-    scene: RecordedScene
+    scene: RecordedScene | RecordedSheet
     reference: Pixels = field(repr=False)
     calm: Pixels = field(repr=False)
     fireflies: int
@@ -59,7 +60,7 @@ class Setting:
     @classmethod
     def of(
         cls,
-        scene: RecordedScene,
+        scene: RecordedScene | RecordedSheet,
         reference: Pixels,
         mask: NDArray[np.bool_],
         plan: RecordedPlan,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ...fit.settings import FitSettings
@@ -19,11 +19,12 @@ from .job_folder import JobFolder
 from .scene_files import check_scene_files
 
 SCHEMA_VERSION = 1
+MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
-    *("film_exposure", "graph", "fit", "notes"),
+    *("film_exposure", "graph", "fit", "notes", "picture", "more_pictures"),
 )
 
 
@@ -82,8 +83,24 @@ class ViewTable:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """Where a picture of several comes from: its number, counted from 1, its file, and what of the .blend it shows."""
+
+    number: int = 1
+    name: str = ""
+    frame: int | None = None
+    camera: str = ""
+    scene: str = ""
+    view_layer: str = ""
+
+
+@dataclass(frozen=True)
 class Request:
-    """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference."""
+    """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference.
+
+    `more_pictures` are further pictures of the same material: the path of each one's own folder, and its request. What
+    is fitted and how is said by the first picture's alone.
+    """
 
     scene: str
     target: Target
@@ -101,10 +118,13 @@ class Request:
     fit: FitSettings = field(default_factory=FitSettings)
     notes: tuple[str, ...] = ()
     generator: Mapping[str, Any] = field(default_factory=dict)
+    picture: Picture = field(default_factory=Picture)
+    more_pictures: tuple[tuple[str, Request], ...] = ()
 
 
-def read_request(folder: JobFolder, *, trusted: bool = False) -> Request:
-    """The checked request of a job folder; `trusted` is that of `check_scene_files`.
+def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = False) -> Request:
+    """The checked request of a job folder, or of the `inner` one of a further picture; `trusted` is that of
+    `check_scene_files`.
 
     Raises
     ------
@@ -119,6 +139,11 @@ def read_request(folder: JobFolder, *, trusted: bool = False) -> Request:
     except (OSError, ValueError, RecursionError) as error:
         raise BadInputError(f"{folder.request} cannot be read as JSON ({error}): write it anew.") from error
     request = request_from_json(data)
+    more = tuple(
+        (path, read_request(_folder_of(folder, path), trusted=trusted, inner=True))
+        for path in _paths_of_more(data, inner=inner)
+    )
+    request = replace(request, more_pictures=more)
     folder.file(request.scene, what=f"{WHERE}: scene")
     folder.file(request.reference, what=f"{WHERE}: reference.path")
     if request.view_table is not None:
@@ -168,6 +193,36 @@ def request_from_json(data: Any) -> Request:
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
         generator=_generator(top.mapping("generator", {})),
+        picture=_picture(top.raw("picture", None)),
+    )
+
+
+def _paths_of_more(data: Mapping[str, Any], *, inner: bool) -> tuple[str, ...]:
+    """The folders of further pictures, relative to the job's."""
+    paths = CheckedObject(data, WHERE, _KEYS).texts("more_pictures", ())
+    if inner and paths:
+        raise BadInputError(f"{WHERE} of a further picture names more_pictures: name all in the first picture's.")
+    if len(paths) >= MOST_PICTURES:
+        raise BadInputError(f"{WHERE} names {len(paths) + 1} pictures: at most {MOST_PICTURES} are fitted together.")
+    return paths
+
+
+def _folder_of(folder: JobFolder, path: str) -> JobFolder:
+    folder.file(f"{path}/request.json", what=f"{WHERE}: more_pictures")
+    return JobFolder.open(folder.root / path)
+
+
+def _picture(data: Any) -> Picture:
+    if data is None:
+        return Picture()
+    picture = CheckedObject(data, f"{WHERE}: picture", ("number", "name", "frame", "camera", "scene", "view_layer"))
+    return Picture(
+        number=picture.integer("number", 1, 10_000, 1),
+        name=picture.text("name", ""),
+        frame=picture.integer("frame", -(2**20), 2**20) if picture.raw("frame", None) is not None else None,
+        camera=picture.text("camera", ""),
+        scene=picture.text("scene", ""),
+        view_layer=picture.text("view_layer", ""),
     )
 
 
@@ -200,6 +255,8 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "graph": asdict(request.graph) if request.graph is not None else None,
         "fit": asdict(request.fit),
         "notes": list(request.notes),
+        **({"picture": asdict(request.picture)} if request.picture != Picture() else {}),
+        **({"more_pictures": [path for path, _ in request.more_pictures]} if request.more_pictures else {}),
     }
 
 

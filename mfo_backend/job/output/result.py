@@ -13,8 +13,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ... import __version__
-from ...types.result import FitResult
+from ...types.result import FitResult, PictureResult
 from ...types.status import Status
+from ...types.verdict import Judgement
 from ..folder.atomic_file import write_atomically
 from ..folder.job_folder import JobFolder
 from .progress import finite
@@ -51,7 +52,7 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "schema_version": SCHEMA_VERSION,
         "status": result.status.value,
         "sentence": result.message,
-        **_verdict(result),
+        **_verdict(result.judgement),
         "model": result.model,
         "partial": result.status is Status.CANCELLED,
         "initial": result.initial,
@@ -65,6 +66,7 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "weak_combinations": [
             {"parameters": w.parameters, "step": w.step, "sentence": w.sentence} for w in result.weak_combinations
         ],
+        **({"pictures": [_picture(picture) for picture in result.pictures]} if result.pictures else {}),
         "stages": [
             {
                 "name": stage.name,
@@ -87,9 +89,13 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
     }
 
 
-def _verdict(result: FitResult) -> dict[str, Any]:
+def _picture(picture: PictureResult) -> dict[str, Any]:
+    """One of several pictures: its errors and its verdict."""
+    return {"errors": picture.errors, **_verdict(picture.judgement)}
+
+
+def _verdict(judgement: Judgement | None) -> dict[str, Any]:
     """Verdict, its sentence, its likely cause and what it rests on; nulls where there is none."""
-    judgement = result.judgement
     if judgement is None:
         return {"verdict": None, "verdict_sentence": "", "verdict_cause": None, "difference": None}
     around = judgement.around

@@ -6,14 +6,16 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.display.tone_mapping import View
+from ...render.sheet.contact_sheet import ContactSheet
 from ...types.errors import UnrecordableError
-from ...types.event import Listener
+from ...types.event import Event, Listener, Preview
 from ...types.image import Image, Pixels
 from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
@@ -32,9 +34,10 @@ from .material_classes import (
     value_of,
     with_values_of,
 )
+from .more_pictures import JobPicture
 
 if TYPE_CHECKING:
-    from ...render.models.prepared_material import Materials
+    from ...render.pictures.mitsuba_renderer import MitsubaRenderer
     from ...render.pictures.renderer import Renderer
 
 # imported where they are needed, as `mfo --help` needs none of them
@@ -58,10 +61,19 @@ _GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes gi
 
 
 @dataclass(frozen=True)
+class SeenPicture:
+    """What a fit has made of one picture: scene-linear at start and end, and which pixels count."""
+
+    start: Pixels
+    result: Pixels
+    counted: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
 class JobOutcome:
     """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them.
 
-    Errors are those of the `counted` pixels, True (height, width).
+    Errors are those of the `counted` pixels, True (height, width). With a `sheet` all of them are over that.
     """
 
     result: FitResult
@@ -69,6 +81,20 @@ class JobOutcome:
     result_image: Pixels
     counted: NDArray[np.bool_]
     variant: str = ""
+    sheet: ContactSheet | None = None
+
+    @property
+    def seen(self) -> tuple[SeenPicture, ...]:
+        """What the fit has made of each of its pictures."""
+        sheet = self.sheet
+        if sheet is None:
+            return (SeenPicture(self.start_image, self.result_image, self.counted),)
+        return tuple(
+            SeenPicture(
+                sheet.picture(self.start_image, n), sheet.picture(self.result_image, n), sheet.cut(self.counted, n)
+            )
+            for n in range(len(sheet))
+        )
 
 
 class Fitter(Protocol):
@@ -83,8 +109,9 @@ class Fitter(Protocol):
         *,
         listener: Listener,
         should_stop: Callable[[], bool],
+        more: Sequence[JobPicture] = (),
     ) -> JobOutcome:
-        """Run the fit; errors are those of `recover_material`."""
+        """Run the fit, to `more` pictures at once; errors are those of `recover_material`."""
         ...
 
 
@@ -96,8 +123,9 @@ def fit_scene(
     *,
     listener: Listener,
     should_stop: Callable[[], bool],
+    more: Sequence[JobPicture] = (),
 ) -> JobOutcome:
-    """Fit the material of the request's target with Mitsuba.
+    """Fit the material of the request's target with Mitsuba, to `more` pictures of it at once where there are some.
 
     Raises
     ------
@@ -109,56 +137,107 @@ def fit_scene(
         If it was asked to stop before there was anything to keep.
     """
     variant = load_native_code()
+    from ...fit.pictures.one_sheet import SheetTask, one_sheet
     from ...fit.recover_material import recover_material
     from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
-    from ...render.pictures.renderer import load_renderer
+    from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
-    materials = request_materials(folder, request)
+    pictures = [JobPicture(folder, request, reference, view), *more]
+    target, fit_of = request.target.bsdf_id, request.fit
+    all_materials = [request_materials(picture.folder, picture.request) for picture in pictures]
+    first = all_materials[0]
+    for others in all_materials[1:]:
+        if target in others:
+            others[target] = of_one_material(first.get(target), others[target])
 
-    def load(materials: Materials, parameters: str | Sequence[str]) -> Renderer:
-        renderer = load_renderer(
-            folder.root / request.scene,
-            request.target.shape_id,
-            model=request.fit.model,
-            parameters=parameters,
-            materials=materials,
-            light_paths=request.light_paths,
-        )
-        renderer.table = narrowed(renderer.table, request.fit.bounds)
-        renderer.start = renderer.table.clip(renderer.start)
-        return renderer
+    def load(change: Callable[[Any], Any], parameters: str | Sequence[str]) -> list[MitsubaRenderer]:
+        renderers = []
+        for picture, materials in zip(pictures, all_materials, strict=True):
+            asked = picture.request
+            changed_ones = materials | {target: change(materials[target])} if target in materials else materials
+            renderer = load_mitsuba_renderer(
+                picture.folder.root / asked.scene,
+                asked.target.shape_id,
+                model=fit_of.model,
+                parameters=parameters,
+                materials=changed_ones,
+                light_paths=asked.light_paths,
+            )
+            renderer.table = narrowed(renderer.table, fit_of.bounds)
+            renderer.start = renderer.table.clip(renderer.start)
+            renderers.append(renderer)
+        return renderers
 
-    def fit(renderer: Renderer, *, hand_over: bool = True) -> _Fitted:
+    def task_of(renderers: Sequence[MitsubaRenderer]) -> SheetTask | None:
+        if len(renderers) == 1:
+            return None
+        labels = [picture.label for picture in pictures]
+        return one_sheet(renderers, [p.reference for p in pictures], [p.view for p in pictures], labels)
+
+    def fit(renderer: Renderer, together: SheetTask | None, *, hand_over: bool = True) -> _Fitted:
+        heard, shown, display = listener, reference, view
+        if together is not None:
+            shown, display = together.reference, together.display or view
+            heard = partial(_of_first, listener, together.renderer.sheet)
         outcome = recover_material(
-            renderer, reference, request.fit, display=view, listener=listener, should_stop=should_stop,
-            hand_over=hand_over, noted=bool(request.notes),
+            renderer, shown, fit_of, display=display, listener=heard, should_stop=should_stop,
+            hand_over=hand_over, noted=any(p.request.notes for p in pictures),
         )  # fmt: skip
-        return _Fitted(outcome.result, outcome.start_image, outcome.result_image, outcome.counted)
+        result = outcome.result if together is None else with_notes(outcome.result, together.notes)
+        sheet = None if together is None else together.renderer.sheet
+        return _Fitted(result, outcome.start_image, outcome.result_image, outcome.counted, sheet)
+
+    def renderer_of(renderers: Sequence[MitsubaRenderer], together: SheetTask | None) -> Renderer:
+        return renderers[0] if together is None else together.renderer
 
     if request.fit.preset == "paper":
         thread = NativeThread(should_stop)
-        fitted = fit(InterruptibleRenderer(thread.call(lambda: load(materials, request.fit.parameters)), thread))
+        renderers = thread.call(lambda: load(lambda material: material, fit_of.parameters))
+        together = thread.call(lambda: task_of(renderers))
+        fitted = fit(InterruptibleRenderer(renderer_of(renderers, together), thread), together)
     else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
-        renderer = load(materials, request.fit.parameters)
-        fitted = fit(renderer)
-        target = request.target.bsdf_id
+        renderers = load(lambda material: material, fit_of.parameters)
+        together = task_of(renderers)
+        fitted = fit(renderer_of(renderers, together), together)
+        table = renderers[0].table
+        del renderers, together
 
         def fit_from(other: MaterialClass) -> _Fitted:
-            names = parameters_of(other, renderer.table.names)
-            return fit(load(materials | {target: changed(materials[target], other)}, names), hand_over=False)
+            loaded = load(lambda material: changed(material, other), parameters_of(other, table.names))
+            again = task_of(loaded)
+            return fit(renderer_of(loaded, again), again, hand_over=False)
 
         def is_wanted(found: _Fitted) -> bool:
             return not should_stop() and is_worth_another(found.result, request.fit.parameters)
 
-        if target in materials:
-            glow = brightest_glow(reference, view, fitted.counted) / request.film_exposure
-            classes = other_classes(materials[target], glow)
-            fitted = _with_other_classes(fitted, materials[target], classes, fit_from, is_wanted)
+        if target in first:
+            counted = fitted.counted if fitted.sheet is None else fitted.sheet.cut(fitted.counted, 0)
+            glow = brightest_glow(reference, view, counted) / request.film_exposure
+            classes = other_classes(first[target], glow)
+            fitted = _with_other_classes(fitted, first[target], classes, fit_from, is_wanted)
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
     result = replace(result, notes=(*result.notes, *_graph_notes(request, result)))
-    return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant)
+    return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
+
+
+def with_notes(result: FitResult, notes: Sequence[str]) -> FitResult:
+    """The result with further sentences."""
+    return replace(result, notes=(*result.notes, *notes)) if notes else result
+
+
+def _of_first(listener: Listener, sheet: ContactSheet, event: Event) -> None:
+    """Tell an event; of a sheet's picture the first of its pictures."""
+    listener(Preview(sheet.picture(event.image, 0)) if isinstance(event, Preview) else event)
+
+
+def of_one_material(first: dict[str, Any] | None, here: dict[str, Any]) -> dict[str, Any]:
+    """The target's material of the first picture, with what nodes give it as this one's camera sees it."""
+    if first is None:
+        return here
+    own = {name: socket for name, socket in here["sockets"].items() if socket.get("graph") or socket.get("texture")}
+    return first | {"sockets": first["sockets"] | own}
 
 
 def load_everything() -> None:
@@ -217,6 +296,7 @@ class _Fitted:
     start_image: Pixels
     result_image: Pixels
     counted: NDArray[np.bool_]
+    sheet: ContactSheet | None = None
 
 
 def _with_other_classes(

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
-from ...metrics.display.tone_mapping import View
 from ...metrics.flip.block_means import block_means, block_side, means_beside
 from ...metrics.flip.flip_error import flip_error
 from ...metrics.pixels.side_by_side import side_by_side
@@ -16,36 +16,63 @@ from ...report.picture import displayed, displayed_linear, mask_png, png_bytes
 from ...scene.image_file import write_exr
 from ...types.image import Encoding, Image
 from ..folder.atomic_file import write_atomically
-from ..folder.job_folder import JobFolder
 from ..folder.request import Request
 from ..output.progress import DIFFERENCE_PATH, PREVIEW_PATH
 from ..output.result import result_to_json, versions, write_result
-from .fit_scene import JobOutcome
+from .fit_scene import JobOutcome, SeenPicture
+from .more_pictures import JobPicture
 
 
-def write_outputs(
-    folder: JobFolder,
-    request: Request,
-    reference: Image,
-    view: View,
-    outcome: JobOutcome,
-    *,
-    notes: Sequence[str],
-) -> None:
+def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes: Sequence[str]) -> None:
     """Write pictures, report and result.json; the last appears by rename when the others are complete.
+
+    `pictures` are those of the job, the first with the folder of the report and the result; each one's own are written
+    into its folder.
 
     Raises
     ------
     OSError, BadInputError
         If the folder cannot be written or the disk is full.
     """
-    side = block_side(outcome.counted)  # as `fit.picture_errors`
-    seen = means_beside(reference.encoding, Image(outcome.result_image, Encoding.LINEAR), side, view)
-    difference = flip_error(block_means(reference, side), seen, display=view)
+    first = pictures[0]
+    folder, request = first.folder, first.request
+    shown = [_write_pictures(picture, seen) for picture, seen in zip(pictures, outcome.seen, strict=False)]
+    curve = curve_png(outcome.result.stages)
+    if curve is not None:
+        write_atomically(folder.pictures / "curve.png", curve)
+    report = ReportContent(
+        title=_title(request),
+        subtitle=_subtitle(request, outcome.result.model),
+        result=outcome.result,
+        pictures=shown[0],
+        more_pictures={f"Picture {p.label}": files for p, files in zip(pictures, shown, strict=True)}
+        if len(shown) > 1
+        else {},
+        notes=(*notes, *outcome.result.notes),
+        versions=versions(outcome.variant),
+    )
+    write_atomically(folder.report, report_html(report).encode("utf-8"))
+    content = result_to_json(outcome.result, notes=notes, variant=outcome.variant)
+    if outcome.result.pictures:
+        content["pictures"] = [
+            {**asdict(p.request.picture), "folder": p.folder.root.relative_to(folder.root).as_posix(), **found}
+            for p, found in zip(pictures, content["pictures"], strict=True)
+        ]
+    write_result(folder, content)
+    for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
+        (folder.root / path).unlink(missing_ok=True)
+
+
+def _write_pictures(picture: JobPicture, seen: SeenPicture) -> dict[str, bytes]:
+    """Write what one picture shows into its folder; returns the PNG files by name."""
+    folder, reference, view = picture.folder, picture.reference, picture.view
+    side = block_side(seen.counted)  # as `fit.picture_errors`
+    result = means_beside(reference.encoding, Image(seen.result, Encoding.LINEAR), side, view)
+    difference = flip_error(block_means(reference, side), result, display=view)
     shown = {
         "reference": lambda: displayed(reference, view),
-        "start": lambda: displayed_linear(outcome.start_image, view),
-        "result": lambda: displayed_linear(outcome.result_image, view),
+        "start": lambda: displayed_linear(seen.start, view),
+        "result": lambda: displayed_linear(seen.result, view),
         "difference": lambda: magma(difference.map),
     }
     files = side_by_side(lambda picture: png_bytes(picture()), list(shown.values()))
@@ -53,28 +80,14 @@ def write_outputs(
     folder.pictures.mkdir(exist_ok=True)
     for name, data in pictures.items():
         write_atomically(folder.pictures / f"{name}.png", data)
-    curve = curve_png(outcome.result.stages)
-    if curve is not None:
-        write_atomically(folder.pictures / "curve.png", curve)
-    write_atomically(folder.counted, mask_png(outcome.counted))
-    write_exr(folder.pictures / "result.exr", outcome.result_image)
-    report = ReportContent(
-        title=_title(request),
-        subtitle=_subtitle(request, outcome.result.model),
-        result=outcome.result,
-        pictures=pictures,
-        notes=(*notes, *outcome.result.notes),
-        versions=versions(outcome.variant),
-    )
-    write_atomically(folder.report, report_html(report).encode("utf-8"))
-    write_result(folder, result_to_json(outcome.result, notes=notes, variant=outcome.variant))
-    for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
-        (folder.root / path).unlink(missing_ok=True)
+    write_atomically(folder.counted, mask_png(seen.counted))
+    write_exr(folder.pictures / "result.exr", seen.result)
+    return pictures
 
 
 def bytes_needed(request: Request) -> int:
     """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, a mask and one EXR."""
-    pixels = request.width * request.height
+    pixels = sum(each.width * each.height for each in (request, *(more for _, more in request.more_pictures)))
     return 2**20 + pixels * (4 * 3 * 3 + 1 + 12)
 
 

@@ -12,7 +12,7 @@ from ...render.machine.memory import require_memory
 from ...render.pictures.renderer import Interrupted
 from ...report.live_pictures import LivePictures
 from ...scene.image_file import check_reference, read_image
-from ...types.errors import MfoError
+from ...types.errors import BadInputError, MfoError
 from ...types.event import BestValues, Event, Progress
 from ...types.image import Image
 from ...types.status import Status
@@ -22,6 +22,7 @@ from ..output.progress import EventWriter
 from ..output.result import write_partial
 from .fit_scene import Fitter, fit_scene
 from .job_view import view_of
+from .more_pictures import JobPicture, in_order, label, without_repeats
 from .outputs import bytes_needed, write_outputs
 from .stop import StopSignal
 
@@ -72,19 +73,24 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
     stop.loading(lambda: events.failed(Status.CANCELLED, _CANCELLED_EARLY))
     folder = JobFolder.open(path)
     request = read_request(folder, trusted=trusted)
+    pixels = sum(each.width * each.height for _, each in in_order(folder, request))
+    together = f" in {len(request.more_pictures) + 1} pictures" if request.more_pictures else ""
+    size = f"{pixels}" if together else f"{request.width}x{request.height}"
     require_memory(
-        _STARTUP_BYTES + request.width * request.height * _BYTES_PER_PIXEL[request.fit.preset],
+        _STARTUP_BYTES + pixels * _BYTES_PER_PIXEL[request.fit.preset],
         mapped=_MAPPED_BYTES,
-        what=f"A fit of {request.width}x{request.height} pixels",
+        what=f"A fit of {size} pixels{together}",
         cure="lower the resolution, or free some memory or raise its limit",
     )
     reference, notes = read_reference(folder, request)
     view = view_of(folder, request, reference)
+    more, said_of_more = _read_more(JobPicture(folder, request, reference, view))
     folder.require_space(bytes_needed(request))
     small = LivePictures(reference, view)
     events.attach(folder, small.current, small.difference)
 
-    said = tuple(dict.fromkeys((*request.notes, *notes)))  # the export may have said the same of the reference
+    # the export may have said the same of the reference
+    said = tuple(dict.fromkeys((*request.notes, *notes, *said_of_more)))
 
     def listener(event: Event) -> None:
         if isinstance(event, BestValues):
@@ -94,11 +100,26 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
             stop.loaded()
         events(event)
 
-    outcome = fitter(folder, request, reference, view, listener=listener, should_stop=stop.requested)
+    outcome = fitter(folder, request, reference, view, listener=listener, should_stop=stop.requested, more=more)
     stop.loaded()
-    write_outputs(folder, request, reference, view, outcome, notes=said)
+    write_outputs([JobPicture(folder, request, reference, view), *more], outcome, notes=said)
     folder.cancel.unlink(missing_ok=True)  # it has been answered
     return outcome.result.status, outcome.result.message
+
+
+def _read_more(first: JobPicture) -> tuple[list[JobPicture], list[str]]:
+    """The further pictures of a job, and notes on them with their numbers."""
+    pictures, said = [first], []
+    for inner, more in list(in_order(first.folder, first.request))[1:]:
+        try:
+            reference, notes = read_reference(inner, more)
+            pictures.append(JobPicture(inner, more, reference, view_of(inner, more, reference)))
+        except BadInputError as error:
+            raise BadInputError(f"Picture {label(more)}: {error}") from error
+        fresh = [note for note in (*more.notes, *notes) if note not in first.request.notes]
+        said += [f"Picture {label(more)}: {note}" for note in fresh]
+    (_, *others), repeated = without_repeats(pictures)
+    return others, [*repeated, *said]
 
 
 def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[str, ...]]:

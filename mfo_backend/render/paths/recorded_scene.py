@@ -63,18 +63,20 @@ class SceneNeeds:
 class RecordedScene:
     """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target.
 
+    `part` is the part of all lanes and rays that its recordings may have, where there are those of other pictures, too.
+
     Raises
     ------
     UnrecordableError
         If the material has textures or a lobe that recorded paths cannot hold.
     """
 
-    def __init__(self, renderer: MitsubaRenderer, covered: int) -> None:
+    def __init__(self, renderer: MitsubaRenderer, covered: int, part: float = 1.0) -> None:
         self._integrator = renderer.scene.integrator()
         if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
-        self._covered = covered
+        self._covered, self._most_lanes, self._most_rays = covered, part * MOST_LANES, part * MOST_RAYS
         self._taken = 0  # bytes for the rays of the largest recording so far
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
@@ -121,32 +123,35 @@ class RecordedScene:
         highlights: Highlights | None = None,
         samples: int = 1,
         enough: float = MOST_LANES,
+        needs: SceneNeeds | None = None,
     ) -> RecordedPaths:
         """Record with `grid` squared rays a pixel, a number or an array (height, width); light over other surfaces is
         that of the material `vector`.
 
         `near` shapes the proposal for that material instead of for any and resolves highlights more finely, unless
         `highlights` says how. Where light is sampled each ray meets it in as many independent `samples`.
-        Tiles are left out, evenly, as long as about `enough` lanes remain.
+        Tiles are left out, evenly, as long as about `enough` lanes remain. `needs` are those of several pictures, where
+        this is one of them.
         """
+        needs = needs or self.needs
         self.renderer.show(vector)
         proposal = DefensiveProposal()
         width = self._value(vector, self.model.scanned[0])
         if near and isinstance(width, float):
             proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
-        samples = samples if self.needs.sampled else 1
-        lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if self.needs.sampled else 1)
+        samples = samples if needs.sampled else 1
+        lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if needs.sampled else 1)
         if self._near_target.any():
             grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
-        stride = max(1, math.ceil(math.sqrt(lanes / MOST_LANES)), int(math.sqrt(lanes / enough)))
-        stride, pixels = self._affordable(grid, stride, samples)
+        stride = max(1, math.ceil(math.sqrt(lanes / self._most_lanes)), int(math.sqrt(lanes / enough)))
+        stride, pixels = self._affordable(grid, stride, samples, sampled=needs.sampled)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
         settings = RecordSettings(
             grid=grid,
             seed=seed,
-            depth=self.needs.depth,
+            depth=needs.depth,
             proposal=proposal,
             hide_emitters=hide,
             stride=stride,
@@ -174,7 +179,7 @@ class RecordedScene:
         return Highlights(share=SHARE_NEAR, narrow=narrow, turn=turn if isinstance(turn, float) else 0.0)
 
     def _affordable(
-        self, grid: int | NDArray[np.int64], stride: int, samples: int
+        self, grid: int | NDArray[np.int64], stride: int, samples: int, *, sampled: bool
     ) -> tuple[int, NDArray[np.bool_] | None]:
         """The stride with which a recording does not take too many camera rays, and the pixels it should look at.
 
@@ -187,11 +192,11 @@ class RecordedScene:
         squares = np.broadcast_to(np.square(grid), (height, width))
         pixels = None
         count = _rays(squares, stride)
-        if count > MOST_RAYS:
+        if count > self._most_rays:
             pixels = self._near_target
-            while (count := _rays(squares * pixels, stride)) > MOST_RAYS:
+            while (count := _rays(squares * pixels, stride)) > self._most_rays:
                 stride += 1
-        of_a_ray = BYTES_PER_RAY_SAMPLED if self.needs.sampled else BYTES_PER_RAY_EXACT
+        of_a_ray = BYTES_PER_RAY_SAMPLED if sampled else BYTES_PER_RAY_EXACT
         needed, mapped = (count * (size + (samples - 1) * BYTES_PER_SAMPLE) for size in of_a_ray)
         if needed > self._taken:  # Dr.Jit keeps what an earlier recording has freed
             require_memory(

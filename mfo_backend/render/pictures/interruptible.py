@@ -77,6 +77,7 @@ class InterruptibleRenderer:
     def __init__(self, renderer: Renderer, thread: NativeThread) -> None:
         self.model, self.table, self.start = renderer.model, renderer.table, renderer.start
         self.counter = renderer.counter
+        self.sheet = getattr(renderer, "sheet", None)
         self._renderer = renderer
         self._thread = thread
 

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several references of one material as the reference of one contact sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...metrics.display.baked_view import BakedView
+from ...metrics.display.colour import luminance
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...metrics.pixels.pixel_check import check_finite
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.sheet.sheet_renderer import SheetRenderer
+from ...types.errors import BadInputError
+from ...types.image import Encoding, Image
+from ..judge.checked_reference import check_reference
+
+_WHITE_LOST = (
+    "Picture {label} is scene-linear and others are not: it was put through their view, and what is brighter than a "
+    "display's white counts as white."
+)
+
+
+@dataclass(frozen=True)
+class SheetTask:
+    """The renderer of a sheet, its reference, the view of its radiance, and sentences on what was done to pictures."""
+
+    renderer: SheetRenderer
+    reference: Image
+    display: View | None
+    notes: tuple[str, ...] = ()
+
+
+def one_sheet(
+    renderers: Sequence[MitsubaRenderer], references: Sequence[Image], views: Sequence[View], labels: Sequence[str]
+) -> SheetTask:
+    """The task of fitting all pictures together; `labels` are what sentences call them.
+
+    Scene-linear pictures count alike, however bright their light is. Display pictures are seen through one view; their
+    exposures may differ.
+
+    Raises
+    ------
+    BadInputError
+        With the picture's number: if it does not fit to its scene or is seen through another view than the others.
+    """
+    masks = [renderer.target_mask() for renderer in renderers]
+    for label, reference, mask in zip(labels, references, masks, strict=True):
+        try:
+            check_reference(reference, mask)
+            check_finite(reference.pixels, "The reference")
+        except BadInputError as error:
+            raise BadInputError(f"Picture {label}: {error}") from error
+    if all(reference.encoding is Encoding.LINEAR for reference in references):
+        light = [float(luminance(np.maximum(r.pixels, 0.0))[m].mean()) for r, m in zip(references, masks, strict=True)]
+        gains = [light[0] / level if level > 0.0 else 1.0 for level in light]
+        renderer = SheetRenderer(renderers, gains, labels)
+        pixels = renderer.sheet.radiance([reference.pixels for reference in references])
+        return SheetTask(renderer, Image(pixels.astype(np.float32), Encoding.LINEAR), None)
+    of_display = [n for n, reference in enumerate(references) if reference.encoding is Encoding.SRGB]
+    display, notes = views[of_display[0]], []
+    gains = [_gain(views[n] if n in of_display else display, display, labels[n]) for n in range(len(references))]
+    shown = []
+    for label, reference in zip(labels, references, strict=True):
+        if reference.encoding is Encoding.LINEAR:
+            notes.append(_WHITE_LOST.format(label=label))
+            reference = replace(reference, pixels=display.display(np.maximum(reference.pixels, 0.0)).astype(np.float32))
+        shown.append(reference.pixels)
+    renderer = SheetRenderer(renderers, gains, labels)
+    return SheetTask(renderer, Image(renderer.sheet.put(shown), Encoding.SRGB), display, tuple(notes))
+
+
+def _gain(view: View, common: View, label: str) -> float:
+    """What radiance is multiplied with so that `common` shows what `view` does."""
+    if isinstance(view, DisplayView) and isinstance(common, DisplayView) and view.gamma == common.gamma:
+        return 2.0 ** (view.exposure_ev - common.exposure_ev)
+    if isinstance(view, BakedView) and isinstance(common, BakedView):
+        same_range = (view.log2_min, view.log2_max) == (common.log2_min, common.log2_max)
+        if same_range and np.array_equal(view.table, common.table):
+            return 1.0
+    raise BadInputError(
+        f"Picture {label} was made under another view transform than the first display picture: give all pictures "
+        "of one fit as EXR, or render them under one view."
+    )

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several scenes' recorded paths as those of one contact sheet: normal equations of pictures add up."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...types.errors import BadInputError
+from ..models.prepared_material import EMISSION
+from ..paths.recorded_image import RecordedImage
+from ..paths.recorded_paths import LaneGroups, RecordedPaths
+from ..paths.recorded_scene import MOST_LANES, RecordedScene, SceneNeeds
+from .contact_sheet import ContactSheet
+from .sheet_renderer import SheetRenderer
+
+_SCENES_APART = 0x9E3779B1  # between the seeds of two pictures' recordings
+
+
+class RecordedSheet:
+    """What `RecordedScene` is for one picture, for all pictures of a sheet.
+
+    All of them together have the lanes and the rays of one, so they take about the time and the memory of one.
+
+    Raises
+    ------
+    UnrecordableError
+        If the material has textures or a lobe that recorded paths cannot hold.
+    """
+
+    def __init__(self, renderer: SheetRenderer) -> None:
+        self.renderer = renderer
+        covered = [int(r.target_mask().sum()) for r in renderer.renderers]
+        self._parts = [count / sum(covered) for count in covered]
+        self._scenes = [
+            RecordedScene(r, count, part)
+            for r, count, part in zip(renderer.renderers, covered, self._parts, strict=True)
+        ]
+        self.model = self._scenes[0].model
+
+    @property
+    def lights_exact(self) -> bool:
+        """See `RecordedScene.lights_exact`; so of all pictures."""
+        return all(scene.lights_exact for scene in self._scenes)
+
+    @cached_property
+    def needs(self) -> SceneNeeds:
+        """What any of the pictures needs."""
+        found = [scene.needs for scene in self._scenes]
+        depth = max(needs.depth for needs in found)
+        notes = found[0].notes if depth == 2 else ()
+        return SceneNeeds(any(needs.sampled for needs in found), depth, notes)
+
+    def record(
+        self,
+        vector: NDArray[np.float64],
+        *,
+        grid: int | NDArray[np.int64],
+        seed: int,
+        near: bool,
+        samples: int = 1,
+        enough: float = MOST_LANES,
+    ) -> RecordedPaths:
+        """See `RecordedScene.record`; `grid` is over the sheet, `enough` lanes are those of all pictures."""
+        parts = []
+        for number, (scene, part) in enumerate(zip(self._scenes, self._parts, strict=True)):
+            own = grid if isinstance(grid, int) else self.renderer.sheet.cut(grid, number)
+            try:
+                recorded = scene.record(
+                    vector, grid=own, seed=(seed + number * _SCENES_APART) % 2**32, near=near, samples=samples,
+                    enough=part * enough, needs=self.needs,
+                )  # fmt: skip
+            except BadInputError as error:
+                raise BadInputError(f"Picture {self.renderer.sheet.labels[number]}: {error}") from error
+            parts.append(self._of_first(recorded, number))
+        return joined(parts, self.renderer.sheet)
+
+    def _of_first(self, paths: RecordedPaths, number: int) -> RecordedPaths:
+        """A recording whose free emission is that of the first picture, as the exposure of films may differ."""
+        if paths.own_emission is None:
+            return paths
+        own, first = (r.factors[EMISSION] for r in (self.renderer.renderers[number], self.renderer.renderers[0]))
+        return replace(paths, own_emission=paths.own_emission * np.float32(own / first))
+
+    def finest_grid(self, samples: int, lanes: float) -> int:
+        """See `RecordedScene.finest_grid`."""
+        return min(
+            scene.finest_grid(samples, part * lanes) for scene, part in zip(self._scenes, self._parts, strict=True)
+        )
+
+    def pictures(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage:
+        """See `RecordedScene.pictures`."""
+        return self._scenes[0].pictures(paths, groups)
+
+    def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
+        """See `RecordedScene.evaluator`."""
+        return self._scenes[0].evaluator(paths, groups, recalled)
+
+
+def joined(parts: Sequence[RecordedPaths], sheet: ContactSheet) -> RecordedPaths:
+    """The recording of a sheet from those of its pictures.
+
+    A sample's lanes follow each other, picture by picture, as those of one picture do.
+    """
+    begins, ranges, total = [], [], 0
+    for sample in range(len(parts[0].first)):
+        at, row = [], []
+        for number, paths in enumerate(parts):
+            first = paths.first[sample]
+            at.append(total - int(first[0]))
+            row.append(first[:-1] + at[-1])
+            ranges.append((number, int(first[0]), int(first[-1]) - int(first[0]), total))
+            total += int(first[-1]) - int(first[0])
+        begins.append(np.concatenate([*row, [total]]))
+    weights = (paths.weight * dr.opaque(mi.Float, gain) for paths, gain in zip(parts, sheet.gains, strict=True))
+    glows = [paths.own_emission for paths in parts if paths.own_emission is not None]
+    merge = partial(_merged, ranges=ranges, total=total)
+    tiles = np.cumsum([0, *(int(paths.tile.max(initial=-1)) + 1 for paths in parts)])
+    return RecordedPaths(
+        wi=merge([paths.wi for paths in parts]),
+        wo=merge([paths.wo for paths in parts]),
+        weight=merge(list(weights)),
+        pixel=np.concatenate([sheet.on_sheet(paths.pixel, number) for number, paths in enumerate(parts)]),
+        tile=np.concatenate([paths.tile + begin for paths, begin in zip(parts, tiles[:-1], strict=True)]),
+        first=np.stack(begins),
+        coverage=np.concatenate([paths.coverage for paths in parts]),
+        constant=sheet.radiance([paths.constant for paths in parts]),
+        own_emission=sheet.radiance(glows) if glows else None,
+        held={name: merge([paths.held[name] for paths in parts]) for name in parts[0].held},
+    )
+
+
+def _merged(arrays: Sequence[Any], ranges: Sequence[tuple[int, int, int, int]], total: int) -> Any:
+    """One array of `total` entries with runs of others: number of the array, first entry, length and place."""
+    whole = dr.zeros(type(arrays[0]), total)
+    dr.eval(whole)
+    for number, begin, length, place in ranges:
+        if length:
+            index = dr.arange(mi.UInt32, length)
+            value = dr.gather(type(arrays[0]), arrays[number], index + dr.opaque(mi.UInt32, begin))
+            dr.scatter(whole, value, index + dr.opaque(mi.UInt32, place), mode=dr.ReduceMode.Permute)
+    dr.eval(whole)
+    return whole
