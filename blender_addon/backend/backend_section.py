@@ -9,6 +9,7 @@ import bpy
 
 from . import backend_state
 from .backend_install import SIZE
+from .preferences import preference
 
 _ICONS = {"UNKNOWN": "QUESTION", "NOT_INSTALLED": "IMPORT", "TESTING": "TIME", "READY": "CHECKMARK", "BROKEN": "ERROR"}
 _TITLES = {
@@ -55,6 +56,7 @@ def draw_setup(layout: bpy.types.UILayout, *, width: int) -> None:
     for problem in state.problems:
         _wrapped(box, problem, width)
     if state.name != "READY":
+        _draw_network(box, width)
         row = box.row()
         row.scale_y = 1.2
         again = state.has_folder and state.name != "NOT_INSTALLED"  # the folder may hold a log alone
@@ -66,6 +68,15 @@ def draw_setup(layout: bpy.types.UILayout, *, width: int) -> None:
         row.operator("mfo.remove_backend", text="Remove", icon="TRASH")
     if state.log_file:
         row.operator("mfo.open_install_log", text="", icon="TEXT")
+
+
+def _draw_network(layout: bpy.types.UILayout, width: int) -> None:
+    """Blender's own switch, where an installation would need it."""
+    if bpy.app.online_access or bpy.app.online_access_override or preference(bpy.context, "wheels"):
+        return
+    text = bpy.app.translations.pgettext_iface("Install downloads packages, for which Blender needs your leave.")
+    _wrapped(layout, text, width)
+    layout.prop(bpy.context.preferences.system, "use_online_access", text="Allow Online Access")
 
 
 def _wrapped(layout: bpy.types.UILayout, text: str, width: int) -> None:

@@ -22,6 +22,8 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         metavar="LIST",
         help='all, reduced, or names with commas between, as "Base Color,Roughness" or base_color (default: all)',
     )
+    group.add_argument("--range", help="losses on radiance or display values: hdr, ldr or auto (default: auto)")
+    group = parser.add_argument_group("for experts and the paper's method")
     group.add_argument(
         "--losses",
         metavar="LIST",
@@ -29,7 +31,6 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--lf", metavar="LOSS", help="low fidelity: the first of two losses (default: mse)")
     group.add_argument("--hf", metavar="LOSS", help="high fidelity: the second of two losses (default: flip)")
-    group.add_argument("--range", help="losses on radiance or display values: hdr, ldr or auto (default: auto)")
     group.add_argument("--seed", type=int, help="random numbers of the fit (default: 0)")
     group.add_argument("--max-iterations", type=int, metavar="N", help="of each stage, preset paper (default: 300)")
     group.add_argument("--spp", type=int, metavar="N", help="samples per pixel and iteration, preset paper")

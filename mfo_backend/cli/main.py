@@ -7,6 +7,7 @@ import argparse
 import importlib
 import json
 import sys
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
@@ -25,10 +26,40 @@ COMMANDS = {
     "blend": "fit a material of a .blend file to a reference picture",
     "compare": "measure the difference between two pictures",
     "judge": "measure a picture against the reference of a job",
+    "apply": "put the values of a result on a material of a .blend file",
     "batch": "run many job folders, several at a time or on a cluster",
     "bench": "measure speed against error on random scenes",
+    "completion": "print what makes a shell complete mfo's words",
     "run": "run a job folder (what the Blender add-on starts)",
 }
+# of each command, shown below its help
+EXAMPLES = {
+    "doctor": ("mfo doctor",),
+    "demo": ("mfo demo", "mfo demo --scene-seed 7 --size 128  # another material, a smaller picture"),
+    "fit": (
+        "mfo fit scene.xml --target vase --reference photo.exr",
+        "mfo fit scene.xml --target vase --reference photo.png --parameters base_color,roughness",
+    ),
+    "blend": (
+        "mfo blend shot.blend --object Vase --reference photo.png  # fit alone, nothing is changed",
+        "mfo blend shot.blend --object Vase --reference ref.exr --apply --save-as matched.blend",
+    ),
+    "apply": (
+        "mfo apply job/result.json shot.blend  # put the values on the material they were fitted for",
+        "mfo apply job/result.json other.blend --material Glaze --save-as matched.blend",
+    ),
+    "compare": ("mfo compare reference.exr render.exr",),
+    "judge": ("mfo judge job render.exr",),
+    "batch": ("mfo batch jobs/*  # those that have a result are left alone",),
+    "bench": (
+        "mfo bench --scenario base --method balanced --scenes 2",
+        "mfo bench  # everything: many hours, the paper's loop alone takes minutes a scene",
+        "mfo bench report DIR",
+    ),
+    "completion": ('eval "$(mfo completion bash)"', "mfo completion fish > ~/.config/fish/completions/mfo.fish"),
+    "run": ("mfo run job",),
+}
+_WIDTH = 100  # letters of a line of help
 _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled, 5 no match."
 
 
@@ -89,6 +120,14 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             continue
         if name == chosen:
             importlib.import_module(f"{__package__}.commands.{name}").add_parser(subparsers)
+            _add_examples(subparsers.choices[name], EXAMPLES[name])
         else:
             subparsers.add_parser(name, help=summary)
     return parser
+
+
+def _add_examples(parser: argparse.ArgumentParser, lines: Sequence[str]) -> None:
+    """Put examples below the help of a command, as they are."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.description = textwrap.fill(parser.description or "", _WIDTH)
+    parser.epilog = "\n".join(["examples:", *(f"  {line}" for line in lines)])

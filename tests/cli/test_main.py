@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import runpy
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -48,6 +50,35 @@ def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture) -> Non
         command.main([name, "--help"])
     assert ended.value.code == 0
     assert f"usage: mfo {name}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", sorted(command.COMMANDS))
+def test_every_help_has_an_example_that_parses(name: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        command.main([name, "--help"])
+    shown = capsys.readouterr().out.split("examples:\n")[1].splitlines()
+    for line in shown:
+        words = shlex.split(line.partition(" > ")[0].replace('eval "$(', "").replace(')"', ""), comments=True)
+        assert words[:2] == ["mfo", name]
+        assert command._parser(words[1:]).parse_args(words[1:]).command == name
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_completes_commands_and_options(shell: str, capsys: pytest.CaptureFixture) -> None:
+    assert command.main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(name in script for name in command.COMMANDS)
+    assert "save-as" in script
+    assert "bake-view" not in script  # an old name, kept and not shown
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_completes(capsys: pytest.CaptureFixture) -> None:
+    command.main(["completion", "bash"])
+    ask = "COMP_WORDS=(mfo blend --ob); COMP_CWORD=2; _mfo; echo ${COMPREPLY[@]}"
+    first = "COMP_WORDS=(mfo bl); COMP_CWORD=1; _mfo; echo ${COMPREPLY[@]}"
+    words = ["bash", "-c", f"{capsys.readouterr().out}\n{ask}\n{first}"]
+    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.split() == ["--object", "blend"]
 
 
 def test_the_version(capsys: pytest.CaptureFixture) -> None:

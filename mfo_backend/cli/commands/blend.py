@@ -193,17 +193,20 @@ def apply_result(
     job: Path,
     save_as: Path,
     *,
+    material: str = "",
     force: bool = False,
     animated: str = "leave",
     make_local: bool = False,
 ) -> tuple[str, ...]:
     """Save `blend` with the recovered values on its material; returns what was skipped, in sentences.
 
+    The material is the fitted one's name, or `material`.
     With `force` also those of a result that does not match. Sockets with keyframes or a driver are left as they are, or
     with `animated` "replace" get a key at the current frame and lose the driver. With `make_local` object, mesh and
     material of a library become parts of the file.
     """
     words = [f"--job={job}", f"--save-as={save_as}", f"--animated={animated}"]
+    words += [f"--material={material}"] if material else []
     words += [word for word, wanted in (("--force", force), ("--make-local", make_local)) if wanted]
     applied = host.call("apply", blend, *words)
     return tuple(applied.get("notes", ()))

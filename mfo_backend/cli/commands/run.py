@@ -17,14 +17,20 @@ from ...job.run.fit_scene import Fitter, fit_scene, load_everything
 from ...job.run.run_job import run_job
 from ...job.run.stop import ORPHAN_GRACE, StopSignal
 from ...job.run.waiting import wait_for_job
-from ...types.errors import BadInputError
 from ...types.status import Status
 
 
 def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse names its class with an underscore
     """Add `mfo run`."""
     parser = subparsers.add_parser("run", help="run a job folder", description="Run the job in a folder.")
-    parser.add_argument("job", type=Path, nargs="?", help="folder with a request.json")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("job", type=Path, nargs="?", help="folder with a request.json")
+    what.add_argument(
+        "--wait",
+        type=float,
+        metavar="SECONDS",
+        help='load everything and wait so long for a line {"cmd": "run", "job": FOLDER} on stdin',
+    )
     parser.add_argument(
         "--progress",
         choices=("json", "bar", "none"),
@@ -33,12 +39,6 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("--parent", type=int, metavar="PID", help="stop when this process is gone")
     parser.add_argument("--control", choices=("stdin",), help="read commands from stdin and stop at its end")
-    parser.add_argument(
-        "--wait",
-        type=float,
-        metavar="SECONDS",
-        help='instead of JOB: load everything and wait so long for a line {"cmd": "run", "job": FOLDER} on stdin',
-    )
     add_trust_option(parser)
     parser.set_defaults(func=run)
 
@@ -56,8 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
     Nothing is left to do: Python would take a tenth of a second to take the renderer down, and after a cancel native
     code may still be at work.
     """
-    if (arguments.job is None) == (arguments.wait is None):
-        raise BadInputError("mfo run needs either the folder of a job, or --wait: give one of them.")
     end_process(work(arguments, fit_scene, prepare=load_everything))
 
 

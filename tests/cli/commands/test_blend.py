@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from mfo_backend.cli.commands import apply as apply_command
 from mfo_backend.cli.commands import blend
 from mfo_backend.cli.main import main
 
@@ -57,6 +58,25 @@ def test_a_mismatch_is_applied_by_force(fitted: SimpleNamespace) -> None:
     fitted.result |= {"status": "different", "verdict": "different"}
     assert main([*WORDS, "--force"]) == 5
     assert fitted.applied == [True]
+
+
+def test_a_result_goes_onto_another_file_and_material(
+    fitted: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys
+) -> None:
+    seen: list[object] = []
+
+    def apply(_host, file: Path, job: Path, save_as: Path, *, material: str, **_: object) -> tuple[str, ...]:
+        seen.extend((file, job, save_as, material))
+        return ("Metallic has a link.",)
+
+    monkeypatch.setattr(apply_command, "find_blender_host", lambda program: None)
+    monkeypatch.setattr(apply_command, "apply_result", apply)
+    (tmp_path / "result.json").write_text("{}")
+    words = ["apply", str(tmp_path / "result.json"), "b.blend", "--material", "Glaze", "--save-as", "c.blend"]
+    assert main(words) == 0
+    assert seen == [Path("b.blend"), tmp_path, Path("c.blend"), "Glaze"]
+    assert capsys.readouterr().out.splitlines() == ["note: Metallic has a link.", "Saved: c.blend"]
+    assert main(["apply", "nowhere", "b.blend"]) == 2
 
 
 def test_json_says_that_nothing_was_saved(fitted: SimpleNamespace, capfd) -> None:

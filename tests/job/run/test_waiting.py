@@ -69,7 +69,7 @@ def test_it_ends_where_no_job_comes(seconds: str, ends: bool) -> None:
 def test_it_needs_a_job_or_a_wait() -> None:
     with start(worker=None) as child:
         assert child.wait(PATIENCE) == 2
-        assert "either the folder of a job, or --wait" in child.stderr.read()
+        assert "one of the arguments job --wait is required" in child.stderr.read()
 
 
 @pytest.mark.slow
