@@ -90,7 +90,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
 
 def _pictures(chosen: argparse.Namespace) -> Any:
     """The reference, or the pictures of --picture."""
-    from .export.picture_setup import PictureSetup
+    from .export.reference.picture_setup import PictureSetup
 
     if chosen.reference is not None:
         return chosen.reference.absolute()

@@ -47,6 +47,14 @@ class PictureResult:
 
 
 @dataclass(frozen=True)
+class Contradiction:
+    """Pictures of a fit of several, by their labels, that do not go with the others, or not with each other."""
+
+    pictures: tuple[str, ...]
+    sentence: str
+
+
+@dataclass(frozen=True)
 class FitResult:
     """The recovered values and how they came about.
 
@@ -54,7 +62,7 @@ class FitResult:
     well the picture determines each value, where the preset finds out, and `weak_combinations` which values it
     determines together only; `notes` are sentences on what was left out or
     kept. `model_gap` and `judgement` are None where they could not be measured. `pictures` are those of a fit of
-    several, whose verdict is the worst of theirs.
+    several, whose verdict is the worst of theirs, and `contradiction` says which of them do not agree.
     """
 
     status: Status
@@ -73,3 +81,4 @@ class FitResult:
     model_gap: ModelGap | None = None
     judgement: Judgement | None = None
     pictures: tuple[PictureResult, ...] = ()
+    contradiction: Contradiction | None = None

@@ -10,14 +10,17 @@ import numpy as np
 
 from ...metrics.display.baked_view import BakedView
 from ...metrics.display.tone_mapping import DisplayView
+from ...render.camera.primary_rays import TILE
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.image import Pixels
+from ...types.result import Contradiction
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.weak_combinations import weak_combinations
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
+from ..pictures.contradiction import contradiction
 from ..plans import RecordedPlan
 from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds
@@ -39,6 +42,7 @@ from .recording import Setting, Vector
 from .refine import OnRecording, refine_exact, refine_sampled
 from .start import start_from_nothing
 
+TILES_OF_A_PICTURE = 300  # that are asked whether pictures agree: a wrong lamp shows in all
 STAGES = ("scan", "start", "refine")
 NOTHING_SEEN = "What is left of the picture ({:.1g} %) nobody sees: perceptual stages were left out."
 NOTHING_BUT_NOISE = (
@@ -110,6 +114,7 @@ class RecordedRoute:
         del started  # and with it the first recording
         weighted = setting.sampled
         kept = keep_values(end, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
+        disagree = self._contradiction(end, kept)
         later, notes, counts = self._perceptual(end, kept, others)
         notes = [*scene.needs.notes, *kept.notes, *notes]
         if setting.fireflies:
@@ -125,6 +130,25 @@ class RecordedRoute:
             choose=self._choose_by(counts),
             stages=tuple(course.reports),
             notes=tuple(notes),
+            contradiction=disagree,
+        )
+
+    def _contradiction(self, end: OnRecording, kept: Kept) -> Contradiction | None:
+        """Which of several pictures does not go with the others."""
+        task, sheet = self._task, self._task.sheet
+        if sheet is None or task.should_stop():
+            return None
+        recording, table = end.recording.whole, end.recording.setting.table
+        groups = recording.tiles(TILE)
+        noise = recording.noise(recording.pixels(kept.x), TILE)
+        some = np.arange(0, len(groups), max(len(groups) // (TILES_OF_A_PICTURE * len(sheet)), 1))
+        groups, noise = groups.take(some), noise.take(some)
+        weigh = recording.weighing(noise, TILE, _weighted(task))
+        solved, judged = (recording.problem(groups, make) for make in (_censored(RelativeResidual, task), weigh))
+        judged = replace(judged, evaluate=solved.evaluate)  # which remembers what it was asked
+        numbers = sheet.numbers(groups.pixels[groups.first[:-1]])
+        return contradiction(
+            solved, judged, numbers, sheet.labels, kept.x, (table.lower, table.upper), task.should_stop
         )
 
     def _perceptual(

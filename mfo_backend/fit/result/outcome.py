@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...render.pictures.renderer import Renderer
 from ...types.certainty import Certainty, WeakCombination
 from ...types.image import Pixels
-from ...types.result import FitResult, StageReport
+from ...types.result import Contradiction, FitResult, StageReport
 from ...types.status import Status
 
 START_KEPT = "Nothing was better than the start, so the start was kept."
@@ -75,6 +75,8 @@ class RouteEnds:
         How the last stage ended.
     unverified
         Start and ends with the fit's own pictures, which have to do where there was no time for others.
+    contradiction
+        Of several pictures, which do not agree.
     """
 
     ends: tuple[End, ...]
@@ -84,6 +86,7 @@ class RouteEnds:
     notes: tuple[str, ...] = ()
     status: Status = Status.CONVERGED
     unverified: tuple[Candidate, ...] = ()
+    contradiction: Contradiction | None = None
 
     def chosen_notes(self, choice: Choice) -> tuple[str, ...]:
         """The sentences on a choice among the ends."""
@@ -139,6 +142,8 @@ def final_result(
     message = status.sentence
     if not choice.beats_start and status is not Status.CANCELLED:
         message += f" {START_KEPT}"
+    if found.contradiction is not None:
+        message += f" {found.contradiction.sentence}"
     table, end = renderer.table, found.ends[choice.end]
     return FitResult(
         status=status,
@@ -154,4 +159,5 @@ def final_result(
         certainty=dict(end.certainty),
         notes=(*found.notes, *found.chosen_notes(choice), *notes),
         weak_combinations=end.weak_combinations,
+        contradiction=found.contradiction,
     )

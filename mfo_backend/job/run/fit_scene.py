@@ -208,7 +208,9 @@ def fit_scene(
             return fit(renderer_of(loaded, again), again, hand_over=False)
 
         def is_wanted(found: _Fitted) -> bool:
-            return not should_stop() and is_worth_another(found.result, request.fit.parameters)
+            # no class of material makes up for a wrong light
+            agree = found.result.contradiction is None
+            return agree and not should_stop() and is_worth_another(found.result, request.fit.parameters)
 
         if target in first:
             counted = fitted.counted if fitted.sheet is None else fitted.sheet.cut(fitted.counted, 0)

@@ -15,7 +15,7 @@ from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.verdict import Verdict
-from tests.render.scenes import POINT
+from tests.render.scenes import FLOOR, POINT
 
 from .two_scenes import VALUES, mean_light, pictures_of, views
 
@@ -111,3 +111,19 @@ def test_glass_is_not_fitted_to_several_pictures_and_it_says_what_to_do(tmp_path
     with pytest.raises(UnrecordableError, match="leave out all pictures but one, or choose the preset 'paper'"):
         fitted(task.renderer, task.reference)
     assert fitted(task.renderer, task.reference, settings=replace(FAST, preset="paper", max_iterations=1, spp=1))
+
+
+def test_a_picture_whose_lamp_had_moved_is_named_and_no_other(tmp_path):
+    """Its scene has the lamp where it is in the others'."""
+    renderers = views(tmp_path / "scenes", [POINT + FLOOR] * 3, [32, 32, 32])
+    moved = POINT.replace('x="2" y="-3" z="3"', 'x="-2.5" y="-2" z="3"')
+    others = views(tmp_path / "moved", [POINT + FLOOR, moved + FLOOR, POINT + FLOOR], [32, 32, 32])
+    references = pictures_of(others, VALUES)
+    task = one_sheet(renderers, references, [DisplayView()] * 3, LABELS[:3])
+    found = fitted(task.renderer, task.reference).result
+    assert found.contradiction is not None
+    assert found.contradiction.pictures == (LABELS[1],)
+    assert "Picture 2 (b.exr) does not go with the rest: its light or camera differs" in found.message
+    assert found.status.exit_code != 0
+    task = one_sheet(renderers, pictures_of(renderers, VALUES), [DisplayView()] * 3, LABELS[:3])
+    assert fitted(task.renderer, task.reference).result.contradiction is None

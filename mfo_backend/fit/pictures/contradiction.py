@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which picture of a fit does not go with the others, by fits that leave one out.
+
+After G. C. Chow's test of whether two sets of observations have the same coefficients ("Tests of Equality Between Sets
+of Coefficients in Two Linear Regressions", 1960): what is left where a set need not agree with the others, against what
+is left where all agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solve.bounded_least_squares import NormalEquations, SolveLimits, solve_bounded
+from ...types.result import Contradiction
+from ..squares.problem import Problem
+from ..squares.residuals import gram_of, residual_rows
+
+Vector = NDArray[np.float64]
+
+# Mean square of all pictures' residuals over that of the others where one is left out, from which on this one does not
+# go with them. Measured by `studies.views`.
+AGAINST_REST = 2.0
+CLEARLY = 2.0  # times the next candidate's: else both are named
+LEAST_MISFIT = 1.5  # deviations of the noise: below, all pictures are explained
+EVALUATIONS = 12
+
+
+def contradiction(
+    solved: Problem,
+    judged: Problem,
+    numbers: NDArray[np.int64],
+    labels: Sequence[str],
+    x: Vector,
+    box: tuple[Vector, Vector],
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Contradiction | None:
+    """The picture that speaks against the others; None where all go together.
+
+    Parameters
+    ----------
+    solved, judged
+        The same groups of all pictures with residuals whose slopes reach far, by which a fit without a picture is
+        solved, and with residuals in standard deviations of the noise, by which it is judged.
+    numbers
+        The picture of each group, counted from 0.
+    x
+        The solution of all pictures together.
+    """
+
+    def squares(at: Vector) -> Vector:
+        """Mean square residual of each picture."""
+        values = np.square(residual_rows(judged.evaluate(at), judged.residual)[:, :, 0]).mean(axis=1)
+        return np.array([values[numbers == number].mean() for number in range(len(labels))])
+
+    together = squares(x)
+    if together.mean() < LEAST_MISFIT**2:
+        return None
+    gains = np.empty(len(labels))
+    for number in range(len(labels)):
+        limits = SolveLimits(evaluations=EVALUATIONS, cost_change=1e-3)
+        found = solve_bounded(_without(solved, numbers == number), x, *box, limits, should_stop).x
+        gains[number] = together.mean() / max(np.delete(squares(found), number).mean(), 1e-12)
+    if should_stop() or gains.max() < AGAINST_REST:
+        return None
+    named = tuple(labels[n] for n in np.flatnonzero(gains > gains.max() / CLEARLY))
+    return Contradiction(named, _sentence(named, len(labels)))
+
+
+def _without(problem: Problem, left_out: NDArray[np.bool_]) -> Callable[[Vector], NormalEquations]:
+    def at(x: Vector) -> NormalEquations:
+        gram = gram_of(residual_rows(problem.evaluate(x), problem.residual)[~left_out])
+        return NormalEquations(0.5 * float(gram[0, 0]), gram[1:, 0], gram[1:, 1:])
+
+    return at
+
+
+def _sentence(named: Sequence[str], count: int) -> str:
+    cure = "Correct it, or leave it out."
+    if len(named) == 1:
+        return f"Picture {named[0]} does not go with the rest: its light or camera differs from its scene. {cure}"
+    listed = f"{', '.join(named[:-1])} and {named[-1]}"
+    rest = "" if len(named) == count else " with the rest"
+    return (
+        f"Pictures {listed} do not go together{rest}: the light or camera of one of them differs from its scene. {cure}"
+    )
