@@ -120,9 +120,9 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
     preset: EnumProperty(name="Preset", description="How the values are searched", items=PRESET_ITEMS)
     parameter_set: EnumProperty(
         name="Parameters",
-        description="Which values may change; sockets with a link never do",
+        description="Which values may change; for a socket with a link, those of the nodes that feed it",
         items=(
-            ("all", "All", "Everything the picture can show"),
+            ("all", "All", "Everything the picture can show, and of nodes colours and what colour nodes do with them"),
             ("reduced", "Basic", "Base colour, roughness, metallic and specular"),
             ("chosen", "Chosen", "Choose below"),
         ),
@@ -142,6 +142,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         default=SOCKETS_START,
     )
     bounds: CollectionProperty(type=MFO_PG_bound)
+    node_values: CollectionProperty(type=bpy.types.PropertyGroup)  # values inside nodes that are chosen, by name
     model: EnumProperty(name="Model", description="Material model to fit", items=MODEL_ITEMS)
     range: EnumProperty(
         name="Range",
@@ -286,6 +287,15 @@ def toggle_bound(settings: bpy.types.PropertyGroup, name: str) -> None:
     bound = settings.bounds.add()
     bound.name = name
     bound.lower, bound.upper = _RANGES.get(name, (0.0, 1.0))
+
+
+def toggle_node_value(settings: bpy.types.PropertyGroup, name: str) -> None:
+    """Choose a value inside the nodes, or leave it out."""
+    index = settings.node_values.find(name)
+    if index >= 0:
+        settings.node_values.remove(index)
+    else:
+        settings.node_values.add().name = name
 
 
 def crossed_limits(settings: bpy.types.PropertyGroup) -> list[str]:

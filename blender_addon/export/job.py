@@ -12,11 +12,13 @@ from typing import Any
 import bpy
 import tomllib
 
-from ..result.animated_sockets import animation_notes
+from ..graph_values.place import holder_of
+from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
 from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .material_model import Material
+from .materials.chosen_values import by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import evaluate_graph, probe_for
 from .nodes.target_shader import TargetShader, target_shader
@@ -83,7 +85,8 @@ def export_job(
             here.mkdir(parents=True, exist_ok=True)
             try:
                 with shown(context, setup, obj, own_size=len(reference) > 1) as there:
-                    part = partial_export(there, obj, here, setup.reference, fit, reference_view, upright)
+                    alone = len(reference) == 1
+                    part = partial_export(there, obj, here, setup.reference, fit, reference_view, upright, alone=alone)
                     part.request["picture"] = setup.request(there)
             except ExportError as error:
                 if len(reference) == 1:
@@ -133,10 +136,16 @@ def partial_export(
     reference_view: str,
     upright: bool,
     tell: Callable[[float], None] = lambda _share: None,
+    *,
+    alone: bool = True,
 ) -> PartialExport:
-    """Write what one picture needs, as the context shows it, into an existing folder; all but request.json."""
+    """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
+
+    `alone` says that it is the only one.
+    """
     findings = Findings()
-    with probe_for(obj) as probe:
+    values, fit = chosen_graph_values(obj, fit, findings, alone=alone)
+    with probe_for(obj, always=bool(values)) as probe:
         with SceneBakes(context) as bakes:
             data = read_scene(context, obj, findings, bakes)
         findings.raise_first()
@@ -145,8 +154,12 @@ def partial_export(
             findings.note(f"The values cannot be applied as it is. {unwritable(obj.active_material)}")
         target = target_shader(obj.active_material)
         assert target is not None
-        fit = _fit_of(target, data.materials[TARGET_BSDF], fit)
-        named = {target.own_name(name): socket for name, socket in target.sockets.items()}
+        data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
+        findings.raise_first()
+        fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not values)
+        unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
+        named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
+        named |= {value.name: holder_of(obj.active_material.node_tree, value.place) for value in values}
         for said in animation_notes(named, context.scene.frame_current):
             findings.note(said)
         tell(0.4)
@@ -161,13 +174,15 @@ def partial_export(
         tell(0.5)
         request = _request(context, obj, data, files, picture, fit, findings)
         if graph is not None:
-            request["graph"] = graph.request()
+            request["graph"] = graph.request() | (request_of(context, obj, target, values) if values else {})
         files.write(folder)
         tell(0.9)
         if picture is not None:
             picture.write(folder)
         if graph is not None:
             graph.write(folder)
+        if values:
+            write_copy(folder / GRAPH_FOLDER)
     return PartialExport(request, findings)
 
 
@@ -186,8 +201,8 @@ def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findin
     return findings
 
 
-def _fit_of(target: TargetShader, material: Material, fit: dict[str, Any]) -> dict[str, Any]:
-    """The fit of what the target's node has: of a Diffuse BSDF its two values."""
+def _fit_of(target: TargetShader, material: Material, fit: dict[str, Any], *, alone: bool) -> dict[str, Any]:
+    """The fit of what the target's node has: of a Diffuse BSDF its two values, `alone` or with its graph's."""
     if not target.is_diffuse:
         return fit
     if fit.get("model", "blender_principled") != "blender_principled":
@@ -196,7 +211,7 @@ def _fit_of(target: TargetShader, material: Material, fit: dict[str, Any]) -> di
     free = [name for name, socket in names.items() if not material.sockets[socket].linked]
     wanted = fit.get("parameters", "all")
     chosen = free if isinstance(wanted, str) else [name for name in wanted if name in names]
-    if not chosen:
+    if not chosen and alone:
         raise ExportError(
             "A Diffuse BSDF has Color (base_color) and Roughness (diffuse_roughness) alone, and none of them is left "
             "to fit: choose one that has no link."

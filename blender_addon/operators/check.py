@@ -13,7 +13,7 @@ from ..check import preflight
 from ..check.checks import from_export, in_order, quick_check
 from ..check.mending import KINDS, MendingError
 from ..export.job import ExportError, export_findings
-from ..properties import toggle_bound
+from ..properties import toggle_bound, toggle_node_value
 from ..running import running_job
 
 _BUTTON = {"HIDDEN", "SKIP_SAVE"}
@@ -90,6 +90,21 @@ class MFO_OT_limit_value(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MFO_OT_choose_node_value(bpy.types.Operator):
+    """Let the fit change this value of a node, or leave it as it is"""
+
+    bl_idname = "mfo.choose_node_value"
+    bl_label = "Choose Value of Node"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    name: StringProperty(options=_BUTTON)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Switch the choice."""
+        toggle_node_value(context.scene.mfo, self.name)
+        return {"FINISHED"}
+
+
 def thorough_check(context: bpy.types.Context) -> None:
     """Make the quick check and add what an export would say."""
     scene, view_layer = context.scene, context.view_layer
@@ -102,4 +117,4 @@ def thorough_check(context: bpy.types.Context) -> None:
     preflight.show_thorough(in_order(found))
 
 
-CLASSES = (MFO_OT_check, MFO_OT_mend, MFO_OT_limit_value)
+CLASSES = (MFO_OT_check, MFO_OT_mend, MFO_OT_limit_value, MFO_OT_choose_node_value)

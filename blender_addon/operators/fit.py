@@ -9,6 +9,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..backend.backend_section import needs_setup
 from ..backend.preferences import idle_seconds
+from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..result import shown_result
 from ..running import fit_queue, running_job
@@ -50,7 +51,7 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         """Export the job and start the backend or, while another fit runs, queue it; wait in background mode."""
         try:
             if not bpy.app.background:  # it loads while the job is exported
-                waiting_backend.prepare(python_of(context), idle_seconds(context))
+                waiting_backend.prepare(python_of(context), idle_seconds(context), own_blender(SERVER, []))
             fit = self.prepare(context, target_of(context, self.object), self.job_folder)
             if running_job.current is not None:
                 fit_queue.add(fit)

@@ -15,6 +15,7 @@ from ..backend.preferences import chosen_python, new_job_folder
 from ..export.job import ExportError, export_job
 from ..export.nodes.target_shader import target_shader
 from ..export.reference.reference_view import REFERENCE_VIEWS
+from ..graph_values.table import graph_values
 from ..process.backend_python import BackendPythonError
 from ..properties import chosen_of, crossed_limits
 from ..result.local_copy import unwritable
@@ -86,7 +87,7 @@ class FitOptions:
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
-        windows, chosen = context.window_manager, self._fit(settings)
+        windows, chosen = context.window_manager, self._fit(settings, obj)
         windows.progress_begin(0.0, 100.0)  # a number beside the pointer, while nothing else can be drawn
         try:
             report = export_job(
@@ -105,11 +106,11 @@ class FitOptions:
         picture = folder / report.request["reference"]["path"]
         return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
 
-    def _fit(self, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
+    def _fit(self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> dict[str, Any]:
         model = self.model or settings.model
         parameters: object = self.parameters or settings.parameter_set
         if parameters == "chosen":
-            parameters = ",".join(_chosen(settings, model))
+            parameters = ",".join([*_chosen(settings, model), *_chosen_inside(obj, settings, model)])
             if not parameters:
                 raise FitError("No parameter is chosen: choose at least one, or All.")
         if parameters not in ("all", "reduced"):
@@ -189,6 +190,14 @@ def _reference(settings: bpy.types.PropertyGroup, given: str) -> Path | bpy.type
     if not path:
         raise FitError("No reference is chosen: give the picture whose material is to be recovered.")
     return Path(bpy.path.abspath(path))
+
+
+def _chosen_inside(obj: bpy.types.Object, settings: bpy.types.PropertyGroup, model: str) -> list[str]:
+    """The chosen values inside the nodes of the object's active material, which may be another than when they were."""
+    target = target_shader(obj.active_material)
+    if model != "blender_principled" or target is None or not settings.node_values:
+        return []
+    return [value.name for value in graph_values(target) if value.name in settings.node_values]
 
 
 def _chosen(settings: bpy.types.PropertyGroup, model: str) -> list[str]:

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import bpy
 
 from ..export.nodes.target_shader import TargetShader, target_shader
+from ..graph_values.place import holder_of
+from ..graph_values.table import GraphValue, graph_values
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
 from ..running import running_job
 
@@ -39,6 +43,8 @@ class Parameters:
             target = target_shader(context.object.active_material if context.object else None)
             for key, name, *_ in SOCKET_ITEMS:
                 _draw_value(column, settings, key, name, target)
+            if target is not None:
+                _draw_nodes(layout, settings, target)
         else:
             for key, name, *_ in PARAMETER_ITEMS:
                 column.prop_enum(settings, chosen_of(settings.model), key, text=name)
@@ -71,3 +77,25 @@ def _draw_value(
         limits = layout.row(align=True)
         limits.prop(bound, "lower")
         limits.prop(bound, "upper")
+
+
+def _draw_nodes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, target: TargetShader) -> None:
+    """The values inside the nodes that feed the target's sockets, under their nodes' labels."""
+    tree = (target.groups[0] if target.groups else target.node).id_data
+    for (_, label), values in groupby(graph_values(target), lambda value: (value.place.path, value.label)):
+        box = layout.box().column(align=True)
+        box.label(text=label, icon="NODE")
+        for value in values:
+            _draw_node_value(box, settings, tree, value)
+
+
+def _draw_node_value(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, tree: bpy.types.NodeTree, value: GraphValue
+) -> None:
+    """A box that unlocks the value, its name within the node, and the value itself."""
+    split = layout.split(factor=0.6, align=True)
+    is_chosen = value.name in settings.node_values
+    text, icon = value.name.rpartition("/")[2], "CHECKBOX_HLT" if is_chosen else "LOCKED"
+    split.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen).name = value.name
+    owner, attribute = holder_of(tree, value.place)
+    split.row(align=True).prop(owner, attribute, text="", index=max(value.place.component, -1))

@@ -13,8 +13,15 @@ GROUP = "ShaderNodeGroup"
 def own_copy(material: bpy.types.Material) -> bpy.types.Material:
     """A copy of `material` whose node groups are copies too, so that a change in them is seen nowhere else."""
     copy = material.copy()
-    _own_groups(copy.node_tree)
+    own_groups(copy.node_tree)
     return copy
+
+
+def variant_of(tree: bpy.types.NodeTree) -> bpy.types.NodeTree:
+    """A copy of a material's tree for a group node in another one, with which `remove_copy` takes it away."""
+    variant = tree.copy()
+    own_groups(variant)
+    return variant
 
 
 def remove_copy(material: bpy.types.Material) -> None:
@@ -42,11 +49,12 @@ def nodes_of(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
             yield from nodes_of(node.node_tree)
 
 
-def _own_groups(tree: bpy.types.NodeTree) -> None:
+def own_groups(tree: bpy.types.NodeTree) -> None:
+    """Give a tree copies of the groups in it, to any depth."""
     for node in tree.nodes:
         if node.bl_idname == GROUP and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
-            _own_groups(node.node_tree)
+            own_groups(node.node_tree)
 
 
 def _groups_in(tree: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTree]:

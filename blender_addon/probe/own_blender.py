@@ -10,6 +10,8 @@ import bpy
 
 from ..versions import is_module
 
+SERVER = "probe.server"  # the module that evaluates nodes
+
 
 def own_blender(module: str, arguments: list[str]) -> list[str]:
     """The command line that runs a module of this package, ``"probe.server"``, in a Blender of this version."""

@@ -26,6 +26,7 @@ Command = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 # a command is a function of a request in a module beside this folder; it leaves the open file as it found it
 COMMANDS = {
     "sockets": ("probe.socket_pictures", "answer"),
+    "values": ("probe.value_pictures", "answer"),
     "world": ("bake.requests", "world"),
     "surfaces": ("bake.requests", "surfaces"),
     "paint": ("bake.requests", "paint"),
@@ -41,17 +42,19 @@ def main(arguments: Sequence[str]) -> int:
     """Open the file and answer until stdin ends; returns the exit code."""
     parser = argparse.ArgumentParser(prog="probe")
     parser.add_argument("file", type=Path, help="the copy; its folder belongs to this process")
+    parser.add_argument("--folder", type=Path, help="belongs to this process instead, and the copy does not")
     parser.add_argument("--parent", type=int, default=0, help="end when this process is not the parent any more")
     chosen = parser.parse_args(arguments)
     stream = _take_stdout()
-    _watch_parent(chosen.parent, chosen.file.parent)
+    folder = chosen.folder or chosen.file.parent
+    _watch_parent(chosen.parent, folder)
     try:
         _say(stream, _open(chosen.file))
         for line in sys.stdin:
             if line.strip():
                 _say(stream, _answer(line))
     finally:
-        shutil.rmtree(chosen.file.parent, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
     return 0
 
 

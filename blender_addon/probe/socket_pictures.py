@@ -7,6 +7,7 @@ Cycles evaluates the nodes itself: a copy of the material writes each socket's v
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from ..export.images.color_space import to_rec709
 from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
-from .aov_render import frame_of, render_outputs, world_to_frame
+from .aov_render import Frame, frame_of, render_outputs, world_to_frame
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
 from .server import ProbeRequestError
 
@@ -39,28 +40,17 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     ProbeRequestError
         If the camera does not see the target, or Blender cannot render.
     """
-    scene = bpy.data.scenes[request["scene"]]
-    layer = scene.view_layers[request["layer"]]
-    if bpy.context.window is not None:
-        bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
-    obj = scene.objects[request["object"]]
-    slot = obj.material_slots[request["slot"]]
-    material, was_link = slot.material, slot.link
+    target = Target.of(request)
+    scene, obj, material = target.scene, target.obj, target.material
     copy = own_copy(material)
     try:
-        kinds = _write_outputs(copy, request["node"], request["sockets"])
+        make_opaque(copy)
+        kinds = write_outputs(copy.node_tree, request["node"], {name: f"mfo {name}" for name in request["sockets"]})
         wanted = [*((f"mfo {name}", kind != "VALUE") for name, kind in kinds.items()), (MASK, False), (POSITION, True)]
         frame = frame_of(scene, obj, request["scale"], len(wanted))
-        _widen_bumps(copy.node_tree, frame.scale)
-        slot.link = "OBJECT"  # the mesh may belong to other objects too
-        slot.material = copy
-        try:
-            found = render_outputs(scene, layer, wanted, frame, request["samples"]).values
-        except RuntimeError as error:
-            raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{material.name}': {error}") from error
+        widen_bumps(copy.node_tree, frame.scale)
+        found = target.outputs(copy, wanted, frame, request["samples"])
     finally:
-        slot.material = material
-        slot.link = was_link
         remove_copy(copy)
     mask = found[MASK]
     seen = mask[..., 0] > SEEN
@@ -69,7 +59,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     folder = Path(request["folder"])
     files, means = {}, {}
     for number, (name, kind) in enumerate(kinds.items()):
-        values = _cleaned(found[f"mfo {name}"] / np.maximum(mask, SEEN), seen, name, kind)
+        values = cleaned(found[f"mfo {name}"] / np.maximum(mask, SEEN), seen, name, kind)
         files[name] = f"socket_{number:02d}.npy"
         np.save(folder / files[name], values)
         means[name] = values[seen].mean(axis=0, dtype=np.float64).tolist()
@@ -79,21 +69,52 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     return {"files": files, "means": means, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
 
 
-def _write_outputs(copy: bpy.types.Material, path: list[str], sockets: list[str]) -> dict[str, str]:
-    """Put output nodes on the sockets of a copied material and make it opaque; returns the sockets' types."""
+@dataclass(frozen=True)
+class Target:
+    """The slot of an object whose material is looked at."""
+
+    scene: bpy.types.Scene
+    layer: bpy.types.ViewLayer
+    obj: bpy.types.Object
+    slot: bpy.types.MaterialSlot
+
+    @staticmethod
+    def of(request: Mapping[str, Any]) -> Target:
+        """That of a request's `scene`, `layer`, `object` and `slot`, which are the window's from now on."""
+        scene = bpy.data.scenes[request["scene"]]
+        layer = scene.view_layers[request["layer"]]
+        if bpy.context.window is not None:
+            bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
+        obj = scene.objects[request["object"]]
+        return Target(scene, layer, obj, obj.material_slots[request["slot"]])
+
+    @property
+    def material(self) -> bpy.types.Material:
+        """The material that is looked at."""
+        return self.slot.material
+
+    def outputs(
+        self, copy: bpy.types.Material, wanted: list[tuple[str, bool]], frame: Frame, samples: int
+    ) -> dict[str, NDArray[np.float32]]:
+        """What Cycles writes into the outputs of `copy`, which stands in for the material meanwhile."""
+        material, was_link = self.slot.material, self.slot.link
+        try:
+            self.slot.link = "OBJECT"  # the mesh may belong to other objects too
+            self.slot.material = copy
+            return render_outputs(self.scene, self.layer, wanted, frame, samples).values
+        except RuntimeError as error:
+            raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{material.name}': {error}") from error
+        finally:
+            self.slot.material = material
+            self.slot.link = was_link
+
+
+def make_opaque(copy: bpy.types.Material) -> None:
+    """Give a copied material a surface of its own, without the user's outputs and with those for mask and position."""
     tree = copy.node_tree
     for node in list(nodes_of(tree)):
         if node.bl_idname == "ShaderNodeOutputAOV":  # the user's own, perhaps of the same name
             node.id_data.nodes.remove(node)
-    inner, shader = node_at(tree, path)
-    kinds = {}
-    for name in sockets:
-        socket = shader.inputs[name]
-        source = source_of(socket)
-        if source is None:
-            raise ProbeRequestError(f"{name} of '{shader.name}' has no link any more.")
-        kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type
-        _output(inner, f"mfo {name}", source, kinds[name] != "VALUE")
     one = tree.nodes.new("ShaderNodeValue")
     one.outputs[0].default_value = 1.0
     _output(tree, MASK, one.outputs[0], False)
@@ -105,6 +126,19 @@ def _write_outputs(copy: bpy.types.Material, path: list[str], sockets: list[str]
     tree.links.new(grey.outputs[0], output.inputs["Surface"])
     for link in list(output.inputs["Volume"].links):
         tree.links.remove(link)
+
+
+def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[str, str]) -> dict[str, str]:
+    """Put an output node of the given name on each of a shader's sockets; returns the sockets' types."""
+    inner, shader = node_at(tree, path)
+    kinds = {}
+    for name, output in outputs.items():
+        socket = shader.inputs[name]
+        source = source_of(socket)
+        if source is None:
+            raise ProbeRequestError(f"{name} of '{shader.name}' has no link any more.")
+        kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type
+        _output(inner, output, source, kinds[name] != "VALUE")
     return kinds
 
 
@@ -114,7 +148,7 @@ def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, i
     tree.links.new(source, node.inputs["Color" if is_color else "Value"])
 
 
-def _widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
+def widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
     """Let Bump nodes take their differences over the width of a pixel, which is `scale` subpixels."""
     for node in nodes_of(tree):
         width = node.inputs.get("Filter Width") if node.bl_idname == "ShaderNodeBump" else None
@@ -122,7 +156,7 @@ def _widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
             width.default_value *= scale
 
 
-def _cleaned(values: NDArray[np.float32], seen: NDArray[np.bool_], name: str, kind: str) -> NDArray[np.float32]:
+def cleaned(values: NDArray[np.float32], seen: NDArray[np.bool_], name: str, kind: str) -> NDArray[np.float32]:
     """Finite values; colours of the working space as linear Rec.709, directions at unit length."""
     finite = np.where(seen[..., None] & np.isfinite(values), values, 0.0).astype(np.float64)
     if kind == "RGBA":

@@ -12,6 +12,7 @@ import os
 import subprocess
 import threading
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 
 from .backend_python import EXTENSION_ROOT, backend_environment
@@ -35,6 +36,8 @@ class BackendProcess:
         Interpreter of the backend.
     job
         Job folder with request.json; stderr goes to backend.log in it.
+    blender
+        Command line of the Blender that evaluates nodes while values inside them are fitted.
     wait
         Instead: seconds to wait for a job that `give` names.
     root
@@ -47,7 +50,13 @@ class BackendProcess:
     """
 
     def __init__(
-        self, python: Path, job: Path | None = None, *, wait: float = 0.0, root: Path = EXTENSION_ROOT
+        self,
+        python: Path,
+        job: Path | None = None,
+        *,
+        blender: Sequence[str] = (),
+        wait: float = 0.0,
+        root: Path = EXTENSION_ROOT,
     ) -> None:
         self.python, self.root = python, root
         self.lock = threading.Lock()
@@ -58,6 +67,8 @@ class BackendProcess:
         self._newest: dict[str, Event] = {}
         what = [str(job)] if job is not None else ["--wait", f"{wait:.0f}"]
         command = [str(python), "-m", "mfo_backend", "run", *what, "--progress", "json", "--control", "stdin"]
+        if blender:
+            command += ["--blender-server", json.dumps(list(blender))]
         with open(job / LOG if job is not None else os.devnull, "wb") as log:
             self.process = subprocess.Popen(
                 [*command, "--parent", str(os.getpid())],

@@ -10,6 +10,7 @@ import contextlib
 import os
 import signal
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,6 +53,8 @@ class JobProcess:
         Interpreter of the backend.
     folder
         Job folder with request.json; stderr goes to backend.log in it.
+    blender
+        Command line of the Blender that evaluates nodes while values inside them are fitted.
     root
         Folder that holds the package `mfo_backend`.
     waiting
@@ -64,16 +67,23 @@ class JobProcess:
     """
 
     def __init__(
-        self, python: Path, folder: Path, *, root: Path = EXTENSION_ROOT, waiting: BackendProcess | None = None
+        self,
+        python: Path,
+        folder: Path,
+        *,
+        blender: Sequence[str] = (),
+        root: Path = EXTENSION_ROOT,
+        waiting: BackendProcess | None = None,
     ) -> None:
         self.folder = folder
         self.outcome: Outcome | None = None
         self._deadlines: list[tuple[float, int]] = []
         self._cancelled = False
         self._exit_seen: float | None = None
+        self._blender = tuple(blender)
         if waiting is not None:
             waiting.give(folder)
-        self.backend = waiting or BackendProcess(python, folder, root=root)
+        self.backend = waiting or BackendProcess(python, folder, blender=self._blender, root=root)
 
     @property
     def pid(self) -> int:
@@ -125,7 +135,9 @@ class JobProcess:
         self.backend.release()
         self._exit_seen = None
         try:
-            self.backend = BackendProcess(self.backend.python, self.folder, root=self.backend.root)
+            self.backend = BackendProcess(
+                self.backend.python, self.folder, blender=self._blender, root=self.backend.root
+            )
         except OSError as error:
             sentence = f"The backend could not be started with {self.backend.python} ({error.strerror or error})."
             self.outcome = Outcome("failed", sentence)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 
 from .backend_process import BackendProcess
@@ -15,15 +16,18 @@ from .backend_process import BackendProcess
 _waiting: BackendProcess | None = None
 
 
-def prepare(python: Path, seconds: float) -> None:
-    """Have a backend of this interpreter wait for so long, unless one does; 0 seconds: none is to wait."""
+def prepare(python: Path, seconds: float, blender: Sequence[str] = ()) -> None:
+    """Have a backend of this interpreter wait for so long, unless one does; 0 seconds: none is to wait.
+
+    `blender` is the command line of the Blender that evaluates nodes for it.
+    """
     global _waiting
     if _waiting is not None and _waiting.is_alive and _waiting.python == python and seconds > 0.0:
         return
     close()
     if seconds > 0.0:
         with contextlib.suppress(OSError):  # the fit itself will say it
-            _waiting = BackendProcess(python, wait=seconds)
+            _waiting = BackendProcess(python, blender=blender, wait=seconds)
             atexit.register(close)
 
 

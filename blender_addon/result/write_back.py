@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recovered values onto a Principled node and the original ones back; links and node graph stay as they are."""
+"""Recovered values onto a shader and into its nodes, and the original ones back; links and nodes stay as they are."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ..export.materials.principled_mapping import mitsuba_to_sockets
 from ..export.nodes.target_shader import TargetShader, make_own, target_shader
-from ..versions import working_space_to_rec709
-from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_of, key_here, left_note, remove_driver
+from ..graph_values.own_groups import make_groups_own
+from ..graph_values.place import INPUT, Place, as_held, held, hold, holder_of
+from ..graph_values.table import graph_values
+from ..versions import node_tree_of
+from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_at, key_here, left_note, remove_driver
 from .job_result import JobResult, Value
 from .local_copy import unwritable
 
@@ -50,6 +53,7 @@ def result_to_sockets(result: JobResult) -> dict[str, Value]:
         return dict(mitsuba_to_sockets(result.recovered, result.sockets_start))
     if result.model == "blender_principled":
         names = {socket_to_parameter(name): name for name in result.sockets_start}
+        names |= {name: name for name in result.recovered if "/" in name}  # values inside nodes
         unknown = [name for name in result.recovered if name not in names]
         if unknown:
             raise WriteBackError(
@@ -60,8 +64,8 @@ def result_to_sockets(result: JobResult) -> dict[str, Value]:
 
 
 def socket_to_parameter(socket_name: str) -> str:
-    """The parameter name of a socket: ``Coat Roughness`` is ``coat_roughness``."""
-    return socket_name.lower().replace(" ", "_")
+    """The parameter name of a socket: ``Coat Roughness`` is ``coat_roughness``. Values of nodes keep their names."""
+    return socket_name if "/" in socket_name else socket_name.lower().replace(" ", "_")
 
 
 def apply_values(
@@ -80,33 +84,36 @@ def apply_values(
     """
     if unwritable(material):
         raise WriteBackError(unwritable(material))
-    target, kept = fitted_shader(material), material.mfo
-    notes, changes, moved = [], {}, animation_of(target.sockets)
+    kept, slots = material.mfo, _slots(material)
+    moved = animation_at({name: slot.holder for name, slot in slots.items() if not slot.is_linked})
+    notes, changes = [], {}
     for name, value in values.items():
-        socket = target.sockets.get(name)
-        if socket is None:
+        slot = slots.get(name)
+        if slot is None and "/" in name:
+            notes.append(f"{name} is not among the nodes any more and was skipped.")
+        elif slot is None:
             notes.append(f"{name} does not exist in this Blender version and was skipped.")
-        elif socket.is_linked:
-            notes.append(f"{target.own_name(name)} has a link and was left as it is.")
+        elif slot.is_linked:
+            notes.append(f"{slot.label} has a link and was left as it is.")
         elif name in moved and animated != REPLACE:
-            notes.append(left_note(target.own_name(name), moved[name]))
+            notes.append(left_note(slot.label, moved[name]))
         else:
-            changes[name] = _fitting(socket, value)
+            changes[name] = slot.fitting(value)
     if kept.shows_original:
         toggle_values(material)  # so that what is kept as the original stays apart from what was applied
-    notes += make_own(material, changes)
-    sockets = fitted_shader(material).sockets
+    notes += _make_own(material, changes)
+    slots = _slots(material)
     for name, value in changes.items():
-        socket = sockets[name]
+        slot = slots[name]
         if name not in kept.originals:
-            keep_value(kept.originals, name, socket.default_value)
+            keep_value(kept.originals, name, slot.kept)
         if moved.get(name) == DRIVER:
-            remove_driver(socket)
-            notes.append(f"The driver of {socket.name} was removed.")
-        _set(socket, value, moved.get(name))
+            remove_driver(*slot.holder)
+            notes.append(f"The driver of {slot.label} was removed.")
+        slot.set(value, moved.get(name))
         if moved.get(name) == KEYFRAMES:
-            notes.append(f"{socket.name} got a key at the current frame; its other keys stay.")
-        keep_value(kept.applied, name, socket.default_value)
+            notes.append(f"{slot.label} got a key at the current frame; its other keys stay.")
+        keep_value(kept.applied, name, slot.kept)
     kept.job_folder = str(folder)
     return notes
 
@@ -116,12 +123,12 @@ def toggle_values(material: bpy.types.Material) -> list[str]:
 
     Returns what could not be set.
     """
-    kept, sockets = material.mfo, fitted_shader(material).sockets
+    kept, slots = material.mfo, _slots(material)
     left, entered = (kept.originals, kept.applied) if kept.shows_original else (kept.applied, kept.originals)
     for value in left:
-        socket = sockets.get(value.name)
-        if socket is not None and value.size == len(_numbers(socket)):
-            keep_value(left, value.name, socket.default_value)
+        slot = slots.get(value.name)
+        if slot is not None and value.size == len(slot.numbers):
+            keep_value(left, value.name, slot.kept)
     kept.shows_original = not kept.shows_original
     return _restore(material, entered)
 
@@ -152,43 +159,93 @@ def kept_value(entry: bpy.types.PropertyGroup) -> Value:
 
 def _restore(material: bpy.types.Material, values: bpy.types.bpy_prop_collection) -> list[str]:
     fitted_shader(material)
-    notes = make_own(material, [entry.name for entry in values])  # shared again, by a copy of the material
-    sockets = fitted_shader(material).sockets
-    moved = animation_of(sockets)
+    notes = _make_own(material, [entry.name for entry in values])  # shared again, by a copy of the material
+    slots = _slots(material)
+    moved = animation_at({name: slot.holder for name, slot in slots.items() if not slot.is_linked})
     for entry in values:
-        socket = sockets.get(entry.name)
-        if socket is None:
+        slot = slots.get(entry.name)
+        if slot is None:
             notes.append(f"{entry.name} does not exist any more and was skipped.")
-        elif entry.size != len(_numbers(socket)):  # it became another kind of socket, or the file was tampered with
+        elif entry.size != len(slot.numbers):  # it became another kind of socket, or the file was tampered with
             notes.append(f"{entry.name} was kept as {entry.size} numbers and could not be set.")
         else:
-            _set(socket, kept_value(entry), moved.get(entry.name))
+            slot.set(kept_value(entry), moved.get(entry.name))
     return notes
 
 
-def _set(socket: bpy.types.NodeSocket, value: Value, animation: str | None) -> None:
-    """Set a socket's value and, where it has keyframes, put a key, without which the next frame takes it away."""
-    socket.default_value = value
-    if animation == KEYFRAMES and not key_here(socket):
-        raise WriteBackError(f"No key can be put for {socket.name}: its action cannot be changed, make it local first.")
+def _make_own(material: bpy.types.Material, names: Collection[str]) -> list[str]:
+    """Give the material copies of the groups that hold these values and are used elsewhere."""
+    notes = make_own(material, [name for name in names if "/" not in name])
+    if not any("/" in name for name in names):
+        return notes
+    places = [value.place for value in graph_values(fitted_shader(material)) if value.name in names]
+    return notes + make_groups_own(material, places)
 
 
-def _numbers(socket: bpy.types.NodeSocket) -> tuple[float, ...]:
-    value = getattr(socket, "default_value", ())  # a shader socket has none
-    return (value,) if isinstance(value, (int, float)) else tuple(value)
+@dataclass(frozen=True)
+class _Slot:
+    """Where a value goes: a socket of the target's shader, or a place inside its nodes."""
+
+    tree: bpy.types.NodeTree
+    place: Place
+    label: str
+    is_linked: bool
+
+    @property
+    def holder(self) -> tuple[Any, str]:
+        """What holds the value, and the name of the attribute."""
+        return holder_of(self.tree, self.place)
+
+    @property
+    def kept(self) -> Value:
+        """The number or numbers as they are held."""
+        return held(self.tree, self.place) if hasattr(*self.holder) else ()  # a shader socket has none
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The same, always several."""
+        kept = self.kept
+        return kept if isinstance(kept, tuple) else (kept,)
+
+    def set(self, value: Value, animation: str | None) -> None:
+        """Set the value and, where it has keyframes, put a key, without which the next frame takes it away."""
+        hold(self.tree, self.place, value)
+        if animation == KEYFRAMES and not key_here(*self.holder):
+            raise WriteBackError(
+                f"No key can be put for {self.label}: its action cannot be changed, make it local first."
+            )
+
+    def fitting(self, value: Value) -> Value:
+        """The value, linear Rec.709, as it is held: a number, or as many as there are."""
+        numbers, given = self.numbers, value if isinstance(value, tuple) else (value,)
+        allowed = (3, 4) if self.is_color else (len(numbers),)
+        if self.place.is_grey:
+            allowed = (1,)
+        if len(given) not in allowed:
+            raise WriteBackError(
+                f"The result has {len(given)} numbers for {self.label}, which holds {len(numbers)}: run the fit again."
+            )
+        if not self.is_color:
+            return given if len(numbers) > 1 else given[0]
+        return as_held(self.tree, self.place, given)
+
+    @property
+    def is_color(self) -> bool:
+        """Whether it holds a colour with its alpha."""
+        owner, attribute = self.holder
+        return attribute == "color" or getattr(owner, "type", "") == "RGBA"
 
 
-def _fitting(socket: bpy.types.NodeSocket, value: Value) -> Value:
-    """The value as the socket takes it: a number, or as many as it has."""
-    held = _numbers(socket)
-    given = value if isinstance(value, tuple) else (value,)
-    is_color = socket.type == "RGBA"
-    if len(given) not in ((3, 4) if is_color else (len(held),)):
-        raise WriteBackError(
-            f"The result has {len(given)} numbers for {socket.name}, which holds {len(held)}: run the fit again."
-        )
-    if not is_color:
-        return given if len(held) > 1 else given[0]
-    matrix = working_space_to_rec709()
-    color = np.array(given[:3]) if matrix is None else np.linalg.solve(matrix, given[:3])
-    return (*map(float, color), held[3])
+def _slots(material: bpy.types.Material) -> dict[str, _Slot]:
+    """Where each value of the material is: sockets of its shader by their names, values inside its nodes by theirs."""
+    target = fitted_shader(material)
+    tree = node_tree_of(material)
+    assert tree is not None  # it holds the target
+    slots = {}
+    for name, found in target.places.items():
+        path = (*(group.name for group in found.groups), found.socket.node.name)
+        place = Place(path, INPUT, found.socket.identifier)
+        slots[name] = _Slot(tree, place, target.own_name(name), found.socket.is_linked)
+    for value in graph_values(target):
+        slots[value.name] = _Slot(tree, value.place, value.name, False)
+    return slots

@@ -19,6 +19,7 @@ import bpy
 
 from ..backend.preferences import idle_seconds
 from ..check.preflight import redraw
+from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..process.job_process import JobProcess, Outcome
 from ..process.progress_lines import Event
@@ -61,7 +62,15 @@ def start(fit: PreparedFit, *, timer: bool) -> None:
         If the backend cannot be started.
     """
     global current
-    current = RunningJob(JobProcess(fit.python, fit.folder, waiting=waiting_backend.take(fit.python)), fit)
+    current = RunningJob(
+        JobProcess(
+            fit.python,
+            fit.folder,
+            blender=own_blender(SERVER, []),
+            waiting=waiting_backend.take(fit.python),
+        ),
+        fit,
+    )
     atexit.register(close)
     runtime = _runtime()
     shown_result.clear(runtime)
@@ -248,7 +257,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     if bpy.app.background:
         record_results()
     else:
-        waiting_backend.prepare(job.fit.python, idle_seconds(bpy.context))
+        waiting_backend.prepare(job.fit.python, idle_seconds(bpy.context), own_blender(SERVER, []))
     redraw()
 
 

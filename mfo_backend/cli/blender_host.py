@@ -19,6 +19,8 @@ from ..types.status import Status
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "blender_addon" / "headless.py"
+NODE_SERVER = ROOT / "blender_addon" / "probe" / "server.py"
+MODULE = "blender_addon.headless"
 ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
 
@@ -28,6 +30,14 @@ class BlenderHost:
 
     name: str
     command: tuple[str, ...]
+
+    @property
+    def node_server(self) -> tuple[str, ...]:
+        """The command line of the add-on's `probe/server.py`, before its own arguments."""
+        return tuple(
+            str(NODE_SERVER) if word == str(SCRIPT) else "blender_addon.probe.server" if word == MODULE else word
+            for word in self.command
+        )
 
     def call(self, *arguments: str | Path) -> Mapping[str, Any]:
         """Run one command of `headless.py` and return the JSON object it answers.
@@ -62,7 +72,7 @@ def find_blender_host(program: str | None = None) -> BlenderHost:
         raise SetupError(f"The add-on is missing: {SCRIPT} does not exist; use a checkout or the unpacked extension.")
     program = program or os.environ.get("MFO_BLENDER", "").split(os.pathsep)[0]
     if not program and importlib.util.find_spec("bpy"):
-        return BlenderHost("The bpy module", (sys.executable, "-m", "blender_addon.headless"))
+        return BlenderHost("The bpy module", (sys.executable, "-m", MODULE))
     path = shutil.which(program or "blender")
     if path is None:
         raise SetupError(

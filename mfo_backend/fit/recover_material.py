@@ -121,6 +121,8 @@ def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Itera
         return
     if ours is not None:
         yield lambda: RecordedRoute(task, ours, plan), lambda stages: ""
+        if ours.graph is not None:  # no other way has the slopes of values inside nodes
+            return
         if settings.losses is None:
             yield (
                 lambda: TracedRoute(task, ours),

@@ -75,17 +75,17 @@ class ParameterTable(Sequence[Parameter]):
     @property
     def slope_upper(self) -> NDArray[np.float64]:
         """The largest values at which the renderer's gradient is defined, shape (length,); infinite without limit."""
-        return np.concatenate([np.full(p.size, p.slope_upper) for p in self._parameters])
+        return np.concatenate([np.zeros(0), *(np.full(p.size, p.slope_upper) for p in self._parameters)])
 
     @property
     def lower(self) -> NDArray[np.float64]:
         """Lower bounds, shape (length,)."""
-        return np.concatenate([np.full(p.size, p.lower) for p in self._parameters])
+        return np.concatenate([np.zeros(0), *(np.full(p.size, p.lower) for p in self._parameters)])
 
     @property
     def upper(self) -> NDArray[np.float64]:
         """Upper bounds, shape (length,)."""
-        return np.concatenate([np.full(p.size, p.upper) for p in self._parameters])
+        return np.concatenate([np.zeros(0), *(np.full(p.size, p.upper) for p in self._parameters)])
 
     def slice_of(self, name: str) -> slice:
         """Entries of the vector that hold `name`."""
@@ -119,7 +119,7 @@ class ParameterTable(Sequence[Parameter]):
     def pack(self, values: Mapping[str, Value]) -> NDArray[np.float64]:
         """One vector of shape (length,) from a value per name; missing names take their default."""
         parts = [np.broadcast_to(np.asarray(values.get(p.name, p.default), float), (p.size,)) for p in self._parameters]
-        return np.concatenate(parts)
+        return np.concatenate([np.zeros(0), *parts])
 
     def unpack(self, vector: NDArray[np.float64]) -> dict[str, Value]:
         """The inverse of `pack`: floats for scalars, tuples for colours."""

@@ -48,7 +48,7 @@ def narrowed(table: ParameterTable, bounds: Mapping[str, tuple[float, float]]) -
     """
     kept = []
     for parameter in table:
-        lower, upper = bounds.get(parameter.name, (parameter.lower, parameter.upper))
+        lower, upper = bounds.get(parameter_name(parameter.name), (parameter.lower, parameter.upper))
         low, high = max(lower, parameter.lower), min(upper, parameter.upper)
         if high - low < _NARROWEST * (parameter.upper - parameter.lower):
             raise BadInputError(

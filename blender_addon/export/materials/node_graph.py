@@ -44,8 +44,10 @@ class NodeGraph:
 
 
 @contextmanager
-def probe_for(obj: bpy.types.Object | None) -> Iterator[Probe | None]:
+def probe_for(obj: bpy.types.Object | None, *, always: bool = False) -> Iterator[Probe | None]:
     """A second Blender where the active material of `obj` needs one, started beside what the caller does next.
+
+    `always` says that values of its graph are fitted, so that one is needed whatever the graph is.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def probe_for(obj: bpy.types.Object | None) -> Iterator[Probe | None]:
         yield None
         return
     described = read_target(material, obj.name, slot, Findings())
-    if described is None or not names_by_graph(described):
+    if described is None or not (always or names_by_graph(described)):
         yield None
         return
     try:

@@ -38,7 +38,7 @@ def _problem_upstream(
         if place in seen:
             continue
         problem = _problem(node, is_copied)
-        for further, within in _feeding(node, output, groups):
+        for further, within in feeding(node, output, groups):
             problem = problem or _problem_upstream(further, within, (*path, place), seen, is_copied)
         if problem is not None:
             return problem
@@ -46,7 +46,7 @@ def _problem_upstream(
     return None
 
 
-def _feeding(
+def feeding(
     node: bpy.types.Node, output: bpy.types.NodeSocket, groups: _Groups
 ) -> Iterator[tuple[bpy.types.NodeSocket, _Groups]]:
     """The sockets that an output depends on, and the groups they are in."""

@@ -78,7 +78,7 @@ class TargetShader:
     def shared_group(self, names: Collection[str]) -> bpy.types.NodeTree | None:
         """The outermost group in which new values for `names` would change something else too."""
         trees = [group.node_tree for group in self.groups[: self.depth_of(names)]]
-        return next((tree for tree in trees if _is_shared(tree)), None)
+        return next((tree for tree in trees if is_shared(tree)), None)
 
     def _place(self, name: str, socket: bpy.types.NodeSocket) -> Place:
         groups = self.groups
@@ -120,7 +120,7 @@ def make_own(material: bpy.types.Material, names: Collection[str]) -> list[str]:
     assert tree is not None  # it holds the target
     for step in target.path[: target.depth_of(names)]:
         group = tree.nodes[step]
-        if _is_shared(group.node_tree):  # by now also what lies in a group that was just copied
+        if is_shared(group.node_tree):  # by now also what lies in a group that was just copied
             group.node_tree = group.node_tree.copy()
         tree = group.node_tree
     return [f"The group '{name}' is used elsewhere too: material '{material.name}' got a copy of its own."]
@@ -146,7 +146,8 @@ def _sole_input(socket: bpy.types.NodeSocket, group: bpy.types.Node) -> bpy.type
     return None
 
 
-def _is_shared(tree: bpy.types.NodeTree) -> bool:
+def is_shared(tree: bpy.types.NodeTree) -> bool:
+    """Whether a group is used elsewhere too, so that a change in it would be seen there."""
     return tree.library is not None or tree.users - int(tree.use_fake_user) > 1
 
 

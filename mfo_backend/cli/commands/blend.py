@@ -8,6 +8,7 @@ import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -181,7 +182,7 @@ def fit_blend(
         *(["--will-apply"] if will_apply else []),
         *(["--make-local"] if make_local else []),
     )
-    done = run_folder(job, fit_scene, is_new=is_new)
+    done = run_folder(job, partial(fit_scene, blender=host.node_server), is_new=is_new)
     if done.result is None:
         raise _ERRORS.get(done.status, MfoError)(done.sentence)
     return BlendFit(job, done.result)

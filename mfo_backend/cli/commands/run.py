@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import sys
 from collections.abc import Callable
@@ -39,6 +40,14 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("--parent", type=int, metavar="PID", help="stop when this process is gone")
     parser.add_argument("--control", choices=("stdin",), help="read commands from stdin and stop at its end")
+    parser.add_argument(
+        "--blender-server",
+        type=_words,
+        default=(),
+        metavar="JSON",
+        help="command line, as a list, of a Blender with the add-on's probe/server.py: it evaluates the nodes while "
+        "values inside them are fitted",
+    )
     add_trust_option(parser)
     parser.set_defaults(func=run)
 
@@ -48,6 +57,14 @@ def add_trust_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--trust", action="store_true", help="take meshes and textures that Mitsuba reads unchecked (OBJ, PNG, ...)"
     )
+
+
+def _words(text: str) -> tuple[str, ...]:
+    """A command line as a JSON list."""
+    words = json.loads(text)
+    if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+        raise ValueError(text)
+    return tuple(words)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -15,6 +15,7 @@ from ...types.image import Encoding
 from ...types.light_paths import NO_LIMIT, LightPaths
 from .checked_object import CheckedObject, is_number, shown
 from .graph_files import check_graph_files
+from .graph_request import NodeGraph, graph_from_json, graph_to_json
 from .job_folder import JobFolder
 from .scene_files import check_scene_files
 
@@ -51,15 +52,6 @@ class Socket:
     linked: bool = False
     texture: str | None = None
     graph: str | None = None
-
-
-@dataclass(frozen=True)
-class NodeGraph:
-    """How the target's `graph` files are seen: the (3, 4) matrix from the world to column, row and 1, and the file of
-    world positions."""
-
-    camera: tuple[tuple[float, ...], ...]
-    positions: str
 
 
 @dataclass(frozen=True)
@@ -189,7 +181,7 @@ def request_from_json(data: Any) -> Request:
         light_paths=_light_paths(top.raw("light_paths", None)),
         film_exposure=top.number("film_exposure", 1e-6, 1e6, 1.0),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
-        graph=_graph(top.raw("graph", None)),
+        graph=graph_from_json(top.raw("graph", None), WHERE),
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
         generator=_generator(top.mapping("generator", {})),
@@ -252,7 +244,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "light_paths": asdict(request.light_paths) if request.light_paths is not None else None,
         "film_exposure": request.film_exposure,
         "materials": materials,
-        "graph": asdict(request.graph) if request.graph is not None else None,
+        "graph": graph_to_json(request.graph),
         "fit": asdict(request.fit),
         "notes": list(request.notes),
         **({"picture": asdict(request.picture)} if request.picture != Picture() else {}),
@@ -297,19 +289,6 @@ def _material(bsdf_id: str, data: Any) -> Material:
         sockets=sockets,
         subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
     )
-
-
-def _graph(data: Any) -> NodeGraph | None:
-    if data is None:
-        return None
-    graph = CheckedObject(data, f"{WHERE}: graph", ("camera", "positions"))
-    rows = graph.raw("camera")
-    if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
-        raise graph.wrong("camera", "three rows of four numbers")
-    for row in rows:
-        if not (isinstance(row, (list, tuple)) and len(row) == 4 and all(map(is_number, row))):
-            raise graph.wrong("camera", "three rows of four numbers")
-    return NodeGraph(tuple(tuple(float(number) for number in row) for row in rows), graph.text("positions"))
 
 
 def _fit(data: Any) -> FitSettings:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.display.tone_mapping import View
+from ...render.models.graph_pictures import GraphPictures
 from ...render.sheet.contact_sheet import ContactSheet
 from ...types.errors import UnrecordableError
 from ...types.event import Event, Listener, Preview
@@ -22,6 +23,7 @@ from ...types.result import FitResult
 from ...types.status import Status
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request, request_to_json
+from .graph_blender import evaluated_graph
 from .material_classes import (
     MaterialClass,
     brightest_glow,
@@ -124,25 +126,41 @@ def fit_scene(
     listener: Listener,
     should_stop: Callable[[], bool],
     more: Sequence[JobPicture] = (),
+    blender: Sequence[str] = (),
 ) -> JobOutcome:
     """Fit the material of the request's target with Mitsuba, to `more` pictures of it at once where there are some.
+
+    `blender` is the command line of the Blender that evaluates the target's nodes while values inside them are fitted.
 
     Raises
     ------
     BadInputError
-        If the scene, the target or a parameter cannot be used.
+        If the scene, the target or a parameter cannot be used, or values inside nodes are all that is to be fitted and
+        there is no Blender.
     SetupError
         If Mitsuba or LLVM is missing.
     Interrupted
         If it was asked to stop before there was anything to keep.
     """
+    pictures = [JobPicture(folder, request, reference, view), *more]
+    with evaluated_graph(folder, request, () if more else blender) as (graph, notes):
+        return _fit_scene(pictures, graph, notes, listener, should_stop)
+
+
+def _fit_scene(
+    pictures: Sequence[JobPicture],
+    graph: GraphPictures | None,
+    notes: tuple[str, ...],
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> JobOutcome:
+    request, reference, view = pictures[0].request, pictures[0].reference, pictures[0].view
     variant = load_native_code()
     from ...fit.pictures.one_sheet import SheetTask, one_sheet
     from ...fit.recover_material import recover_material
     from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
     from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
-    pictures = [JobPicture(folder, request, reference, view), *more]
     target, fit_of = request.target.bsdf_id, request.fit
     all_materials = [request_materials(picture.folder, picture.request) for picture in pictures]
     first = all_materials[0]
@@ -150,7 +168,11 @@ def fit_scene(
         if target in others:
             others[target] = of_one_material(first.get(target), others[target])
 
-    def load(change: Callable[[Any], Any], parameters: str | Sequence[str]) -> list[MitsubaRenderer]:
+    inside = () if graph is None else graph.table.names
+
+    def load(
+        change: Callable[[Any], Any], parameters: str | Sequence[str], graph: GraphPictures | None = graph
+    ) -> list[MitsubaRenderer]:
         renderers = []
         for picture, materials in zip(pictures, all_materials, strict=True):
             asked = picture.request
@@ -159,7 +181,8 @@ def fit_scene(
                 picture.folder.root / asked.scene,
                 asked.target.shape_id,
                 model=fit_of.model,
-                parameters=parameters,
+                parameters=parameters if isinstance(parameters, str) else [n for n in parameters if n not in inside],
+                graph=graph,
                 materials=changed_ones,
                 light_paths=asked.light_paths,
             )
@@ -203,7 +226,8 @@ def fit_scene(
         del renderers, together
 
         def fit_from(other: MaterialClass) -> _Fitted:
-            loaded = load(lambda material: changed(material, other), parameters_of(other, table.names))
+            # values inside nodes are those of the material in the scene
+            loaded = load(lambda material: changed(material, other), parameters_of(other, table.names), None)
             again = task_of(loaded)
             return fit(renderer_of(loaded, again), again, hand_over=False)
 
@@ -220,7 +244,7 @@ def fit_scene(
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    result = replace(result, notes=(*result.notes, *_graph_notes(request, result)))
+    result = replace(result, notes=(*notes, *result.notes, *_graph_notes(request, result)))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
 
 

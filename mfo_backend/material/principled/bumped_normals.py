@@ -8,7 +8,7 @@ microfacet surface that shades the bumps.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,3 +85,33 @@ def valid_normal(geometric: Any, view: Any, normal: Any) -> Any:
 
 def _tangent2(cosine: Any) -> Any:
     return dr.maximum(dr.rcp(dr.square(dr.clip(cosine, 1e-6, 1))) - 1, 0)
+
+
+def turned_to_normals(
+    given: Mapping[str, Any], axes: Sequence[Any], geometric: Any, smooth: Any, tangent: Any, wi: Any, wo: Any
+) -> tuple[Any, Any, dict[str, Any]]:
+    """Directions in the frame of other normals, and those of `BUMPED_NORMALS` in it.
+
+    `given` are the world directions `normal`, `coat_normal` and `tangent`, zero for the mesh's own; `axes` are those of
+    the old frame in the world; all other directions are in that frame, normals on the side of the view.
+    """
+    vector = dr.kind_of(wi)
+
+    def within(frame: Sequence[Any], v: Any) -> Any:
+        return vector(*(dr.dot(axis, v) for axis in frame))
+
+    def direction(name: str, instead: Any) -> Any:
+        if name not in given:
+            return instead
+        found = within(axes, given[name])
+        return dr.normalize(dr.select(dr.dot(found, found) > 0.01, found, instead))
+
+    bumped = direction("normal", smooth)
+    coat = valid_normal(geometric, wi, direction("coat_normal", smooth))
+    n = valid_normal(geometric, wi, bumped)
+    along = direction("tangent", tangent)
+    s = dr.normalize(along - dr.dot(n, along) * n)
+    t = vector(n.y * s.z - n.z * s.y, n.z * s.x - n.x * s.z, n.x * s.y - n.y * s.x)
+    frame = (s, t, n)
+    others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
+    return within(frame, wi), within(frame, wo), {name: within(frame, other) for name, other in others.items()}

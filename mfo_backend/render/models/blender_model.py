@@ -17,7 +17,7 @@ from ...material.principled.principled_dict import blender_principled_dict, sock
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...scene.scene_xml import Element, Target
 from ...types.errors import BadInputError, UnrecordableError
-from ...types.parameter import Value
+from ...types.parameter import ParameterTable, Value
 from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
 
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
@@ -46,7 +46,10 @@ def prepare_blender_principled(
     sockets = materials[target.bsdf_id]["sockets"]
     linked = {PARAMETER_OF_SOCKET[name] for name, socket in sockets.items() if socket.get("linked") and name in SOCKETS}
     present = [name for name, value in _constants(sockets).items() if value != 0.0]
-    table = select_blender_parameters(selection, present=present, linked=linked)
+    # values inside nodes may be all that is fitted
+    nothing = not isinstance(selection, str) and not selection
+    chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
+    table = ParameterTable(()) if chosen is None else chosen
     start = table.clip(table.pack(_constants(sockets)))
     opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in table.unpack(start).items()}
     textures = _textures(scene)

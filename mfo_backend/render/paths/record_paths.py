@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
+from ...material.plugins.seen_surface import SeenSurface
 from ...types.errors import BadInputError
 from ...types.light_paths import LightPaths
 from ..camera.highlight_cells import Highlights, highlight_cells
@@ -41,12 +42,13 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. `bumped` says
-    that nodes give normals to the plugin. With `light_paths` light over other surfaces has Cycles' blur, clamping and
-    limits. `pixels` (height, width) are the only ones looked at; where they hold all that see the target, nothing is
-    missed. With `highlights` more rays start where lights of no extent are mirrored. Every camera ray meets the lights
-    with extent in as many independent `samples`, or in samples of the same directions if they are `alike`. The first
-    `direct_samples` leave light over other surfaces out and need no other kernels than a recording with it. With
-    `free_emission` the target's own emission is kept apart from the constant picture.
+    that nodes give normals to the plugin. With a `surface`, lanes keep their `subpixel` on it. With `light_paths` light
+    over other surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the only ones looked at;
+    where they hold all that see the target, nothing is missed. With `highlights` more rays start where lights of no
+    extent are mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples
+    of the same directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need
+    no other kernels than a recording with it. With `free_emission` the target's own emission is kept apart from the
+    constant picture.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -58,6 +60,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     bumped: bool = False
+    surface: SeenSurface | None = None
     light_paths: LightPaths | None = None
     pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
@@ -139,7 +142,10 @@ def record_paths(
             plugin: Any = shape.bsdf()
             values = plugin.values_at(si, mi.Bool(True))
             if settings.bumped:
-                values |= plugin.bumped_frame(si, mi.Bool(True))[2]
+                frame, _, normals = plugin.bumped_frame(si, mi.Bool(True))
+                values |= normals | plugin.own_directions(si, frame)
+            if settings.surface is not None:
+                values["subpixel"] = settings.surface.row_of(si.p)
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)

@@ -23,6 +23,7 @@ from ...material.recorded_models import RecordedModel
 from ...types.parameter import ParameterTable, Value
 from .packed_lanes import Lanes
 from .recorded_paths import LaneGroups
+from .varying_values import VaryingValues
 
 
 @contextmanager
@@ -49,6 +50,8 @@ class RecordedJacobian:
     fixed
         All other values. One that is exactly 0 leaves its lobe out of the kernel; others enter as data, so that a new
         value needs no new kernel. None is a texture's, which the recording holds for each lane.
+    varying
+        Those of them that a graph gives, by the last entries of `free`.
     derivatives
         Without them K is 0: a kernel of its own, which takes half the time.
 
@@ -66,48 +69,60 @@ class RecordedJacobian:
         free: ParameterTable,
         fixed: Mapping[str, Value | None],
         *,
+        varying: VaryingValues | None = None,
         derivatives: bool = True,
     ) -> None:
         self.model = model
         self.table = free
+        self._sockets = ParameterTable(p for p in free if p.name in model.table.names)
+        self._varying = varying
         self._derivatives = derivatives
         self._width = 1 + free.length * derivatives
         values = {name: value for name, value in fixed.items() if name not in free.names}
         self._absent = [name for name, value in values.items() if value == 0.0]
         tables = (model.table, model.normals)
-        self._held = [table[name] for table in tables for name in table.names if values.get(name, 0.0) is None]
+        given = () if varying is None else (*varying.names, *(model.normals.names if varying.turns else ()))
+        held = [name for name, value in values.items() if value is None and name not in given]
+        self._held = [table[name] for table in tables for name in table.names if name in held]
         self._fixed_table = [model.table[n] for n, value in values.items() if value is not None and value != 0.0]
         constants = [np.atleast_1d(np.asarray(values[p.name], np.float32)) for p in self._fixed_table]
         self._constants = own_memory(np.concatenate([*constants, np.ones(1, np.float32)]), mi.Float)
         dr.eval(self._constants)
-        self._evaluate = model.bind(values, free.names)
+        self._evaluate = model.bind(values, self._sockets.names)
         self._warm_up()
         self.evaluations = 0
         # a recording is made anew when the relation of the array sizes changes; that is rare and no cause for a warning
         frozen = dr.freeze(auto_opaque=False, warn_after=1000, state_fn=lambda *_: model.buffers())
         self._launch = frozen(self._kernel)
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of the values that lanes hold."""
+        return tuple(p.name for p in self._held)
+
     def __call__(self, vector: NDArray[np.float64], lanes: Lanes, groups: LaneGroups) -> NDArray[np.float32]:
         """Mean radiance of the groups, whose `lanes` these are, without the constant part, then its derivatives:
         (samples, g, 3, 1 + K)."""
         width = self._width
         theta = own_memory(vector, mi.Float)
+        pictures = () if self._varying is None else self._varying.arrays(vector)
         *_, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(scale) * 3 * width)
         dr.eval(theta, out)
         # not the dataclass: Dr.Jit would run Python to look into it, which may let another thread go on, and that one
         # waits for a lock which this one holds
         with _no_garbage_collection():
-            self._launch(theta, self._constants, lanes.arrays, lanes.start, lanes.stop, lanes.step, scale, out)
+            places = (lanes.start, lanes.stop, lanes.step)
+            self._launch(theta, self._constants, pictures, lanes.arrays, *places, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
-    def _kernel(self, theta, constants, arrays, start, stop, step, scale, out):
+    def _kernel(self, theta, constants, pictures, arrays, start, stop, step, scale, out):
         width = self._width
 
         def body(lane, stop, sums):
             wi, wo, weight, *held = (dr.gather(type(array), array, lane) for array in arrays)
-            columns = self._columns(theta, constants, wi, wo, weight, held)
+            columns = self._columns(theta, constants, pictures, wi, wo, weight, held)
             return (
                 lane + step,
                 stop,
@@ -125,15 +140,21 @@ class RecordedJacobian:
         for column, total in enumerate(sums):
             dr.scatter(out, total * scale, row + column, mode=dr.ReduceMode.Permute)
 
-    def _columns(self, theta, constants, wi, wo, weight, held) -> list[mi.Color3f]:
+    def _columns(self, theta, constants, pictures, wi, wo, weight, held) -> list[mi.Color3f]:
         """The weighted BSDF value and its derivative by each free value."""
         free, fixed = self._numbers(theta, constants)
+        held, lane = held[: len(self._held)], held[len(self._held) :]
+        if self._derivatives:
+            free = [Dual(value, {k: mi.Float(1.0)}) for k, value in enumerate(free)]
+            fixed, held, (wi, wo) = ([Dual(array) for array in arrays] for arrays in (fixed, held, (wi, wo)))
+        parameters = self._parameters(free, fixed, held)
+        if self._varying is not None:
+            given, wi, wo = self._varying.read(pictures, lane, wi, wo, derivatives=self._derivatives)
+            parameters |= given
+        result = self._evaluate(parameters, wi, wo) * weight
         if not self._derivatives:
-            return [mi.Color3f(self._evaluate(self._parameters(free, fixed, held), wi, wo) * weight)]
-        free = [Dual(value, {k: mi.Float(1.0)}) for k, value in enumerate(free)]
-        fixed, held, (wi, wo) = ([Dual(array) for array in arrays] for arrays in (fixed, held, (wi, wo)))
-        result = self._evaluate(self._parameters(free, fixed, held), wi, wo) * weight
-        return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(len(free))))]
+            return [mi.Color3f(result)]
+        return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(self.table.length)))]
 
     def _warm_up(self) -> None:
         """Let the model load its tables: a frozen launch cannot.
@@ -144,11 +165,13 @@ class RecordedJacobian:
         up = dr.opaque(mi.Vector3f, (0.0, 0.0, 1.0))
         kinds = dict.fromkeys(self.model.normals.names, mi.Vector3f)
         some = [dr.opaque(kinds.get(p.name, mi.Color3f if p.size == 3 else mi.Float), 0.5) for p in self._held]
-        self._evaluate(self._parameters(*self._numbers(theta, self._constants), some), up, up)  # traced, never run
+        pictures, lane = ((), []) if self._varying is None else self._varying.sample()
+        # traced, never run
+        self._columns(theta, self._constants, pictures, up, up, dr.opaque(mi.Color3f, 1.0), [*some, *lane])
 
     def _numbers(self, theta, constants) -> tuple[list[Any], list[Any]]:
         """The components of all free values and of all fixed ones that are data."""
-        counts = (self.table.length, sum(p.size for p in self._fixed_table))
+        counts = (self._sockets.length, sum(p.size for p in self._fixed_table))
         free, fixed = (
             [dr.gather(mi.Float, array, mi.UInt32(k)) for k in range(count)]
             for array, count in zip((theta, constants), counts, strict=True)
@@ -158,7 +181,7 @@ class RecordedJacobian:
     def _parameters(self, free: list[Any], fixed: list[Any], held: list[Any]) -> dict[str, Any]:
         parameters: dict[str, Any] = dict.fromkeys(self._absent, 0.0)
         parameters |= {p.name: value for p, value in zip(self._held, held, strict=True)}
-        for table, entries in ((self.table, iter(free)), (self._fixed_table, iter(fixed))):
+        for table, entries in ((self._sockets, iter(free)), (self._fixed_table, iter(fixed))):
             for p in table:
                 components = [next(entries) for _ in range(p.size)]
                 parameters[p.name] = components[0] if p.size == 1 else cast(mi.Color3f, *components)

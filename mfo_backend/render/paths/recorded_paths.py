@@ -192,7 +192,7 @@ class RecordedPaths:
     @property
     def bytes(self) -> int:
         """Memory of the lanes."""
-        floats = sum(1 if isinstance(value, mi.Float) else 3 for value in self.held.values())
+        floats = sum(1 if isinstance(value, (mi.Float, mi.UInt32)) else 3 for value in self.held.values())
         return self.lanes * (BYTES_PER_LANE + 4 * floats)
 
     @property

@@ -35,6 +35,7 @@ from .record_paths import RecordSettings, record_paths
 from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths
+from .varying_values import VaryingValues
 
 # Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
 # noise of 64 samples a pixel.
@@ -83,8 +84,10 @@ class RecordedScene:
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
-        self._held = tuple(name for name, value in self._fixed.items() if value is None)
-        self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed)
+        graph = renderer.graph
+        self._varying = None if graph is None else VaryingValues(graph, renderer.table, self.model.table)
+        self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._varying)
+        self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
 
     @property
     def lights_exact(self) -> bool:
@@ -158,6 +161,7 @@ class RecordedScene:
             two_sided=two_sided,
             held=held,
             bumped=self._bumped,
+            surface=None if self._varying is None else self._varying.surface(vector),
             light_paths=light_paths,
             pixels=pixels,
             highlights=highlights,
@@ -230,7 +234,8 @@ class RecordedScene:
 
     @cached_property
     def _image(self) -> RecordedJacobian:
-        return RecordedJacobian(self.model, self.renderer.table, self._fixed, derivatives=False)
+        table = self.renderer.table
+        return RecordedJacobian(self.model, table, self._fixed, varying=self._varying, derivatives=False)
 
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """The function from a vector to image and Jacobian of the groups, background included."""

@@ -18,9 +18,10 @@ from ...scene.scene_xml import Element, find_target, prepare_for_fit, read_scene
 from ...types.errors import BadInputError
 from ...types.image import Pixels, Pullback
 from ...types.light_paths import LightPaths
-from ...types.parameter import Vector
+from ...types.parameter import ParameterTable, Vector
 from ..machine.plugins import check_plugins
 from ..machine.variant import load_variant
+from ..models.graph_pictures import GraphPictures
 from ..models.material_model import material_model
 from ..models.prepared_material import RADIANCE_KEY, Materials, PreparedMaterial
 from .pass_counter import PassCounter
@@ -36,7 +37,12 @@ class MitsubaRenderer:
     """The `Renderer` protocol on a loaded Mitsuba scene."""
 
     def __init__(
-        self, model: str, material: PreparedMaterial, scene: Any, light_paths: LightPaths | None = None
+        self,
+        model: str,
+        material: PreparedMaterial,
+        scene: Any,
+        light_paths: LightPaths | None = None,
+        graph: GraphPictures | None = None,
     ) -> None:
         import mitsuba as mi
 
@@ -44,8 +50,9 @@ class MitsubaRenderer:
 
         self.model = model
         self.light_paths = light_paths
-        self.table = material.table
-        self.start = material.start
+        self.graph = graph
+        self.table = material.table if graph is None else ParameterTable([*material.table, *graph.table])
+        self.start = material.start if graph is None else np.concatenate([material.start, graph.table.pack({})])
         self.counter = PassCounter()
         self._shape_id = material.target.shape_id
         self._scene = scene
@@ -56,6 +63,9 @@ class MitsubaRenderer:
         self._keys = _keys_of(list(self._params.keys()), material)
         self.factors = material.factors
         self._params.keep(list(self._keys.values()))
+        if graph is not None:
+            textures = {name: self._texture(name) for name in graph.varying}
+            graph.note(graph.table.pack({}), {name: texture.picture for name, texture in textures.items()})
         self._mask: NDArray[np.bool_] | None = None
         self._of_pixels: PixelPictures | None = None
 
@@ -197,7 +207,16 @@ class MitsubaRenderer:
             values = values if factor == 1.0 else [value * dr.opaque(mi.Float, factor) for value in values]
             self._params[key] = mi.Color3f(*values) if len(values) == 3 else values[0]
         self._params.update()
+        if self.graph is not None:
+            of_graph = np.asarray(vector, np.float64)[self.table.length - self.graph.table.length :]
+            for name, picture in self.graph.fine(of_graph).items():
+                self._texture(name).show(picture)
         return theta
+
+    def _texture(self, name: str) -> Any:
+        """The texture of a parameter or direction that nodes give the target."""
+        bsdf: Any = self.shape.bsdf()
+        return bsdf.directions[name] if name in bsdf.directions else getattr(bsdf, name)
 
 
 _LOADED = itertools.count()  # scenes of this process
@@ -221,6 +240,7 @@ def load_mitsuba_renderer(
     parameters: str | Sequence[str],
     materials: Materials,
     light_paths: LightPaths | None = None,
+    graph: GraphPictures | None = None,
 ) -> MitsubaRenderer:
     """See `renderer.load_renderer`."""
     document = read_scene(scene_xml)
@@ -258,7 +278,7 @@ def load_mitsuba_renderer(
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
-    return MitsubaRenderer(model, material, scene, light_paths)
+    return MitsubaRenderer(model, material, scene, light_paths, graph)
 
 
 def _camera_world(document: Element) -> Element | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...types.image import Pixels, Pullback
 from ...types.light_paths import LightPaths
 from ...types.parameter import ParameterTable, Vector
+from ..models.graph_pictures import GraphPictures
 from .pass_counter import PassCounter
 
 
@@ -54,6 +55,7 @@ def load_renderer(
     parameters: str | Sequence[str],
     materials: Mapping[str, Mapping[str, Any]] | None = None,
     light_paths: LightPaths | None = None,
+    graph: GraphPictures | None = None,
 ) -> Renderer:
     """Load a scene with the material of shape `shape_id` open to change.
 
@@ -67,6 +69,8 @@ def load_renderer(
         `materials` of request.json, for models that are not described by the scene file.
     light_paths
         What Cycles does to indirect light; the model `mitsuba_principled` has none of it.
+    graph
+        Free values inside the nodes of the target, after the parameters in the table.
 
     Raises
     ------
@@ -84,4 +88,5 @@ def load_renderer(
         parameters=parameters,
         materials=materials or {},
         light_paths=light_paths,
+        graph=graph,
     )

@@ -106,11 +106,12 @@ def test_another_working_space_gets_the_same_color(
 ) -> None:
     import numpy as np
 
-    from blender_addon.result import write_back
+    from blender_addon.export.images import color_space
+    from blender_addon.result.write_back import apply_values
 
     to_rec709 = np.array([[1.6, -0.5, -0.1], [-0.1, 1.2, -0.1], [0.0, -0.1, 1.1]])
-    monkeypatch.setattr(write_back, "working_space_to_rec709", lambda: to_rec709)
-    write_back.apply_values(glaze(scene), {"Base Color": given}, JOB)
+    monkeypatch.setattr(color_space, "working_space_to_rec709", lambda: to_rec709)
+    apply_values(glaze(scene), {"Base Color": given}, JOB)
     found = to_rec709 @ np.array(inputs["Base Color"].default_value[:3])
     np.testing.assert_allclose(found, (0.5, 0.25, 0.125), atol=FLOAT32)
 

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a value of a node may go in a fit, and the difference that its derivative is taken over."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import bpy
+
+# Whose values join the set *All*: colours, and what colour nodes do with them. Positions, scales, coordinates and plain
+# numbers have many minima or none, and are named by the user
+COLOR, SETTING, NUMBER = "color", "setting", "number"
+BY_DEFAULT = (COLOR, SETTING)
+
+# Of the range; forward differences of a float32 picture, measured on graphs of noise, ramps and bumps
+STEP, ROUGH_STEP, LOGARITHMIC_STEP = 0.002, 0.01, 0.004
+FACTOR = 4.0  # a scale may be this many times smaller or larger than it is
+CURVES = ("ShaderNodeRGBCurve", "ShaderNodeFloatCurve")
+MIXES = ("ShaderNodeMix", "ShaderNodeMixRGB")
+
+
+@dataclass(frozen=True)
+class Range:
+    """Bounds, the group that the value belongs to, whether it counts by factors, and the share of the range that a
+    difference takes."""
+
+    lower: float
+    upper: float
+    group: str = NUMBER
+    logarithmic: bool = False
+    step: float = STEP
+
+
+FROM_0_TO_1 = Range(0.0, 1.0, SETTING)
+# by node and name of the input; what is not here goes by its value
+SETTINGS = {
+    ("ShaderNodeHueSaturation", "Hue"): FROM_0_TO_1,
+    ("ShaderNodeHueSaturation", "Saturation"): Range(0.0, 2.0, SETTING),
+    ("ShaderNodeHueSaturation", "Value"): Range(0.0, 2.0, SETTING),
+    ("ShaderNodeBrightContrast", "Bright"): Range(-0.5, 0.5, SETTING),
+    ("ShaderNodeBrightContrast", "Brightness"): Range(-0.5, 0.5, SETTING),
+    ("ShaderNodeBrightContrast", "Contrast"): Range(-1.0, 1.0, SETTING),
+    ("ShaderNodeGamma", "Gamma"): Range(0.2, 5.0, SETTING, logarithmic=True, step=LOGARITHMIC_STEP),
+    ("ShaderNodeBump", "Strength"): Range(0.0, 1.0, SETTING, step=ROUGH_STEP),
+    ("ShaderNodeNormalMap", "Strength"): Range(0.0, 2.0, SETTING, step=ROUGH_STEP),
+    ("ShaderNodeTexNoise", "Detail"): Range(0.0, 15.0, step=ROUGH_STEP),
+    ("ShaderNodeTexNoise", "Distortion"): Range(-2.0, 2.0, step=ROUGH_STEP),
+}
+LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
+SCALES = ("Scale", "Distance", "Lacunarity", "Brick Width", "Row Height", "Detail Scale")
+
+
+def range_of_input(node: bpy.types.Node, socket: bpy.types.NodeSocket, value: float) -> Range:
+    """The range of a number that an input holds, or of one component of a vector."""
+    known = SETTINGS.get((node.bl_idname, socket.name))
+    if known is not None:
+        return _around(known, value)
+    if node.bl_idname == "ShaderNodeMapping" and socket.name == "Rotation":
+        return Range(value - math.pi / 4, value + math.pi / 4, step=ROUGH_STEP)
+    if node.bl_idname == "ShaderNodeMapping" and socket.name == "Location":
+        return Range(value - 1.0, value + 1.0)
+    if socket.name in SCALES and value > 0.0:
+        return Range(value / FACTOR, value * FACTOR, logarithmic=True, step=LOGARITHMIC_STEP)
+    if socket.bl_idname == "NodeSocketFloatFactor":
+        step = ROUGH_STEP if node.bl_idname in MIXES else STEP
+        return _around(Range(0.0, 1.0, SETTING if node.bl_idname in MIXES else NUMBER, step=step), value)
+    return plain_range(value)
+
+
+def plain_range(value: float) -> Range:
+    """The range of a number of which nothing is known but its value."""
+    return Range(0.0, 1.0) if 0.0 <= value <= 1.0 else Range(value - abs(value), value + abs(value))
+
+
+def range_of_stop(ramp: bpy.types.ColorRamp, number: int) -> Range:
+    """The range of a stop's position: halfway to its neighbours, for stops that pass each other change their order."""
+    places = [stop.position for stop in ramp.elements]
+    lower = 0.5 * (places[number - 1] + places[number]) if number > 0 else 0.0
+    upper = 0.5 * (places[number] + places[number + 1]) if number + 1 < len(places) else 1.0
+    return Range(lower, upper, step=min(ROUGH_STEP / max(upper - lower, ROUGH_STEP), 0.2))
+
+
+def _around(known: Range, value: float) -> Range:
+    """The range, wider where the value is outside of it."""
+    lower, upper = min(known.lower, value), max(known.upper, value)
+    return Range(lower, upper, known.group, known.logarithmic and lower > 0.0, known.step)

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The values of a graph by their names, ``"Color Ramp/Stop 0"``: what is unlinked upstream of the target's sockets."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any
+
+import bpy
+
+from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
+from ..export.nodes.shader_graph import source_of
+from ..export.nodes.target_shader import TargetShader
+from . import ranges
+from .place import CURVE_POINT, INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, Place, Value, read
+from .ranges import COLOR, NUMBER, Range, plain_range, range_of_input, range_of_stop
+
+# what a fit on recorded light does not change: light that the target emits, and what lets light through
+NOT_FITTED = ("Emission Color", "Emission Strength", "Alpha", "Transmission Weight")
+MOST = 256  # values of one graph; what lies further upstream is not offered
+_AXES = ("X", "Y", "Z", "W")
+
+
+class GraphValueError(Exception):
+    """A value is asked for that the graph does not have; the message is one sentence for the user."""
+
+
+@dataclass(frozen=True)
+class GraphValue:
+    """A value of a graph: its name, where it is, how far it may go, and the target's sockets that it reaches."""
+
+    name: str
+    label: str  # of its node
+    place: Place
+    range: Range
+    sockets: tuple[str, ...]
+
+    def request(self, value: Value) -> dict[str, Any]:
+        """The entry of request.json."""
+        step = self.range.step * (self.range.upper - self.range.lower)
+        return {
+            "name": self.name, "value": list(value) if isinstance(value, tuple) else value,
+            "lower": self.range.lower, "upper": self.range.upper, "logarithmic": self.range.logarithmic, "step": step,
+            "sockets": list(self.sockets), "place": self.place.request(),
+        }  # fmt: skip
+
+
+def graph_values(target: TargetShader) -> list[GraphValue]:
+    """The values of the graph of a target, in the order in which they are met on the way up from its sockets."""
+    tree = (target.groups[0] if target.groups else target.node).id_data
+    found: dict[Place, _Met] = {}
+    for name, place in target.places.items():
+        if name in NOT_FITTED or not place.socket.is_linked:
+            continue
+        is_color = place.socket.type == "RGBA"
+        for met in _upstream(place.socket, place.groups):
+            known = found.setdefault(met.place, met)
+            known.sockets.append(name) if name not in known.sockets else None
+            known.asks_color |= is_color
+            if len(found) >= MOST:
+                break
+    return _named([_finished(met, tree) for met in found.values()])
+
+
+def chosen_values(values: Sequence[GraphValue], wanted: str | Sequence[str]) -> list[GraphValue]:
+    """Those of a set, ``"all"`` or ``"reduced"``, or of a list of names, which other names may be in.
+
+    Raises
+    ------
+    GraphValueError
+        If a name with a slash is none of theirs.
+    """
+    if isinstance(wanted, str):
+        return [v for v in values if v.range.group in ranges.BY_DEFAULT] if wanted == "all" else []
+    by_name = {_plain(value.name): value for value in values}
+    chosen = []
+    for name in wanted:
+        if "/" not in name:
+            continue
+        if _plain(name) not in by_name:
+            near = get_close_matches(_plain(name), by_name, n=1, cutoff=0.3)
+            guess = f" (the nearest is '{by_name[near[0]].name}')" if near else ""
+            have = ", ".join(f"'{value.name}'" for value in values[:12]) or "no unlinked values"
+            more = " and more" if len(values) > 12 else ""
+            raise GraphValueError(f"The material's nodes have no value '{name}'{guess}: they have {have}{more}.")
+        chosen.append(by_name[_plain(name)])
+    return list(dict.fromkeys(chosen))
+
+
+def _plain(name: str) -> str:
+    """A name as the backend compares it."""
+    return "_".join(name.lower().replace("_", " ").split())
+
+
+@dataclass
+class _Met:
+    """A value on the way up, before all sockets that it reaches are known."""
+
+    place: Place
+    node: bpy.types.Node
+    groups: tuple[bpy.types.Node, ...]
+    inside: str  # its name within the node
+    is_color: bool
+    range: Range | None  # None where it hangs on the value, which is read later
+    sockets: list[str]
+    asks_color: bool = False
+
+
+def _upstream(
+    socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], seen: set[Any] | None = None
+) -> Iterator[_Met]:
+    """The values upstream of a socket that lies in `groups`."""
+    seen = set() if seen is None else seen
+    source = source_of(socket)
+    if source is None or source.node.mute:
+        return
+    node = source.node
+    key = (*(group.as_pointer() for group in groups), node.as_pointer(), source.identifier)
+    if key in seen or not node.is_registered_node_type():
+        return
+    seen.add(key)
+    if node.bl_idname not in (GROUP, GROUP_INPUT):
+        yield from _own_values(node, groups, source)
+    for further, within in feeding(node, source, groups):
+        if further.is_linked:
+            if source_of(further) is not None:
+                yield from _upstream(further, within, seen)
+        elif further.node.bl_idname != GROUP_INPUT:
+            yield from _input_values(further, within)
+
+
+def _path(node: bpy.types.Node, groups: tuple[bpy.types.Node, ...]) -> tuple[str, ...]:
+    return (*(group.name for group in groups), node.name)
+
+
+def _input_values(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Iterator[_Met]:
+    node = socket.node
+    if not socket.enabled or socket.hide_value or getattr(socket, "is_unavailable", False):
+        return
+    if (node.bl_idname, socket.name) in ranges.LEFT_OUT:
+        return
+    twins = [s for s in node.inputs if s.name == socket.name and s.enabled]
+    name = socket.name if twins[:1] == [socket] else f"{socket.name} {twins.index(socket) + 1}"
+    place = Place(_path(node, groups), INPUT, socket.identifier)
+    if socket.type == "RGBA":
+        yield _Met(place, node, groups, name, True, Range(0.0, 1.0, COLOR), [])
+    elif socket.type == "VALUE":
+        yield _Met(place, node, groups, name, False, range_of_input(node, socket, socket.default_value), [])
+    elif socket.type == "VECTOR":
+        for k, number in enumerate(socket.default_value):
+            axis = replace(place, component=k)
+            yield _Met(axis, node, groups, f"{name} {_AXES[k]}", False, range_of_input(node, socket, number), [])
+
+
+def _own_values(
+    node: bpy.types.Node, groups: tuple[bpy.types.Node, ...], source: bpy.types.NodeSocket
+) -> Iterator[_Met]:
+    path = _path(node, groups)
+    if node.bl_idname == "ShaderNodeRGB":
+        yield _Met(Place(path, OUTPUT, source.identifier), node, groups, "Color", True, Range(0.0, 1.0, COLOR), [])
+    elif node.bl_idname == "ShaderNodeValue":
+        place = Place(path, OUTPUT, source.identifier)
+        yield _Met(place, node, groups, "Value", False, plain_range(source.default_value), [])
+    elif node.bl_idname == "ShaderNodeValToRGB" and source.name == "Color":
+        for k in range(len(node.color_ramp.elements)):
+            stop = Place(path, STOP_COLOR, str(k))
+            yield _Met(stop, node, groups, f"Stop {k}", True, Range(0.0, 1.0, COLOR), [])
+        for k in range(len(node.color_ramp.elements)):
+            place = Place(path, STOP_POSITION, str(k))
+            yield _Met(place, node, groups, f"Position {k}", False, range_of_stop(node.color_ramp, k), [])
+    elif node.bl_idname in ranges.CURVES:
+        names = ("R ", "G ", "B ", "") if node.bl_idname == ranges.CURVES[0] else ("",)
+        for c, curve in enumerate(node.mapping.curves):
+            for p in range(len(curve.points)):
+                place, inside = Place(path, CURVE_POINT, f"{c}/{p}", component=1), f"{names[c]}Point {p}"
+                yield _Met(place, node, groups, inside, False, Range(0.0, 1.0, NUMBER), [])
+
+
+def _finished(met: _Met, tree: bpy.types.NodeTree) -> GraphValue:
+    """The value with what the sockets that it reaches ask of it, and a range that holds what it is."""
+    place = met.place
+    if met.is_color:
+        place = replace(place, size=3 if met.asks_color else 1, is_grey=not met.asks_color)
+    value = read(tree, place)
+    numbers = value if isinstance(value, tuple) else (value,)
+    limits = met.range or plain_range(numbers[0])
+    limits = replace(limits, lower=min(limits.lower, *numbers, limits.upper), upper=max(limits.upper, *numbers))
+    label, inside = _one_word(met.node.label or met.node.name), _one_word(met.inside)
+    return GraphValue(f"{label}/{inside}", label, place, limits, tuple(met.sockets))
+
+
+def _one_word(text: str) -> str:
+    """Without what separates names."""
+    return text.replace("/", " ").replace(",", " ").strip()
+
+
+def _named(values: Iterable[GraphValue]) -> list[GraphValue]:
+    """With names that differ: those of groups before, or a number behind, where they would be the same."""
+    values = list(values)
+    count = Counter(_plain(value.name) for value in values)
+    longer = [
+        replace(v, name="/".join((*v.place.path[:-1], v.name))) if count[_plain(v.name)] > 1 and len(v.place.path) > 1
+        else v
+        for v in values
+    ]  # fmt: skip
+    met: Counter[str] = Counter()
+    named = []
+    for value in longer:
+        met[_plain(value.name)] += 1
+        number = met[_plain(value.name)]
+        named.append(value if number == 1 else replace(value, name=f"{value.name} {number}"))
+    return named

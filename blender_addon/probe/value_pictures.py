@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command `values`: what the target's sockets hold for other values of its nodes, and how that changes with them.
+
+One render holds many variants of the nodes. Each is a copy of the material's whole tree; Cycles merges what is the same
+in all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..graph_values.place import Place, write
+from .aov_render import Frame, frame_of, world_to_frame
+from .graph_copy import own_copy, remove_copy, variant_of
+from .server import ProbeRequestError
+from .socket_pictures import MASK, POSITION, SEEN, Target, cleaned, make_opaque, widen_bumps, write_outputs
+
+# of the nodes in one render: more overflow the memory that Cycles has for a material's nodes, at 128 noises all of it
+MOST_VARIANTS = 32
+
+_Sets = Sequence[tuple[Sequence[Any], Sequence[str]]]  # the values of a variant, and the sockets that are looked at
+_Found = tuple[dict[tuple[int, str], NDArray[np.float32]], NDArray[np.float32], NDArray[np.float32]]
+
+
+def answer(request: Mapping[str, Any]) -> dict[str, Any]:
+    """Write one .npy file, float32 (height, width, 1 or 3), for each socket of each variant.
+
+    Requested are `scene`, `layer`, `object`, `slot` and the shader's `node` as of the command `sockets`, the `places`
+    of the values (entries of request.json), `variants`, each with a number or colour for every place in `values` and
+    with the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder`
+    for the files. Answered are `files`, by socket for each variant, and of the target the file `positions`, NaN beside
+    it, and the `camera` of the command `sockets`.
+
+    Raises
+    ------
+    ProbeRequestError
+        If the camera does not see the target, a value's node is gone, or Blender cannot render.
+    """
+    target = Target.of(request)
+    places = [Place.of_request(entry) for entry in request["places"]]
+    variants: _Sets = [(variant["values"], variant["sockets"]) for variant in request["variants"]]
+    most = max(min(len(variants), MOST_VARIANTS), 1)
+    frame = frame_of(target.scene, target.obj, request["scale"], sum(len(names) for _, names in variants[:most]) + 2)
+    while True:
+        try:
+            files, mask, positions = _all(target, request, places, variants, frame, most)
+            break
+        except _TooManyError:
+            most //= 2
+    seen = mask[..., 0] > SEEN
+    positions = np.where(seen[..., None], positions / np.maximum(mask, SEEN), np.float32(np.nan))
+    np.save(Path(request["folder"]) / "positions.npy", positions.astype(np.float32))
+    camera = world_to_frame(target.scene, frame).tolist()
+    return {"files": files, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
+
+
+class _TooManyError(Exception):
+    """So many variants do not fit into one render."""
+
+
+def _all(
+    target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets, frame: Frame, most: int
+) -> tuple[list[dict[str, str]], NDArray[np.float32], NDArray[np.float32]]:
+    files: list[dict[str, str]] = []
+    mask = positions = np.zeros((0, 0, 1), np.float32)
+    for begin in range(0, len(variants), most):
+        some = variants[begin : begin + most]
+        found, mask, positions = _rendered(target, request, places, some, frame)
+        seen = mask[..., 0] > SEEN
+        if not seen.any():  # Cycles shows nothing of a material that is too large for it
+            if most > 1:
+                raise _TooManyError
+            raise ProbeRequestError(f"The camera does not see '{target.obj.name}': move it into the picture.")
+        kinds = _kinds(target.material, request["node"])
+        for k, (_, names) in enumerate(some):
+            files.append({})
+            for name in names:
+                values = cleaned(found[k, name] / np.maximum(mask, SEEN), seen, name, kinds[name])
+                files[-1][name] = f"value_{begin + k:02d}_{len(files[-1]):02d}.npy"
+                np.save(Path(request["folder"]) / files[-1][name], values)
+    return files, mask, positions
+
+
+def _rendered(target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets, frame: Frame) -> _Found:
+    copy, base = own_copy(target.material), own_copy(target.material)
+    try:
+        make_opaque(copy)
+        widen_bumps(base.node_tree, frame.scale)
+        wanted = [(MASK, False), (POSITION, True)]
+        for k, (values, names) in enumerate(variants):
+            tree = variant_of(base.node_tree)
+            copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
+            _put(tree, places, values, target.material.name)
+            _only_nodes(tree)
+            kinds = write_outputs(tree, request["node"], {name: _name(k, i) for i, name in enumerate(names)})
+            wanted += [(_name(k, i), kinds[name] != "VALUE") for i, name in enumerate(names)]
+        found = target.outputs(copy, wanted, frame, request["samples"])
+    finally:
+        remove_copy(copy)
+        remove_copy(base)
+    outputs = {(k, name): found[_name(k, i)] for k, (_, names) in enumerate(variants) for i, name in enumerate(names)}
+    return outputs, found[MASK], found[POSITION]
+
+
+def _name(variant: int, socket: int) -> str:
+    return f"mfo {variant} {socket}"
+
+
+def _put(tree: bpy.types.NodeTree, places: list[Place], values: Sequence[Any], material: str) -> None:
+    for place, value in zip(places, values, strict=True):
+        try:
+            write(tree, place, value)
+        except (KeyError, IndexError, AttributeError, StopIteration) as error:
+            raise ProbeRequestError(
+                f"The node '{place.path[-1]}' of material '{material}' is not what it was when the fit began."
+            ) from error
+
+
+def _only_nodes(tree: bpy.types.NodeTree) -> None:
+    """Leave out what only a material has."""
+    for node in list(_outputs(tree)):
+        tree.nodes.remove(node)
+
+
+def _outputs(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
+    yield from (node for node in tree.nodes if node.bl_idname in ("ShaderNodeOutputMaterial", "ShaderNodeOutputAOV"))
+
+
+def _kinds(material: bpy.types.Material, path: list[str]) -> dict[str, str]:
+    tree = material.node_tree
+    assert tree is not None
+    for group in path[:-1]:
+        tree = tree.nodes[group].node_tree
+    return {s.name: s.type if s.type in ("RGBA", "VECTOR") else "VALUE" for s in tree.nodes[path[-1]].inputs}

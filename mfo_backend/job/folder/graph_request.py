@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The entry `graph` of request.json: what nodes give the target, and the values inside them that are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ...types.errors import BadInputError
+from ...types.node_value import NodeValue
+from ...types.parameter import Value
+from .checked_object import CheckedObject, is_number
+
+COPY = "graph/scene.blend"  # of the file, which a Blender evaluates while values inside its nodes are fitted
+LARGEST = 1e6  # of a bound
+MOST_VALUES = 256
+_EVALUATE = ("scene", "layer", "object", "slot", "node", "sockets")
+
+
+@dataclass(frozen=True)
+class NodeGraph:
+    """How the target's `graph` files are seen: the (3, 4) matrix from the world to column, row and 1, and the file of
+    world positions.
+
+    `values` are those of the nodes that are fitted, beside the sockets; `evaluate` says where the material is in the
+    copy of the file, for the Blender that evaluates it, with what its shader calls the sockets.
+    """
+
+    camera: tuple[tuple[float, ...], ...]
+    positions: str
+    values: tuple[NodeValue, ...] = ()
+    evaluate: Mapping[str, Any] | None = None
+
+
+def graph_from_json(data: Any, where: str) -> NodeGraph | None:
+    """The checked entry.
+
+    Raises
+    ------
+    BadInputError
+        For unknown or missing keys, wrong types and values out of range.
+    """
+    if data is None:
+        return None
+    graph = CheckedObject(data, f"{where}: graph", ("camera", "positions", "values", "evaluate"))
+    rows = graph.raw("camera")
+    if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
+        raise graph.wrong("camera", "three rows of four numbers")
+    for row in rows:
+        if not (isinstance(row, (list, tuple)) and len(row) == 4 and all(map(is_number, row))):
+            raise graph.wrong("camera", "three rows of four numbers")
+    listed = graph.raw("values", ())
+    if not isinstance(listed, (list, tuple)) or len(listed) > MOST_VALUES:
+        raise graph.wrong("values", f"a list of at most {MOST_VALUES}")
+    values = tuple(_value(entry, f"{where}: graph.values[{k}]") for k, entry in enumerate(listed))
+    evaluate = graph.raw("evaluate", None)
+    if values:
+        evaluate = _evaluate(evaluate, f"{where}: graph.evaluate")
+        unknown = {name for value in values for name in value.sockets} - set(evaluate["sockets"])
+        if unknown:
+            raise BadInputError(f"{where}: graph.evaluate.sockets has no {sorted(unknown)[0]!r}: add it.")
+    camera = tuple(tuple(float(number) for number in row) for row in rows)
+    return NodeGraph(camera, graph.text("positions"), values, evaluate)
+
+
+def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
+    """The inverse of `graph_from_json`."""
+    if graph is None:
+        return None
+    data = asdict(graph)
+    return data if graph.values else {key: data[key] for key in ("camera", "positions")}
+
+
+def _value(data: Any, where: str) -> NodeValue:
+    keys = ("name", "value", "lower", "upper", "logarithmic", "step", "sockets", "place")
+    entry = CheckedObject(data, where, keys)
+    lower, upper = (entry.number(key, -LARGEST, LARGEST) for key in ("lower", "upper"))
+    if not lower < upper:
+        raise entry.wrong("upper", f"above {lower:g}")
+    if not entry.text("name").strip():
+        raise entry.wrong("name", "a name")
+    logarithmic = entry.boolean("logarithmic", False)
+    return NodeValue(
+        name=entry.text("name"), value=_number_or_color(entry), lower=lower, upper=upper,
+        logarithmic=logarithmic and lower > 0.0, step=entry.number("step", 1e-9 * (upper - lower), upper - lower),
+        sockets=entry.texts("sockets"), place=entry.mapping("place"),
+    )  # fmt: skip
+
+
+def _number_or_color(entry: CheckedObject) -> Value:
+    value = entry.raw("value")
+    if is_number(value):
+        return float(value)
+    if isinstance(value, (list, tuple)) and len(value) == 3 and all(map(is_number, value)):
+        return tuple(map(float, value))
+    raise entry.wrong("value", "a number, or a list of three")
+
+
+def _evaluate(data: Any, where: str) -> dict[str, Any]:
+    entry = CheckedObject(data, where, _EVALUATE)
+    sockets = entry.mapping("sockets")
+    if not all(isinstance(name, str) for name in sockets.values()):
+        raise entry.wrong("sockets", "names by names")
+    return {
+        **{key: entry.text(key) for key in ("scene", "layer", "object")},
+        "slot": entry.integer("slot", 0, 32766),
+        "node": list(entry.texts("node")),
+        "sockets": dict(sockets),
+    }

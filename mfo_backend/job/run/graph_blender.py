@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Blender that evaluates the target's nodes while values inside them are fitted: JSON lines to a child process.
+
+Its command line comes from whoever starts the job, never from the job folder; `docs/reference/job_folder.md` has the
+requests.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...render.models.graph_pictures import Evaluated, GraphPictures, Picture, Variant
+from ...types.errors import BadInputError, MfoError
+from ..folder.graph_request import COPY, NodeGraph
+from ..folder.job_folder import JobFolder
+from ..folder.request import Request
+
+# one render of many variants takes a second; a big file opens in a minute, and a loaded machine is ten times slower
+ANSWER_SECONDS = 300.0
+END_SECONDS = 2.0  # Blender may take to end when nobody asks any more
+LOG_BYTES = 2000  # of the end of its log that are looked at for a last line
+_NO_BLENDER = (
+    "Values inside nodes ({names}) stayed as they were: no Blender was given that evaluates the nodes, or the preset "
+    "fits the values of sockets alone."
+)
+_PREFIX = "mfo_nodes_"
+
+
+class GraphBlender:
+    """A Blender on the copy of the file in a job folder; it starts at once and is waited for at the first request.
+
+    Use it in a `with` block: at its end the process and its files are gone. It ends with this process, too.
+    """
+
+    def __init__(self, words: Sequence[str], copy: Path, graph: NodeGraph) -> None:
+        """`words` is the command line of the add-on's `probe.server`, without its own arguments.
+
+        Raises
+        ------
+        MfoError
+            If it cannot be started.
+        """
+        assert graph.evaluate is not None
+        self._graph, self._evaluate, self._ready = graph, graph.evaluate, False
+        self._folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}_"))
+        self._log = self._folder / "blender.log"
+        own = [str(copy), "--folder", str(self._folder), "--parent", str(os.getpid())]
+        kept = {key: value for key, value in os.environ.items() if key not in ("PYTHONHOME", "PYTHONSTARTUP")}
+        environment = kept | dict.fromkeys(("TMPDIR", "TEMP"), str(self._folder)) | {"PYTHONPATH": str(_root())}
+        try:
+            with self._log.open("wb") as log:
+                self._process = subprocess.Popen(
+                    [*words, *own], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True,
+                    encoding="utf-8", env=environment, cwd=self._folder, start_new_session=os.name != "nt",
+                )  # fmt: skip
+        except OSError as error:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            what = error.strerror or error
+            raise MfoError(f"Blender, which evaluates nodes, could not be started ({what}).") from error
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+        """See `render.graph_pictures.Evaluate`."""
+        where, own = self._evaluate, self._evaluate["sockets"]
+        answer = self._ask({
+            "command": "values", **{key: where[key] for key in ("scene", "layer", "object", "slot", "node")},
+            "places": [dict(value.place) for value in self._graph.values],
+            "variants": [
+                {"values": [list(v) if isinstance(v, tuple) else v for v in values], "sockets": [own[n] for n in names]}
+                for values, names in variants
+            ],
+            "scale": scale, "samples": samples, "folder": str(self._folder),
+        })  # fmt: skip
+        names = {theirs: ours for ours, theirs in own.items()}
+        pictures = [{names[socket]: self._picture(file) for socket, file in files.items()} for files in answer["files"]]
+        return Evaluated(pictures, self._picture(answer["positions"]), np.array(answer["camera"], np.float64))
+
+    def close(self) -> None:
+        """End Blender and remove its files."""
+        with contextlib.suppress(OSError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+        try:
+            self._process.wait(END_SECONDS if self._ready else 0.0)
+        except subprocess.TimeoutExpired:
+            self._kill()
+        self._reader.join(END_SECONDS)
+        if self._process.stdout is not None and not self._reader.is_alive():
+            self._process.stdout.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> GraphBlender:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _picture(self, file: str) -> Picture:
+        return np.load(self._folder / Path(file).name, allow_pickle=False)
+
+    def _ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        if not self._ready:
+            self._checked(self._next())
+            self._ready = True
+        with contextlib.suppress(OSError):  # a process that is gone is told by what it does not answer
+            assert self._process.stdin is not None
+            self._process.stdin.write(json.dumps(request) + "\n")
+            self._process.stdin.flush()
+        return self._checked(self._next())
+
+    @staticmethod
+    def _checked(answer: dict[str, Any]) -> dict[str, Any]:
+        if answer["status"] != "ok":
+            raise (BadInputError if answer["status"] == "bad_input" else MfoError)(str(answer.get("sentence", "")))
+        return answer
+
+    def _next(self) -> dict[str, Any]:
+        """The next answer; other lines are Blender's."""
+        while True:
+            try:
+                line = self._lines.get(timeout=ANSWER_SECONDS)
+            except queue.Empty:
+                self._kill()
+                raise MfoError(
+                    f"Blender, which evaluates nodes, has not answered for {ANSWER_SECONDS:.0f} s and was ended: try "
+                    "again, or leave the values inside nodes out."
+                ) from None
+            if line is None:
+                self._lines.put(None)
+                raise MfoError(f"Blender, which evaluates nodes, has ended: {self._last_words()}")
+            with contextlib.suppress(ValueError):
+                answer = json.loads(line)
+                if isinstance(answer, dict) and "status" in answer:
+                    return answer
+
+    def _last_words(self) -> str:
+        with contextlib.suppress(OSError):
+            lines = self._log.read_bytes()[-LOG_BYTES:].decode("utf-8", "replace").splitlines()
+            return next((line.strip() for line in reversed(lines) if line.strip()), "its log is empty")
+        return "its log is gone"
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError, ValueError):
+            for line in self._process.stdout:
+                self._lines.put(line)
+        self._lines.put(None)
+
+    def _kill(self) -> None:
+        with contextlib.suppress(OSError):
+            if os.name == "nt":
+                self._process.kill()
+            else:
+                os.killpg(self._process.pid, signal.SIGKILL)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(END_SECONDS)
+
+
+@contextmanager
+def evaluated_graph(
+    folder: JobFolder, request: Request, blender: Sequence[str]
+) -> Iterator[tuple[GraphPictures | None, tuple[str, ...]]]:
+    """The free values of the target's graph, whose Blender lives as long as the block, and what is said of them."""
+    asked = request.graph
+    if asked is None or not asked.values:
+        yield None, ()
+        return
+    if not blender or request.fit.preset == "paper":
+        names = ", ".join(value.name for value in asked.values)
+        if not request.fit.parameters:
+            raise BadInputError(f"{names} are inside nodes, and need a Blender: run the fit there, or by `mfo blend`.")
+        yield None, (_NO_BLENDER.format(names=names),)
+        return
+    copy = folder.file(COPY, what="request.json: graph.values, and the copy of the file")
+    linked = [name for name, socket in request.materials[request.target.bsdf_id].sockets.items() if socket.graph]
+    with GraphBlender(blender, copy, asked) as evaluate:
+        yield GraphPictures(asked.values, evaluate, linked), ()
+
+
+def _root() -> Path:
+    """The folder of the packages, backend and add-on."""
+    return Path(__file__).resolve().parents[3]

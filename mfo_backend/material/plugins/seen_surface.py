@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which subpixel of a camera's picture shows a point of a surface."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.own_memory import own_memory
+
+NOWHERE = 0xFFFFFFFF
+RINGS = 2  # subpixels beside the surface that take their neighbours' value: samples may miss what a ray meets
+# A point is seen where it is as near to what the camera saw there as neighbours are to each other, twice, or as this
+# share of the surface's extent
+NEAR_NEIGHBOURS, NEAR_EXTENT = 2.0, 1e-3
+
+
+class SeenSurface:
+    """Which subpixel shows a point, for all textures of one surface."""
+
+    def __init__(self, positions: NDArray[np.float32], camera: NDArray[np.float64]) -> None:
+        self.height, self.width = positions.shape[:2]
+        seen = np.isfinite(positions).all(axis=2)
+        source = _filled(seen)
+        self._source = own_memory(np.where(source < 0, NOWHERE, source), mi.UInt32)
+        known = np.where(seen[..., None], positions, 0.0).reshape(-1, 3)[np.maximum(source, 0).ravel()]
+        self._positions = own_memory(known, mi.Float)
+        extent = np.ptp(positions[seen], axis=0) if seen.any() else np.zeros(3)
+        reach = NEAR_NEIGHBOURS * _steps(positions) + NEAR_EXTENT * float(np.linalg.norm(extent))
+        self._reach = own_memory(reach.ravel()[np.maximum(source, 0).ravel()], mi.Float)
+        self._camera = [[dr.opaque(mi.Float, float(v)) for v in row] for row in camera]
+        dr.eval(self._source, self._positions, self._reach)
+
+    def row_of(self, point: mi.Point3f) -> mi.UInt32:
+        """The subpixel that holds the point's value, or the number of them where the camera does not see it."""
+        index, seen = self.find(point, mi.Bool(True))
+        return dr.select(seen, index, dr.opaque(mi.UInt32, self.height * self.width))
+
+    def find(self, point: mi.Point3f, active: Any) -> tuple[mi.UInt32, mi.Bool]:
+        """The subpixel that holds the point's value, and whether the camera sees the point."""
+        column, row, w = (r[0] * point.x + r[1] * point.y + r[2] * point.z + r[3] for r in self._camera)
+        inverse = dr.rcp(w)
+        column, row = dr.floor(column * inverse), dr.floor(row * inverse)
+        width, height = dr.opaque(mi.Float, self.width), dr.opaque(mi.Float, self.height)
+        inside = active & (w > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        index = mi.UInt32(dr.select(inside, row, 0)) * mi.UInt32(width) + mi.UInt32(dr.select(inside, column, 0))
+        source = dr.gather(mi.UInt32, self._source, index, inside)
+        inside &= source != NOWHERE
+        found = dr.gather(mi.Point3f, self._positions, index, inside)
+        inside &= dr.norm(found - point) <= dr.gather(mi.Float, self._reach, index, inside)
+        return source, inside
+
+
+def _filled(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The subpixel whose value each takes: its own, a neighbour's some rings away, or -1."""
+    source = np.where(seen, np.arange(seen.size).reshape(seen.shape), -1)
+    for _ in range(RINGS):
+        padded = np.pad(source, 1, constant_values=-1)
+        rows, columns = source.shape
+        for down in (1, 0, 2):
+            for right in (1, 0, 2):
+                near = padded[down : down + rows, right : right + columns]
+                source = np.where((source < 0) & (near >= 0), near, source)
+    return source
+
+
+def _steps(positions: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The largest distance of each position to those of its neighbours above, below and beside it; 0 without."""
+    steps = np.zeros(positions.shape[:2], np.float32)
+    for axis in (0, 1):
+        apart = np.nan_to_num(np.linalg.norm(np.diff(positions, axis=axis), axis=2))
+        before = np.pad(apart, [(1, 0) if k == axis else (0, 0) for k in (0, 1)])
+        after = np.pad(apart, [(0, 1) if k == axis else (0, 0) for k in (0, 1)])
+        steps = np.maximum(steps, np.maximum(before, after))
+    return steps

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a node graph gives the target for any values inside it: pictures of its sockets, and how they change.
+
+Somebody else evaluates the nodes (`Evaluate`); derivatives are forward differences of what comes back.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.principled.principled_dict import DIRECTIONS
+from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
+from ...types.node_value import NodeValue, table_of
+from ...types.parameter import Value, Vector
+
+Picture = NDArray[np.float32]  # (height, width, 1 or 3)
+Variant = tuple[Sequence[Value], Sequence[str]]  # all values of a graph, and the sockets that are looked at
+
+# A solve looks at pictures of this many subpixels along a pixel, a scene's textures at those of the export
+SOLVE_SCALE, SOLVE_SAMPLES = 2, 4
+FINE_SCALE, FINE_SAMPLES = 4, 4
+RECALLED = 6  # answers that are kept
+# Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
+# square: a tenth of what is seen, and a third of what a noisy reference hides
+EXTRAPOLATED = 1e-3
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Pictures by socket for each variant; world positions, NaN beside the target; the (3, 4) matrix of the camera."""
+
+    pictures: Sequence[Mapping[str, Picture]]
+    positions: Picture
+    camera: NDArray[np.float64]
+
+
+class Evaluate(Protocol):
+    """Evaluates variants of a graph, `scale` squared subpixels to a pixel, and so many samples in each."""
+
+    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+        """The pictures; raises `BadInputError` with a sentence where the nodes cannot be evaluated."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class GraphState:
+    """The graph at one vector: flat pictures by parameter, (subpixels + 1, 1 or 3), whose last row is their mean, and
+    their derivatives by the components of the vector that they change with."""
+
+    pictures: Mapping[str, NDArray[np.float32]]
+    slopes: Mapping[str, Mapping[int, NDArray[np.float32]]]
+
+    def moved(self, by: Vector) -> GraphState:
+        """The state at another vector if the pictures were linear."""
+        pictures = {
+            name: picture + sum(np.float32(by[j]) * slope for j, slope in self.slopes[name].items() if by[j] != 0.0)
+            for name, picture in self.pictures.items()
+        }
+        return GraphState(pictures, self.slopes)
+
+
+class GraphPictures:
+    """The free values of a graph and the pictures that they give.
+
+    Attributes
+    ----------
+    table
+        The values; vectors are theirs.
+    varying
+        Names of the material's parameters and directions that they change, with the components of the vector that each
+        changes with.
+    """
+
+    def __init__(self, values: Sequence[NodeValue], evaluate: Evaluate, linked: Sequence[str]) -> None:
+        """`linked` are all sockets that the graph gives."""
+        self.table = table_of(values)
+        self._values, self._evaluate = tuple(values), evaluate
+        changed = {name for value in values for name in value.sockets}
+        if changed & set(DIRECTIONS):  # one frame is made of all of them
+            changed |= set(linked) & set(DIRECTIONS)
+        self._sockets = [name for name in linked if name in changed]
+        self._components = [
+            (value, k) for value in values for k in range(value.parameter.size)
+        ]  # of each entry of the vector
+        self.varying = {
+            name_of(socket): tuple(j for j, (value, _) in enumerate(self._components) if socket in value.sockets)
+            for socket in self._sockets
+        }
+        self._width = self.table.upper - self.table.lower
+        self._states: OrderedDict[bytes, GraphState] = OrderedDict()
+        self._exact: list[tuple[Vector, GraphState]] = []  # those that were evaluated, the newest last
+        # how much the slope along each entry changes over the width of the box, at most; unknown before two states are
+        self._bend: Vector | None = None
+        self._fine: OrderedDict[bytes, Mapping[str, Picture]] = OrderedDict()
+        self._seen: tuple[Picture, NDArray[np.float64]] | None = None
+        self.renders = 0
+
+    def seen(self, vector: Vector) -> tuple[Picture, NDArray[np.float64]]:
+        """World positions of the subpixels of `state`, and the camera's matrix."""
+        if self._seen is None:
+            self.settle(vector)
+        assert self._seen is not None
+        return self._seen
+
+    def state(self, vector: Vector) -> GraphState:
+        """Pictures and derivatives at a vector of this table.
+
+        They are extrapolated from a known state where that is about as good.
+        """
+        key = vector.tobytes()
+        if key not in self._states:
+            self._states[key] = self._extrapolated(vector) or self._evaluated(vector)
+            if len(self._states) > RECALLED:
+                self._states.popitem(last=False)
+        self._states.move_to_end(key)
+        return self._states[key]
+
+    def settle(self, vector: Vector) -> None:
+        """Evaluate the nodes at this vector, from where nearby states are extrapolated from now on."""
+        if not any(np.array_equal(known, vector) for known, _ in self._exact):
+            self._states = OrderedDict({vector.tobytes(): self._evaluated(vector)})
+
+    def _evaluated(self, vector: Vector) -> GraphState:
+        state = self._state(vector)
+        for known, other in self._exact[-1:]:
+            bend = _bend(state, other, self._width, (vector - known) / self._width)
+            self._bend = bend if self._bend is None else np.maximum(self._bend, bend)
+        self._exact = [*self._exact[1 - RECALLED :], (vector.copy(), state)]
+        return state
+
+    def _extrapolated(self, vector: Vector) -> GraphState | None:
+        """The state by the slopes of a known one, None where the nodes have to be evaluated."""
+        if self._bend is None:
+            return None
+        ways = [(vector - known) / self._width for known, _ in self._exact]
+        errors = [0.5 * float(np.linalg.norm(way) * (np.abs(way) @ self._bend)) for way in ways]
+        best = int(np.argmin(errors))
+        if errors[best] > EXTRAPOLATED:
+            return None
+        known, state = self._exact[best]
+        return state.moved(vector - known)
+
+    def fine(self, vector: Vector) -> Mapping[str, Picture]:
+        """Finer pictures by parameter, without derivatives."""
+        key = vector.tobytes()
+        if key not in self._fine:
+            self.renders += 1
+            found = self._evaluate([(self._as_values(vector), self._sockets)], scale=FINE_SCALE, samples=FINE_SAMPLES)
+            self._fine[key] = {name_of(socket): picture for socket, picture in found.pictures[0].items()}
+            if len(self._fine) > RECALLED:
+                self._fine.popitem(last=False)
+        self._fine.move_to_end(key)
+        return self._fine[key]
+
+    def note(self, vector: Vector, fine: Mapping[str, Picture]) -> None:
+        """Take over finer pictures that are known already."""
+        self._fine[vector.tobytes()] = fine
+
+    def _state(self, vector: Vector) -> GraphState:
+        steps = [value.step * (1 if x + value.step <= value.upper else -1) for x, (value, _) in self._pairs(vector)]
+        variants: list[Variant] = [(self._as_values(vector), self._sockets)]
+        for j, step in enumerate(steps):
+            there = vector.copy()
+            there[j] += step
+            variants.append((self._as_values(there), self._components[j][0].sockets))
+        self.renders += 1
+        found = self._evaluate(variants, scale=SOLVE_SCALE, samples=SOLVE_SAMPLES)
+        self._seen = found.positions, found.camera
+        seen = np.isfinite(found.positions).all(axis=2).ravel()
+        here = {socket: _flat(picture, seen) for socket, picture in found.pictures[0].items()}
+        slopes: dict[str, dict[int, NDArray[np.float32]]] = {name_of(socket): {} for socket in here}
+        for j, (step, pictures) in enumerate(zip(steps, found.pictures[1:], strict=True)):
+            for socket, picture in pictures.items():
+                slopes[name_of(socket)][j] = (_flat(picture, seen) - here[socket]) / np.float32(step)
+        return GraphState({name_of(socket): picture for socket, picture in here.items()}, slopes)
+
+    def _pairs(self, vector: Vector) -> list[tuple[float, tuple[NodeValue, int]]]:
+        return list(zip(map(float, vector), self._components, strict=True))
+
+    def _as_values(self, vector: Vector) -> list[Value]:
+        return list(self.table.unpack(vector).values())
+
+
+def _bend(a: GraphState, b: GraphState, width: Vector, way: Vector) -> Vector:
+    """How much the slope along each entry changes between two states by their distance `way`, in widths of the box.
+
+    It is 0 along entries that all pictures are linear in, whatever the others are.
+    """
+    bend, apart = np.zeros(len(width)), max(float(np.linalg.norm(way)), 1e-9)
+    for name, slopes in a.slopes.items():
+        for j, slope in slopes.items():
+            change = float(np.sqrt(np.mean(np.square(slope - b.slopes[name][j])))) * width[j] / apart
+            bend[j] = max(bend[j], change)
+    return bend
+
+
+def name_of(socket: str) -> str:
+    """The material's name for what a socket of the shader takes: a parameter or a direction."""
+    return DIRECTIONS[socket] if socket in DIRECTIONS else PARAMETER_OF_SOCKET[socket]
+
+
+def _flat(picture: Picture, seen: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """(subpixels + 1, numbers), the last the mean over the target."""
+    rows = picture.reshape(-1, picture.shape[2])
+    mean = rows[seen].mean(axis=0, dtype=np.float64) if seen.any() else np.zeros(rows.shape[1])
+    return np.concatenate([rows, mean[None].astype(np.float32)])

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values inside nodes: which there are, what Cycles makes of changes in them, and how they are put back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+FLOAT32 = 1e-6
+JOB = Path("job")
+
+
+@pytest.fixture
+def graph(scene: SimpleNamespace) -> SimpleNamespace:
+    """Noise through a ramp of three stops, mixed with a colour by a group that another material has, too; the ramp is
+    the roughness as well, and another ramp is nothing but the roughness of the coat."""
+    bpy = scene.bpy
+    material = bpy.data.materials["Glaze"]
+    tree = material.node_tree
+    shader = tree.nodes["Principled BSDF"]
+    group = bpy.data.node_groups.new("Wash", "ShaderNodeTree")
+    group.interface.new_socket("Under", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    mix, entry = group.nodes.new("ShaderNodeMix"), group.nodes.new("NodeGroupInput")
+    mix.data_type = "RGBA"
+    group.links.new(entry.outputs["Under"], mix.inputs["A"] if mix.inputs["A"].type == "RGBA" else mix.inputs[6])
+    group.links.new(entry.outputs["Paint"], mix.inputs[7])
+    group.links.new(mix.outputs[2], group.nodes.new("NodeGroupOutput").inputs[0])
+    noise, ramp, coat = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexNoise", "ValToRGB", "ValToRGB"))
+    ramp.color_ramp.elements.new(0.25).color = (0.2, 0.4, 0.6, 0.5)
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree, node.label = group, "Wash, thin"
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    tree.links.new(noise.outputs[0], coat.inputs[0])
+    tree.links.new(ramp.outputs["Color"], node.inputs["Under"])
+    tree.links.new(ramp.outputs["Color"], shader.inputs["Roughness"])
+    tree.links.new(coat.outputs["Color"], shader.inputs["Coat Roughness"])
+    tree.links.new(node.outputs[0], shader.inputs["Base Color"])
+    other = bpy.data.materials.new("Other")
+    other.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
+    return SimpleNamespace(
+        bpy=bpy, material=material, ramp=ramp, coat=coat, noise=noise, node=node, group=group, shader=shader
+    )
+
+
+def values_of(material: Any) -> dict[str, Any]:
+    from blender_addon.export.nodes.target_shader import target_shader
+    from blender_addon.graph_values.table import graph_values
+
+    target = target_shader(material)
+    assert target is not None
+    return {value.name: value for value in graph_values(target)}
+
+
+def test_the_table(graph: SimpleNamespace) -> None:
+    found = values_of(graph.material)
+    ranges = {name: (v.range.lower, v.range.upper, v.range.group) for name, v in found.items()}
+    assert ranges["Color Ramp/Stop 1"] == (0.0, 1.0, "color")
+    assert ranges["Color Ramp/Position 1"] == (0.125, 0.625, "number")  # halfway to its neighbours
+    assert ranges["Mix/Factor"] == (0.0, 1.0, "setting")
+    assert ranges["Wash  thin/Paint"] == (0.0, 1.0, "color")
+    assert ranges["Noise Texture/Scale"] == (1.25, 20.0, "number")
+    assert found["Noise Texture/Scale"].range.logarithmic
+    assert found["Color Ramp/Stop 1"].sockets == ("Base Color", "Roughness")
+    assert found["Mix/Factor"].place.path == ("Group", "Mix")
+    # no colour is asked of it: one number
+    assert (found["Color Ramp/Stop 1"].place.size, found["Color Ramp.001/Stop 1"].place.size) == (3, 1)
+    assert "Noise Texture/W" not in found  # of four dimensions alone
+
+
+def test_sets_and_names(graph: SimpleNamespace) -> None:
+    from blender_addon.graph_values.table import GraphValueError, chosen_values
+
+    values = list(values_of(graph.material).values())
+    names = {value.name for value in chosen_values(values, "all")}
+    assert {"Color Ramp/Stop 0", "Mix/Factor", "Wash  thin/Paint"} <= names
+    assert not any(name.endswith("Scale") or "Position" in name for name in names)
+    assert chosen_values(values, "reduced") == []
+    chosen = chosen_values(values, ["base_color", "noise texture/scale", "Mix/Factor"])
+    assert [value.name for value in chosen] == ["Noise Texture/Scale", "Mix/Factor"]
+    with pytest.raises(GraphValueError, match=r"no value 'Color Ramp/Stop 7' \(the nearest is 'Color Ramp/Stop \d'\)"):
+        chosen_values(values, ["Color Ramp/Stop 7"])
+
+
+def test_apply_toggle_and_revert(graph: SimpleNamespace) -> None:
+    from blender_addon.result.write_back import apply_values, revert_values, toggle_values
+
+    ramp, mix = graph.ramp.color_ramp, graph.group.nodes["Mix"]
+    before = mix.inputs[0].default_value
+    given = {"Color Ramp/Stop 1": (0.5, 0.25, 0.125), "Color Ramp/Position 1": 0.375, "Mix/Factor": 0.875,
+             "Color Ramp.001/Stop 0": 0.25, "Nowhere/Stop 0": 0.5}  # fmt: skip
+    notes = apply_values(graph.material, given, JOB)
+    assert notes == [
+        "Nowhere/Stop 0 is not among the nodes any more and was skipped.",
+        "The group 'Wash' is used elsewhere too: material 'Glaze' got a copy of its own.",
+    ]
+    assert tuple(ramp.elements[1].color) == pytest.approx((0.5, 0.25, 0.125, 0.5), abs=FLOAT32)  # its alpha stays
+    assert ramp.elements[1].position == pytest.approx(0.375)
+    assert tuple(graph.coat.color_ramp.elements[0].color) == pytest.approx((0.25, 0.25, 0.25, 1.0), abs=FLOAT32)
+    assert graph.node.node_tree != graph.group
+    assert graph.node.node_tree.nodes["Mix"].inputs[0].default_value == pytest.approx(0.875)
+    assert mix.inputs[0].default_value == before  # of the other material
+    toggle_values(graph.material)
+    assert ramp.elements[1].position == pytest.approx(0.25)
+    toggle_values(graph.material)
+    assert ramp.elements[1].position == pytest.approx(0.375)
+    assert revert_values(graph.material) == []
+    assert tuple(ramp.elements[1].color) == pytest.approx((0.2, 0.4, 0.6, 0.5), abs=FLOAT32)
+    assert graph.node.node_tree.nodes["Mix"].inputs[0].default_value == before
+
+
+def test_one_axis_leaves_the_others(graph: SimpleNamespace) -> None:
+    from blender_addon.result.write_back import apply_values, revert_values
+
+    tree = graph.material.node_tree
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    tree.links.new(mapping.outputs[0], graph.noise.inputs["Vector"])
+    mapping.inputs["Scale"].default_value = (1.0, 2.0, 3.0)
+    apply_values(graph.material, {"Mapping/Scale Z": 4.0, "Mapping/Scale X": 1.5}, JOB)
+    assert tuple(mapping.inputs["Scale"].default_value) == (1.5, 2.0, 4.0)
+    revert_values(graph.material)
+    assert tuple(mapping.inputs["Scale"].default_value) == (1.0, 2.0, 3.0)
+
+
+def test_keyframes_of_a_node_are_left_or_get_a_key(graph: SimpleNamespace) -> None:
+    from blender_addon.result.write_back import apply_values
+
+    scale = graph.noise.inputs["Scale"]
+    scale.keyframe_insert("default_value", frame=1)
+    notes = apply_values(graph.material, {"Noise Texture/Scale": 8.0}, JOB)
+    assert "Noise Texture/Scale has keyframes and was left as it is" in notes[0]
+    apply_values(graph.material, {"Noise Texture/Scale": 8.0}, JOB, animated="replace")
+    graph.bpy.context.scene.frame_set(graph.bpy.context.scene.frame_current)
+    assert scale.default_value == 8.0
+
+
+def test_pictures_of_variants(graph: SimpleNamespace, tmp_path: Path) -> None:
+    """The change by a Mix's factor is the difference of its colours, and 40 variants take two renders."""
+    from blender_addon.graph_values.place import read
+    from blender_addon.probe.value_pictures import answer
+
+    bpy = graph.bpy
+    scene, tree = bpy.context.scene, graph.material.node_tree
+    graph.node.inputs["Paint"].default_value = (0.9, 0.5, 0.1, 1.0)
+    values = values_of(graph.material)
+    factor, stop = values["Mix/Factor"], values["Color Ramp.001/Stop 0"]
+    base = [read(tree, factor.place), read(tree, stop.place)]
+    factors = np.linspace(0.0, 1.0, 39)
+    variants = [{"values": base, "sockets": ["Base Color", "Coat Roughness"]}]
+    variants += [{"values": [float(f), base[1]], "sockets": ["Base Color"]} for f in factors]
+    before = {name: len(getattr(bpy.data, name)) for name in ("materials", "node_groups")}
+    found = answer({
+        "scene": scene.name, "layer": bpy.context.view_layer.name, "object": "Väse", "slot": 0,
+        "node": ["Principled BSDF"], "places": [factor.place.request(), stop.place.request()], "variants": variants,
+        "scale": 1, "samples": 1, "folder": str(tmp_path),
+    })  # fmt: skip
+    assert {name: len(getattr(bpy.data, name)) for name in before} == before
+    assert len(found["files"]) == 40
+    seen = np.isfinite(np.load(tmp_path / found["positions"])).all(axis=2)
+    none, half, full = (np.load(tmp_path / found["files"][k]["Base Color"])[seen] for k in (1, 20, 39))
+    np.testing.assert_allclose(full, np.broadcast_to((0.9, 0.5, 0.1), full.shape), atol=1e-5)
+    np.testing.assert_allclose(half, 0.5 * (none + full), atol=1e-5)
+    assert none.std(axis=0).min() > 0.01
+    assert np.load(tmp_path / found["files"][0]["Coat Roughness"]).shape[2] == 1
+
+
+def test_what_a_fit_is_refused(graph: SimpleNamespace, tmp_path: Path) -> None:
+    from blender_addon.export.job import ExportError, export_job
+
+    context, target = graph.bpy.context, graph.bpy.data.objects["Väse"]
+
+    def export(**fit: Any) -> None:
+        export_job(context, target, tmp_path / "job", reference=None, fit=fit)
+
+    with pytest.raises(ExportError, match="the nearest is 'Noise Texture/Scale'"):
+        export(parameters=["Noise Texture/Scales"])
+    with pytest.raises(ExportError, match="Mix/Factor cannot be fitted: the preset paper"):
+        export(parameters=["Mix/Factor"], preset="paper")
+    graph.shader.inputs["Transmission Weight"].default_value = 0.5
+    with pytest.raises(ExportError, match="needs an opaque material, and Transmission Weight is set"):
+        export(parameters=["Mix/Factor"])
+    assert not (tmp_path / "job").exists()

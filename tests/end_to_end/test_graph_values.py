@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A .blend whose colours are inside its nodes: they are found there and written there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from .conftest import run_bpy, run_mfo
+
+BUILD = """
+from studies.graphs.__main__ import build_scene
+target, node = build_scene("ramp", "lamp", 48)
+stops = target.active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
+scene = bpy.context.scene
+scene.cycles.samples = 64
+settings = scene.render.image_settings
+settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+scene.render.filepath = argv[1]
+bpy.ops.render.render(write_still=True)
+for stop in stops:
+    stop.color = (0.4, 0.4, 0.4, 1.0)
+bpy.ops.wm.save_as_mainfile(filepath=argv[0])
+"""
+SHOW = """
+import json
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+stops = bpy.data.objects["Suzanne"].active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
+open(argv[1], "w").write(json.dumps([list(stop.color) for stop in stops]))
+"""
+
+
+def test_stops_of_a_ramp_are_found_and_applied(tmp_path: Path) -> None:
+    start, picture, saved = tmp_path / "start.blend", tmp_path / "reference.exr", tmp_path / "saved.blend"
+    run_bpy(BUILD, start, picture)
+    names = "Color Ramp/Stop 0, color ramp/stop 1"
+    done = run_mfo(
+        "blend", start, "--object", "Suzanne", "--reference", picture, "--parameters", names, "--preset", "fast",
+        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    assert set(done.answer["recovered"]) == {"Color Ramp/Stop 0", "Color Ramp/Stop 1"}
+    levels = {name: entry["level"] for name, entry in done.answer["certainty"].items()}
+    assert levels == dict.fromkeys(done.answer["recovered"], "determined")
+    run_bpy(SHOW, saved, tmp_path / "stops.json")
+    low, high = json.loads((tmp_path / "stops.json").read_text())
+    assert low == pytest.approx([0.8, 0.1, 0.05, 1.0], abs=0.02)
+    assert high == pytest.approx([0.05, 0.2, 0.7, 1.0], abs=0.02)

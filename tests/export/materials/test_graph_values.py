@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded pictures at other values inside the nodes, against Cycles, and their derivatives, against differences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
+from mfo_backend.job.folder.request import read_request  # noqa: E402
+from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
+
+from ..scenes import new_material  # noqa: E402
+from .test_node_graphs import ball, bump, lit_scene, noise_ramp, principled  # noqa: E402
+
+
+def evaluator(request: Any, folder: Path) -> Any:
+    """What a second Blender answers, from this one."""
+    from blender_addon.probe.value_pictures import answer
+    from mfo_backend.render.models.graph_pictures import Evaluated
+
+    where = request.graph.evaluate
+    own = where["sockets"]
+
+    def evaluate(variants: Sequence[Any], *, scale: int, samples: int) -> Any:
+        asked = [{"values": list(values), "sockets": [own[name] for name in names]} for values, names in variants]
+        found = answer({
+            **where, "places": [value.place for value in request.graph.values], "variants": asked,
+            "scale": scale, "samples": samples, "folder": str(folder),
+        })  # fmt: skip
+        pictures = [{name: np.load(folder / file) for name, file in files.items()} for files in found["files"]]
+        return Evaluated(pictures, np.load(folder / found["positions"]), np.array(found["camera"]))
+
+    return evaluate
+
+
+@pytest.mark.parametrize(
+    ("build", "values", "change"),
+    [
+        (noise_ramp, {"Roughness": 0.4}, {"Color Ramp/Stop 0": (0.1, 0.6, 0.3), "Color Ramp/Position 1": 0.7}),
+        (bump("Normal"), {"Base_Color": (0.4, 0.3, 0.2), "Roughness": 0.4}, {"Bump/Strength": 0.4}),
+        (bump("Coat Normal"), {"Coat_Weight": 1.0, "Coat_Roughness": 0.3}, {"Bump/Strength": 0.5}),
+    ],
+    ids=["ramp", "bump", "coat"],
+)
+def test_the_recorded_picture_at_other_values_is_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, tmp_path: Path, build: Any, values: Any, change: Any
+) -> None:
+    from blender_addon.export.nodes.target_shader import target_shader
+    from blender_addon.graph_values.place import write
+    from blender_addon.graph_values.table import graph_values
+    from mfo_backend.render.models.graph_pictures import GraphPictures
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures.renderer import load_renderer
+
+    lit_scene(scene)
+    material = new_material("Target", **values)
+    build(material.node_tree, principled(material))
+    target = ball(material)
+    picture = tmp_path / "reference.exr"
+    from mfo_backend.scene.image_file import write_exr
+
+    write_exr(picture, render_cycles())
+    report = export(target, reference=picture, fit={"parameters": ["roughness", *change]})
+    folder = JobFolder.open(report.folder)
+    request = read_request(folder)
+    assert request.graph is not None
+    assert [value.name for value in request.graph.values] == list(change)
+    assert (report.folder / "graph" / "scene.blend").is_file()
+    linked = [name for name, socket in request.materials["target_bsdf"].sockets.items() if socket.graph]
+    renderer = load_renderer(
+        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=["roughness"],
+        materials=request_materials(folder, request), light_paths=request.light_paths,
+        graph=GraphPictures(request.graph.values, evaluator(request, tmp_path), linked),
+    )  # fmt: skip
+    recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    there = renderer.table.pack({**renderer.table.unpack(renderer.start), **change})
+    paths = recorded.record(there, grid=4, seed=0, near=True)
+    groups = paths.pixel_groups(paths.interior)
+    found = recorded.evaluator(paths, groups)(there)
+    tree = material.node_tree
+    for value in graph_values(target_shader(material)):
+        if value.name in change:
+            write(tree, value.place, change[value.name])
+    truth = render_cycles().reshape(-1, 3)[groups.pixels]
+    assert abs(found[:, :, 0].mean() / truth.mean() - 1.0) < 0.004
+    assert np.sqrt(np.mean((found[:, :, 0] - truth) ** 2)) / truth.mean() < 0.025
+    # what is path traced shows the same
+    traced = renderer.image(there, seed=0, spp=64).reshape(-1, 3)[groups.pixels]
+    assert abs(traced.mean() / truth.mean() - 1.0) < 0.01
+    step = 0.02
+    for k in range(1, len(there)):
+        moved = there + step * (np.arange(len(there)) == k)
+        recorded.renderer.graph.settle(moved[1:])
+        change_of = (recorded.evaluator(paths, groups)(moved)[:, :, 0] - found[:, :, 0]) / step
+        slope = found[:, :, 1 + k]
+        # the difference is taken over a few per cent of the range, where normals turn
+        assert np.corrcoef(change_of.ravel(), slope.ravel())[0, 1] > 0.98, renderer.table.names
+        assert abs((change_of * slope).sum() / (slope**2).sum() - 1.0) < 0.06

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values inside nodes in a job: the request's entry, and the Blender that evaluates them, as a process."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mfo_backend.job.folder.graph_request import graph_from_json, graph_to_json
+from mfo_backend.job.run import graph_blender
+from mfo_backend.job.run.graph_blender import GraphBlender
+from mfo_backend.types.errors import BadInputError, MfoError
+
+ENTRY: dict[str, Any] = {
+    "camera": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]],
+    "positions": "graph/positions.npy",
+    "values": [
+        {
+            "name": "Color Ramp/Stop 0", "value": [0.1, 0.2, 0.3], "lower": 0.0, "upper": 1.0, "logarithmic": False,
+            "step": 0.002, "sockets": ["Base Color"], "place": {"node": ["Color Ramp"]},
+        },
+        {
+            "name": "Noise Texture/Scale", "value": 4.0, "lower": 1.0, "upper": 16.0, "logarithmic": True,
+            "step": 0.06, "sockets": ["Base Color"], "place": {"node": ["Noise Texture"]},
+        },
+    ],
+    "evaluate": {"scene": "Scene", "layer": "ViewLayer", "object": "Head", "slot": 0, "node": ["Principled BSDF"],
+                 "sockets": {"Base Color": "Color"}},
+}  # fmt: skip
+
+
+def test_the_entry_comes_back() -> None:
+    graph = graph_from_json(ENTRY, "request.json")
+    assert graph is not None
+    assert [value.parameter.size for value in graph.values] == [3, 1]
+    assert graph_from_json(json.loads(json.dumps(graph_to_json(graph))), "request.json") == graph
+    plain = {key: ENTRY[key] for key in ("camera", "positions")}
+    assert set(graph_to_json(graph_from_json(plain, "request.json")) or ()) == set(plain)
+
+
+@pytest.mark.parametrize(
+    ("path", "wrong", "sentence"),
+    [
+        (("values", 0, "upper"), 0.0, r"values\[0\].upper is 0.0: it must be above 0"),
+        (("values", 0, "value"), [0.1, 0.2], "must be a number, or a list of three"),
+        (("values", 1, "step"), 0.0, "step is 0.0"),
+        (("values", 1, "sockets"), ["Normal"], "graph.evaluate.sockets has no 'Normal'"),
+        (("values",), "all", "must be a list of at most 256"),
+        (("evaluate", "slot"), -1, "slot is -1"),
+        (("evaluate", "sockets"), {"Base Color": 3}, "must be names by names"),
+        (("evaluate", "command"), "rm", "unknown key 'command'"),
+        (("evaluate",), None, "graph.evaluate"),
+    ],
+)
+def test_what_is_wrong_is_said(path: tuple[Any, ...], wrong: Any, sentence: str) -> None:
+    entry: Any = copy.deepcopy(ENTRY)
+    inner = entry
+    for step in path[:-1]:
+        inner = inner[step]
+    inner[path[-1]] = wrong
+    with pytest.raises(BadInputError, match=sentence):
+        graph_from_json(entry, "request.json")
+
+
+def server(does: str) -> tuple[str, ...]:
+    """A command line that stands in for Blender: it says that it is ready, then runs `does` for each `line`."""
+    script = (
+        "import json, sys, time, numpy as np\n"
+        'print("Blender 5.0", flush=True)\n'
+        'print(\'{"status": "ok"}\', flush=True)\n'
+        f"for line in sys.stdin:\n    asked = json.loads(line)\n    {does}\n"
+    )
+    return (sys.executable, "-c", script)
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def ask(words: tuple[str, ...]) -> Any:
+    graph = graph_from_json(ENTRY, "request.json")
+    assert graph is not None
+    with GraphBlender(words, Path("scene.blend"), graph) as blender:
+        return blender([(((0.1, 0.2, 0.3), 4.0), ("Base Color",))], scale=2, samples=4)
+
+
+def test_an_answer_is_read_and_nothing_is_left(temporary: Path) -> None:
+    does = (
+        "folder = asked['folder']; np.save(folder + '/a.npy', np.full((2, 3, 3), asked['variants'][0]['values'][1])); "
+        "np.save(folder + '/p.npy', np.zeros((2, 3, 3))); "
+        "files = [dict.fromkeys(asked['variants'][0]['sockets'], 'a.npy')]; "
+        "print(json.dumps({'status': 'ok', 'files': files, 'positions': '../p.npy', 'camera': [[1, 2, 3, 4]] * 3}),"
+        " flush=True)"
+    )
+    found = ask(server(does))
+    assert np.asarray(found.pictures[0]["Base Color"]).tolist() == np.full((2, 3, 3), 4.0).tolist()
+    assert found.camera.shape == (3, 4)
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("does", "kind", "sentence"),
+    [
+        ("print(json.dumps({'status': 'bad_input', 'sentence': 'Not seen.'}), flush=True)", BadInputError, "Not seen"),
+        ("print('out of memory', file=sys.stderr, flush=True); sys.exit(1)", MfoError, "has ended: out of memory"),
+        ("time.sleep(60)", MfoError, "has not answered for 2 s and was ended"),
+    ],
+    ids=["refuses", "dies", "hangs"],
+)
+def test_a_blender_that_does_not_answer_is_said(
+    does: str, kind: type[MfoError], sentence: str, temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(graph_blender, "ANSWER_SECONDS", 2.0)
+    start = time.monotonic()
+    with pytest.raises(kind, match=sentence):
+        ask(server(does))
+    assert time.monotonic() - start < 20.0
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_program_that_is_not_there() -> None:
+    with pytest.raises(MfoError, match="could not be started"):
+        ask((os.path.join("nowhere", "blender"),))

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a graph at any values: derivatives by differences, and where nothing has to be evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mfo_backend.render.models.graph_pictures import Evaluated, GraphPictures, Variant
+from mfo_backend.types.node_value import NodeValue
+
+NOISE = np.random.default_rng(0).uniform(0.0, 1.0, (6, 8, 1)).astype(np.float32)
+
+
+def value(name: str, start: float | tuple[float, ...], sockets: tuple[str, ...], upper: float = 1.0) -> NodeValue:
+    return NodeValue(name, start, 0.0, upper, False, 0.002 * upper, sockets, {})
+
+
+class Nodes:
+    """Base colour: a mix of a colour and grey by noise; roughness: noise to a power."""
+
+    def __init__(self) -> None:
+        self.variants: list[int] = []
+
+    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+        self.variants.append(len(variants))
+        pictures = []
+        for (color, power), sockets in variants:
+            known = {
+                "Base Color": (NOISE * np.array(color) + (1.0 - NOISE) * 0.5).astype(np.float32),
+                "Roughness": (NOISE**power).astype(np.float32),
+            }
+            pictures.append({name: known[name] for name in sockets})
+        positions = np.zeros((*NOISE.shape[:2], 3), np.float32)
+        positions[0] = np.nan  # the first row is beside the target
+        return Evaluated(pictures, positions, np.zeros((3, 4)))
+
+
+def graph(nodes: Nodes) -> GraphPictures:
+    values = (value("Mix/A", (0.2, 0.3, 0.4), ("Base Color",)), value("Math/Value", 1.5, ("Roughness",), 3.0))
+    return GraphPictures(values, nodes, ("Base Color", "Roughness", "Metallic"))
+
+
+def test_pictures_and_derivatives() -> None:
+    nodes = Nodes()
+    pictures = graph(nodes)
+    assert pictures.table.names == ("Mix/A", "Math/Value")
+    assert pictures.varying == {"base_color": (0, 1, 2), "roughness": (3,)}
+    state = pictures.state(np.array([0.2, 0.3, 1.0, 2.0]))
+    assert nodes.variants == [5]  # the last component is at no bound, the third is: its difference goes back
+    noise = NOISE.reshape(-1, 1)
+    for channel in range(3):
+        wanted = np.zeros((48, 3))
+        wanted[:, channel] = noise[:, 0]
+        np.testing.assert_allclose(state.slopes["base_color"][channel][:-1], wanted, atol=1e-3)
+    np.testing.assert_allclose(state.pictures["roughness"][:-1], noise**2, rtol=1e-6)
+    np.testing.assert_allclose(state.slopes["roughness"][3][:-1], np.log(noise) * noise**2, atol=3e-3)
+    # the last row stands for hits that the camera does not see
+    np.testing.assert_allclose(state.pictures["roughness"][-1], (NOISE[1:] ** 2).mean(), rtol=1e-5)
+
+
+def test_what_is_linear_is_evaluated_twice_and_never_again() -> None:
+    nodes = Nodes()
+    pictures = graph(nodes)
+    for red in (0.1, 0.9, 0.3, 0.7):
+        at = np.array([red, 0.5, 0.2, 1.5])
+        found = pictures.state(at).pictures["base_color"][:-1]
+        np.testing.assert_allclose(found[:, 0], NOISE.ravel() * red + (1.0 - NOISE.ravel()) * 0.5, atol=2e-3)
+    assert len(nodes.variants) == 2
+    pictures.settle(at)  # but the first of a recording is exact
+    assert len(nodes.variants) == 3
+
+
+def test_what_is_not_linear_is_extrapolated_nearby_alone() -> None:
+    nodes = Nodes()
+    pictures = graph(nodes)
+
+    def roughness(power: float) -> np.ndarray:
+        return pictures.state(np.array([0.5, 0.5, 0.5, power])).pictures["roughness"][:-1]
+
+    roughness(1.0)
+    roughness(1.5)
+    for power in (1.52, 1.48, 2.5, 0.4, 0.42):
+        error = roughness(power) - NOISE.reshape(-1, 1) ** power
+        assert np.sqrt(np.mean(error**2)) < 2e-3, power
+    assert len(nodes.variants) == 4  # of 7
+
+
+def test_finer_pictures_are_kept() -> None:
+    nodes = Nodes()
+    pictures = graph(nodes)
+    at = np.array([0.5, 0.5, 0.5, 1.0])
+    pictures.note(at, {"roughness": NOISE})
+    assert pictures.fine(at)["roughness"] is NOISE
+    assert nodes.variants == []
+    np.testing.assert_allclose(pictures.fine(at + 0.25)["roughness"], NOISE**1.25, rtol=1e-6)
+    assert nodes.variants == [1]
