@@ -171,16 +171,16 @@ class BlenderPrincipled(mi.BSDF):
         others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
         return frame, frame.to_local(view), {name: frame.to_local(other) for name, other in others.items()}
 
-    def own_directions(self, si: mi.SurfaceInteraction3f, frame: mi.Frame3f) -> dict[str, mi.Vector3f]:
-        """The axes of the frame of `bumped_frame` in the world, and in it the mesh's own geometric normal, on the side
-        of the view, and tangent."""
+    def directions_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, mi.Vector3f]:
+        """The normals of `bumped_frame`, the axes of its frame in the world, and in that frame the mesh's geometric
+        normal, on the side of the view, and its own tangent."""
+        frame, _, normals = self.bumped_frame(si, active)
         view: Any = si.to_world(si.wi)
         geometric = mi.Vector3f(si.n)
         geometric = dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
-        return {
-            "frame_s": mi.Vector3f(frame.s), "frame_t": mi.Vector3f(frame.t), "frame_n": mi.Vector3f(frame.n),
-            "geometric_normal": frame.to_local(geometric), "own_tangent": frame.to_local(mi.Vector3f(si.sh_frame.s)),
-        }  # fmt: skip
+        axes = {"frame_s": mi.Vector3f(frame.s), "frame_t": mi.Vector3f(frame.t), "frame_n": mi.Vector3f(frame.n)}
+        own = {"geometric_normal": geometric, "own_tangent": mi.Vector3f(si.sh_frame.s)}
+        return normals | axes | {name: frame.to_local(direction) for name, direction in own.items()}
 
     def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> _Surface:
         values, wi, frame = self.values_at(si, active), si.wi, None

@@ -41,14 +41,13 @@ class RecordSettings:
     proposal. `depth` is the path length of light that arrives over other surfaces: 2 leaves it out. `hide_emitters`
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
-    wrapper. `held` names values of the target's material that textures give; its plugin has to tell them. `bumped` says
-    that nodes give normals to the plugin. With a `surface`, lanes keep their `subpixel` on it. With `light_paths` light
-    over other surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the only ones looked at;
-    where they hold all that see the target, nothing is missed. With `highlights` more rays start where lights of no
-    extent are mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples
-    of the same directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need
-    no other kernels than a recording with it. With `free_emission` the target's own emission is kept apart from the
-    constant picture.
+    wrapper. `held` names values of the target's material that textures give; its plugin tells them. `bumped` says that
+    nodes give it normals. With a `surface`, lanes keep their `subpixel` on it. With `light_paths` light over other
+    surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the only ones looked at; where they
+    hold all that see the target, nothing is missed. With `highlights` more rays start where lights of no extent are
+    mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples of the same
+    directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need no other
+    kernels than a recording with it. With `free_emission` the target's own emission is no part of the constant picture.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -142,8 +141,7 @@ def record_paths(
             plugin: Any = shape.bsdf()
             values = plugin.values_at(si, mi.Bool(True))
             if settings.bumped:
-                frame, _, normals = plugin.bumped_frame(si, mi.Bool(True))
-                values |= normals | plugin.own_directions(si, frame)
+                values |= plugin.directions_at(si, mi.Bool(True))
             if settings.surface is not None:
                 values["subpixel"] = settings.surface.row_of(si.p)
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
