@@ -12,8 +12,8 @@ import pytest
 from mfo_backend.fit.plans import TransmissionPlan
 from mfo_backend.fit.random_streams import Stream
 from mfo_backend.fit.traced.choose_end import GUARD_PARTS, choose_end
+from mfo_backend.fit.traced.polish import COUNTED_STEPS, MOST_COUNTINGS
 from mfo_backend.fit.traced.sample_count import MOST_COUNT
-from mfo_backend.fit.traced.stages import COUNTED_STEPS, MOST_COUNTINGS
 
 FITS = (0, 1, 2, 3, 7, 100, 1009, 65535, 2**31 - 1)
 

@@ -27,9 +27,8 @@ def picture(height=9, width=7):
 
 def write_parts(path, *parts, **header):
     header = {"type": OpenEXR.scanlineimage, **header}
-    OpenEXR.File([OpenEXR.Part(dict(header), channels, name=f"p{i}") for i, channels in enumerate(parts)]).write(
-        str(path)
-    )
+    made = [OpenEXR.Part(dict(header), channels, name=f"p{i}") for i, channels in enumerate(parts)]
+    OpenEXR.File(made).write(str(path))
 
 
 def test_exr_round_trip_keeps_every_bit(tmp_path):

@@ -26,10 +26,13 @@ from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds, kept_note
 from ..squares.stage_residuals import finishing_residuals
 from ..tolerances import VISIBLE, WEAK_BELOW
+from .choose_end import choose_end
 from .linear_pictures import LinearPictures
 from .perceptual_stages import FLIP, lower_seen_error
+from .pictures import TracedTiles
+from .polish import polish
 from .polished import CORE, Polished
-from .stages import TransmissionFit
+from .search import Setting, race, scan
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ...render.paths.traced_paths import TracedPaths
@@ -90,16 +93,19 @@ class TracedRoute:
             task.began,
             picture=lambda x: _preview(paths, x, task.mask.shape, Stream.PREVIEW.seed(seed)),
         )
-        fit = TransmissionFit(paths, renderer.start, task.light, task.mask, self._plan, seed, course, task.clipped)
+        pictures = TracedTiles(paths, task.light, task.mask, task.clipped, should_stop)
+        setting = Setting(pictures, renderer.start, self._plan, seed, course)
 
-        ends: list[Polished] = []
+        ends: Sequence[Polished] = ()
         freest = 0
-        nodes = fit.scan()
-        found = [fit.race(nodes) if not should_stop() else nodes[0][1]]
+        nodes = scan(setting)
+        raced_to = race(setting, nodes) if not should_stop() else nodes
+        found = [raced_to[0]]
         if not should_stop():
-            ends = fit.polish(found[0])
+            polishing = polish(setting, raced_to)
+            ends, pictures = polishing.ends, polishing.pictures
             candidates = [end.x for end in reversed(ends)] + found
-            chosen = fit.choose(candidates)
+            chosen = choose_end(pictures, candidates, self._plan, seed, Stream.CHOOSE)
             raced = chosen == len(ends)
             found = [candidates[chosen]]
             ends = ends if raced else ends[: len(ends) - chosen]
@@ -112,14 +118,14 @@ class TracedRoute:
         judge: PictureJudge | None = None
         nearer: list[Vector] = []
         if self._seen_residuals and ends and not should_stop():
-            linear = LinearPictures(fit.pictures, seed)
+            linear = LinearPictures(pictures, seed)
             if linear.are_worth_it(found[0], task.reference, task.view):
                 judge = self._judge(task.light, blurred=task.linear)
                 end = lower_seen_error(
                     linear, judge, self._seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in self.stages
                 )
                 nearer = [] if np.array_equal(end, found[0]) else [end]
-        counts = fit.pictures.counts
+        counts = pictures.counts
         notes = ()
         if counts is not None:
             notes = (
@@ -158,7 +164,7 @@ class TracedRoute:
         settings, view = task.settings, task.view
         return PictureJudge(task.measure, task.reference, background, task.mask, settings, view, blurred=blurred)
 
-    def _known(self, ends: list[Polished]) -> tuple[dict[str, Certainty], tuple[str, ...]]:
+    def _known(self, ends: Sequence[Polished]) -> tuple[dict[str, Certainty], tuple[str, ...]]:
         """How sure the last end's values are, and a sentence on those that went back to the user's unseen."""
         if not ends:
             return {}, ()
@@ -182,7 +188,7 @@ def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -
     return np.pad(filled, short, mode="edge")[:height, :width]
 
 
-def _certainty(ends: list[Polished], table: ParameterTable) -> dict[str, Certainty]:
+def _certainty(ends: Sequence[Polished], table: ParameterTable) -> dict[str, Certainty]:
     """How sure each value is, given those that went back to the user's; these are as unsure as when they were free.
 
     A value of the glass itself that the picture does not determine is hardly the user's, so given it nothing is surer.

@@ -8,6 +8,7 @@ either, where those of one picture with itself would.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,24 +37,20 @@ SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has le
 SECANTS = {"roughness": 0.12, "ior": 0.045}
 
 
+@dataclass(frozen=True, eq=False)
 class TracedTiles:
     """Pictures of `paths` against a scene-linear `reference` (height, width, 3), in pixels of the `mask`.
 
-    `clipped` is 1 where the reference is only a lower bound. Once `count_samples` has found it noisy, all pictures and
+    `clipped` is 1 where the reference is only a lower bound. With `counts`, for a noisy reference, all pictures and
     tiles are compressed.
     """
 
-    def __init__(
-        self,
-        paths: TracedPaths,
-        reference: Pixels,
-        mask: NDArray[np.bool_],
-        clipped: NDArray[np.float32] | None,
-        should_stop: Callable[[], bool],
-    ) -> None:
-        self.paths, self.reference, self.mask, self.clipped = paths, reference, mask, clipped
-        self.counts: EqualCounts | None = None
-        self.should_stop = should_stop
+    paths: TracedPaths
+    reference: Pixels = field(repr=False)
+    mask: NDArray[np.bool_] = field(repr=False)
+    clipped: NDArray[np.float32] | None = field(repr=False)
+    should_stop: Callable[[], bool]
+    counts: EqualCounts | None = None
 
     def tiles(self, size: int, most: int) -> TileRows:
         """Tiles of the reference, compressed where pictures are compared so."""
@@ -122,13 +119,11 @@ class TracedTiles:
             for image, (i, k, h) in zip(images, where, strict=True):
                 tables[i, :, :, 1 + k] = (image - tables[i, :, :, 0]) / h
 
-    def count_samples(self, x: Vector, most: int, seed: int) -> EqualCounts | None:
-        """Compare from now on as the reference's noise asks for, judged by pictures of `x` in about `most` pixels."""
-        self.counts = None
-        pixels = self.tiles(BLOCK, most).pixels
-
-        self.counts = equal_counts(self.reference, self.mask, pixels, self.clipped, self._linear(x, pixels, seed))
-        return self.counts
+    def counted(self, x: Vector, most: int, seed: int) -> TracedTiles:
+        """The same, compared as the reference's noise asks for, judged by pictures of `x` in about `most` pixels."""
+        pixels = replace(self, counts=None).tiles(BLOCK, most).pixels
+        counts = equal_counts(self.reference, self.mask, pixels, self.clipped, self._linear(x, pixels, seed))
+        return replace(self, counts=counts)
 
     def recount(self, x: Vector, pixels: NDArray[np.int64], seed: int) -> Recount | None:
         """What the noise in these pixels says at the end `x` of a fit; None where pictures are not compared so."""
