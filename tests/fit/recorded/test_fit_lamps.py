@@ -41,5 +41,5 @@ def test_the_truth_is_found_under_a_lamp(tmp_path, name):
 @pytest.mark.parametrize("name", ["soft point", "spread"])
 def test_adam_goes_downhill_under_a_lamp(tmp_path, name):
     """On pull-backs of the integrator, which are the same for all lamps."""
-    _, result = fit(tmp_path, name, "paper", max_iterations=60)
+    _, result = fit(tmp_path, name, "paper", max_iterations=25)
     assert result.errors["mse"][1] < 0.5 * result.errors["mse"][0]

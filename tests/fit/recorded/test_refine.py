@@ -50,7 +50,7 @@ def test_a_recording_that_is_too_old_is_made_anew(refined):
     plan = RecordedPlan(too_noisy=NEVER, most_own=1.0)
 
     def error_and_recordings(**guards):
-        found = [refined(plan, seed, **guards) for seed in range(24)]
+        found = [refined(plan, seed, **guards) for seed in range(11)]
         return np.median(found, axis=0)
 
     stale, recordings = error_and_recordings(MOVED=NEVER, NOISIER=NEVER)

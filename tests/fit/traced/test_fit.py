@@ -53,7 +53,7 @@ def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
 
 
 def test_the_intervals_hold_the_truth(tmp_path):
-    renderer = load(tmp_path, size=96)
+    renderer = load(tmp_path, size=56)
     x = renderer.table.pack(TRUTH)
     deviations = []
     for seed in range(5, 11):
@@ -130,7 +130,8 @@ def test_a_polish_takes_more_samples_where_an_eye_would_see_their_noise(tmp_path
         add(self, samples, weight)
 
     monkeypatch.setattr(TilePools, "add", added)
-    fit(renderer, reference)
+    # the first step with more samples says all
+    fit(renderer, reference, stop=lambda: bool(weights) and max(weights) > weights[0])
     assert weights[0] < MOST_SAMPLES
     assert (max(weights) > weights[0]) is grows
     assert max(weights) <= MOST_SAMPLES
@@ -141,7 +142,7 @@ def test_fireflies_do_not_decide_where_counts_are_equal(tmp_path, monkeypatch):
     x = renderer.table.pack(TRUTH)
     width = renderer.table.upper - renderer.table.lower
     errors = {True: [], False: []}
-    for seed in (5, 6, 7):
+    for seed in (5, 6):
         reference = renderer.image(x, seed=seed, spp=8)
         for equal in errors:
             monkeypatch.setattr(equal_counts, "LOUD", 0.25 if equal else np.inf)
@@ -254,7 +255,7 @@ def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
     monkeypatch.setattr("mfo_backend.fit.result.course._PREVIEW_SECONDS", np.inf)  # they come by the clock
     launch, launches, passes = TracedPaths._launch, [], []
     monkeypatch.setattr(TracedPaths, "_launch", lambda *given: launches.append(given) or launch(*given))
-    for truth in ({}, {"roughness": 0.1, "ior": 1.6}, {"roughness": 0.5, "ior": 1.8, "base_color": (0.4, 0.5, 0.6)}):
+    for truth in ({}, {"roughness": 0.1, "ior": 1.6}):
         reference = renderer.image(renderer.table.pack({**TRUTH, **truth}), seed=5, spp=32)
         before = renderer.passes
         result, _ = fit(renderer, reference)

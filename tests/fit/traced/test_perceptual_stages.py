@@ -33,13 +33,20 @@ def blend(tmp_path_factory):
     return renderer, lambda seed, spp: np.mean([renderer.image(x, seed=seed, spp=spp) for x in truths], axis=0)
 
 
-def test_flip_is_lower_where_no_values_give_the_picture(blend):
+@pytest.fixture(scope="module")
+def fits(blend):
+    """Results of the presets on such a picture."""
     renderer, picture = blend
-    reference, clean = picture(5, 32), picture(7, 512)
+    return {preset: fit(renderer, picture(5, 32), preset=preset)[0] for preset in ("fast", "balanced", "best")}
+
+
+def test_flip_is_lower_where_no_values_give_the_picture(blend, fits):
+    renderer, picture = blend
+    clean = picture(7, 512)
     flip = make_loss("flip-hdr", Image(clean, Encoding.LINEAR), mask=renderer.target_mask())
     errors = {}
     for preset, last in (("fast", ["polish"]), ("balanced", ["itp", "pu21"]), ("best", ["itp", "pu21", "flip"])):
-        result, _ = fit(renderer, reference, preset=preset)
+        result = fits[preset]
         assert [stage.name for stage in result.stages][-len(last) :] == last
         (instead,) = (note for note in result.notes if "whole light paths" in note)
         assert f"'{last[-1]}'" in instead
@@ -161,13 +168,11 @@ def test_a_large_target_goes_without(blend, monkeypatch):
     assert [stage.name for stage in result.stages] == ["scan", "race", "polish"]
 
 
-def test_the_end_of_the_squares_is_kept_where_flip_is_not_better(blend, monkeypatch):
+def test_the_end_of_the_squares_is_kept_where_flip_is_not_better(blend, fits, monkeypatch):
     renderer, picture = blend
-    reference = picture(5, 32)
-    squares, _ = fit(renderer, reference, preset="fast")
     monkeypatch.setattr(
         "mfo_backend.fit.traced.fit.lower_seen_error", lambda *given, **more: renderer.table.pack(OTHER)
     )
-    result, _ = fit(renderer, reference, preset="best")
-    assert result.recovered == squares.recovered
+    result, _ = fit(renderer, picture(5, 32), preset="best")
+    assert result.recovered == fits["fast"].recovered
     assert any("'polish' was kept" in note for note in result.notes)

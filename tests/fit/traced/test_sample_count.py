@@ -220,7 +220,7 @@ def test_a_wrong_count_is_made_good(glass, monkeypatch):
     errors = {}
     for again in (True, False):
         monkeypatch.setattr(traced_tiles, "recount", known if again else lambda *of: replace(known(*of), log_ratio=0.0))
-        found = [fit(renderer, renderer.image(x, seed=seed, spp=8))[0].recovered for seed in (5, 6, 7)]
+        found = [fit(renderer, renderer.image(x, seed=seed, spp=8))[0].recovered for seed in (5, 6)]
         errors[again] = np.mean([np.abs(renderer.table.pack(values) - x)[:3] for values in found])
     assert errors[True] < 0.6 * errors[False]  # 0.017 and 0.040
 

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where two pictures differ says why; here on a disc whose difference is put where a cause would have it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.judge.likely_cause import RIM, likely_cause
+from mfo_backend.types.verdict import Cause
+
+SIZE = 64
+Y, X = np.mgrid[:SIZE, :SIZE]
+
+
+def disc(radius, x=31.5, y=31.5):
+    return np.hypot(X - x, Y - y) < radius
+
+
+def textured(mask, seed=1):
+    """A disc that no shift makes another, on black."""
+    noise = np.random.default_rng(seed).uniform(0.2, 0.8, (SIZE, SIZE, 3))
+    return np.where(mask[..., None], noise, 0.0)
+
+
+@pytest.mark.parametrize("radius", [20, 12])
+def test_a_difference_at_the_silhouette_is_the_shapes(radius):
+    mask = disc(radius)
+    reference, result = textured(mask), textured(mask)
+    result[mask & ~disc(radius - RIM)] += 0.3
+    assert likely_cause(reference, result, mask, None, noted=True) is Cause.CAMERA_OR_SHAPE
+
+
+@pytest.mark.parametrize("noted", [False, True])
+def test_a_difference_everywhere_is_not_the_shapes_where_most_of_a_small_target_is_rim(noted):
+    mask = disc(5)
+    reference, result = textured(mask), textured(mask)
+    result[mask] += 0.3
+    cause = Cause.NOTED if noted else Cause.MATERIAL
+    assert likely_cause(reference, result, mask, None, noted=noted) is cause
+
+
+def test_a_difference_inside_is_the_materials():
+    mask = disc(20)
+    reference, result = textured(mask), textured(mask)
+    result[disc(10)] += 0.3
+    assert likely_cause(reference, result, mask, None, noted=False) is Cause.MATERIAL
+
+
+@pytest.mark.parametrize("step", [1, 4])
+def test_a_moved_picture_is_the_cameras(step):
+    whole = textured(np.ones((SIZE, SIZE), bool))
+    smooth = sum(np.roll(whole, (i, j), (0, 1)) for i in range(5) for j in range(5)) / 25
+    assert likely_cause(smooth, np.roll(smooth, step, 1), disc(20), None, noted=False) is Cause.CAMERA_OR_SHAPE
