@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+NEAR_EVALUATIONS = 12  # of a solve that begins near its end: where light is sampled, and of what is tried from there
+PERCEPTUAL_EVALUATIONS = 25  # of a stage, from each start
+
 
 @dataclass(frozen=True)
 class RecordedPlan:

@@ -34,7 +34,6 @@ SolveBelow = Callable[[Vector, float], Solution]
 
 SOLVED = 1e-8  # a relative error of 1.4e-4 a pixel: no wrong basin of 128 hard cases came as near
 MOST_MOVES = 3  # from basin to basin
-HALF = 0.5
 SHEENS = (0.1, 0.5)  # roughnesses of a sheen to begin with
 STRETCH = 0.9  # of Blender's anisotropy: the stretch is the root of 1 less so much of it
 PAST = 1.02  # the larger width that says whether the picture knows of the clamp
@@ -65,16 +64,16 @@ def _better(solve: SolveBelow, found: Solution, table: ParameterTable) -> Soluti
 def moved(x: Vector, table: ParameterTable) -> Iterator[Vector]:
     """Materials that may be taken for `x`, in the order in which they are worth a trial."""
     if {"flatness", "metallic"} <= set(table.names) and _value(x, table, "flatness") > OFF:
-        yield _with(x, table, flatness=0.0, metallic=HALF, specular=HALF)
+        yield _with(x, table, flatness=0.0, metallic=0.5, specular=0.5)
     if not exchangeable(table):
         return
     yield exchanged(x, table)
-    yield _with(x, table, roughness=HALF * _value(x, table, "roughness"))
-    yield _with(x, table, coat_roughness=HALF)
-    yield _with(x, table, coat_weight=HALF)
+    yield _with(x, table, roughness=0.5 * _value(x, table, "roughness"))
+    yield _with(x, table, coat_roughness=0.5)
+    yield _with(x, table, coat_weight=0.5)
     if "sheen_weight" in table.names:
         for roughness in SHEENS:
-            yield _with(x, table, sheen_weight=HALF, sheen_roughness=roughness)
+            yield _with(x, table, sheen_weight=0.5, sheen_roughness=roughness)
 
 
 def metal_rivals(
@@ -115,7 +114,7 @@ def metal_exchanged(x: Vector, table: ParameterTable) -> Vector | None:
     if np.max((1.0 - metallic) * color) > DARK_ALBEDO or np.max(f0) > DARK_F0:
         return None
     dielectric, metal = OPPOSITE
-    if metallic < HALF:
+    if metallic < 0.5:
         return _with(x, table, metallic=metal, base_color=f0)
     return _with(x, table, metallic=dielectric, base_color=0.0, **{level: float(f0.mean()) / F0_OF_LEVEL})
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable
+from ..plans import NEAR_EVALUATIONS
 from ..squares.problem import Problem, Refined, Rival
 from ..tolerances import ANOTHER_MATERIAL, HOPELESS, SIGNIFICANT
 from .compare import compare
@@ -26,7 +27,6 @@ Vector = NDArray[np.float64]
 
 BASE, COAT = ("specular_ior_level", "roughness"), ("coat_weight", "coat_roughness")
 SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the same index does (Blender 4.0)
-EVALUATIONS = 12
 
 
 class Solve(Protocol):
@@ -128,7 +128,7 @@ class OtherEnds:
         What is hopeless follows from the scatter between tiles: a few of them with fireflies may cost any chi squared.
         """
         for problem in (self._all,) if self._few is self._all else (self._few, self._all):
-            end = self._solve(problem, start, EVALUATIONS, box=box, wanted=np.inf)
+            end = self._solve(problem, start, NEAR_EVALUATIONS, box=box, wanted=np.inf)
             it = compare(problem, found.x, end.x)
             if not it.more / it.inflation <= HOPELESS:
                 return None

@@ -15,8 +15,7 @@ from ...types.image import Pixels
 from ...types.result import CurvePoint, StageReport
 from ...types.status import Status
 from ..result.best_so_far import BestSoFar
-
-_PREVIEW_SECONDS = 1.0  # no more than one preview in this time
+from ..result.course import PREVIEW_SECONDS
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ class StageLog:
             self._unseen = step.image
             self._best.found(self._name, step.vector)
         self._best.tell(now)
-        if self._unseen is not None and now - self._previewed >= _PREVIEW_SECONDS:
+        if self._unseen is not None and now - self._previewed >= PREVIEW_SECONDS:
             self._previewed = now
             self._listener(Preview(self._unseen))
             self._unseen = None

@@ -12,6 +12,7 @@ from ...types.image import Pixels
 from ..alike.unneeded_lobes import Box
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
+from ..plans import PERCEPTUAL_EVALUATIONS
 from ..result.outcome import End
 from ..settings import FitSettings
 from ..squares.problem import Problem
@@ -22,7 +23,6 @@ from .solve import solve, solve_within
 
 FLIP_STARTS = 2
 FINALISTS = 2  # ends that are path-traced besides the start and the end of the least squares
-EVALUATIONS = 25  # of a stage, from each start
 
 
 def perceptual_ends(
@@ -75,7 +75,7 @@ def _lower_squares(
     with setting.course.stage(name) as stage:
         stage.picture = recording.preview
         problem = replace(problem, residual=make(problem.groups.average(setting.reference)), near=starts[0])
-        found = [solve(setting, problem, start, EVALUATIONS, stage=stage, box=box) for start in starts]
+        found = [solve(setting, problem, start, PERCEPTUAL_EVALUATIONS, stage=stage, box=box) for start in starts]
         stage.vector = min(found, key=lambda solution: solution.equations.cost).x
     return [solution.x for solution in found if np.isfinite(solution.equations.cost)]
 

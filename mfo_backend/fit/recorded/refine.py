@@ -13,6 +13,7 @@ from ...solve.bounded_least_squares import Solution
 from ..alike.exchanges import best_basin, metal_rivals, width_rivals
 from ..alike.simplest import OtherEnds, SimplestEnd
 from ..alike.unneeded_lobes import solve_without_unneeded
+from ..plans import NEAR_EVALUATIONS
 from ..result.course import Stage
 from ..squares.problem import Refined
 from ..squares.residuals import MakeResidual, MakeWeighted
@@ -23,7 +24,6 @@ from .start import Started
 from .where_to_look import all_groups, fewer_groups, finer_grid, solution_grid
 
 EVALUATIONS_EXACT = 15
-EVALUATIONS = 12
 MOST_RECORDINGS = 3  # at the solution, until it holds still
 # After a solve its recording is too old if the tiles changed by this share, or if its own noise grew by this factor.
 # The first is what mends fits that began far away, though most of those keep their samples; the second finds a lobe
@@ -123,7 +123,7 @@ def _recorded_near(
         recording = setting.record(start, grid, number)
         stage.picture = recording.preview
         few = _problems(recording, start, make, weigh).refined.few
-        x = solve(setting, few, start, EVALUATIONS, stage=stage).x
+        x = solve(setting, few, start, NEAR_EVALUATIONS, stage=stage).x
         before, after = few.own_noise(start), few.own_noise(x)
         moved = few.change(start, x) > MOVED or after > NOISIER * before
         finer = finer_grid(grid, after, few.own_share(x), plan, finest)
@@ -155,7 +155,7 @@ def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
     """The solution on all tiles without lobes nobody asks for."""
     x, problem, table = refined.x, refined.all, setting.table
     found, off = solve_without_unneeded(
-        lambda start, box: solve(setting, problem, start, EVALUATIONS, stage=stage, box=box),
+        lambda start, box: solve(setting, problem, start, NEAR_EVALUATIONS, stage=stage, box=box),
         problem.equations(x), problem.independent, x, setting.user, table,
     )  # fmt: skip
     others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table)

@@ -21,7 +21,7 @@ from .best_so_far import BestSoFar
 
 Vector = NDArray[np.float64]
 _QUIET_SECONDS = 0.05  # between two progress events; an iteration takes about a millisecond
-_PREVIEW_SECONDS = 1.0  # no more than one preview in this time
+PREVIEW_SECONDS = 1.0  # no more than one preview in this time
 
 # What the stages take of the time of a fit, and how many evaluations they need: rough means for the time left
 _EXPECTED = {
@@ -134,7 +134,7 @@ class Course:
         """Tell a preview of the stage's best, where that is new."""
         if self._shown == -np.inf:
             self._shown = self._began
-        if stage.picture is None or stage.best is None or now - self._shown < _PREVIEW_SECONDS:
+        if stage.picture is None or stage.best is None or now - self._shown < PREVIEW_SECONDS:
             return
         with self._renderer.counter.uncounted():  # how many previews there are depends on the clock
             self._listener(Preview(stage.picture(stage.best)))

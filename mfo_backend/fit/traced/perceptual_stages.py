@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...solve.bounded_least_squares import SolveLimits, solve_bounded
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
+from ..plans import PERCEPTUAL_EVALUATIONS
 from ..result.course import Course
 from ..squares.recording_noise import unbiased_equations
 from ..squares.residuals import MakeResidual
@@ -20,7 +21,6 @@ from .linear_pictures import LinearPicture, LinearPictures
 FLIP = "flip"
 ROUNDS = 2  # linear pictures of the stage `flip`; a third changed nothing
 STILL = 0.01  # of the range: a shorter way needs no other picture
-EVALUATIONS = 25  # of the squares of a linear picture, each of which takes next to no time
 COST_CHANGE = 1e-4  # relative, of a step that ends them
 
 Vector = NDArray[np.float64]
@@ -65,7 +65,7 @@ def _lower_squares(
     residual = make(pictures.tiles.reference)
     with course.stage(name) as stage:
         equations = course.watch(stage, unbiased_equations(picture.of_tiles(), residual, start))
-        limits = SolveLimits(evaluations=EVALUATIONS, cost_change=COST_CHANGE)
+        limits = SolveLimits(evaluations=PERCEPTUAL_EVALUATIONS, cost_change=COST_CHANGE)
         try:
             stage.vector = solve_bounded(equations, start, *pictures.box(start, kept), limits, course.should_stop).x
         except ValueError:  # a response may not be finite where a picture is

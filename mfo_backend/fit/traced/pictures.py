@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...types.image import Pixels
 from .sample_count import EqualCounts, NoiseComparison, Recount, TwoPictures, equal_counts, recount
-from .tile_rows import BLOCK, TileRows
+from .tile_rows import BLOCK, CHANNELS, TileRows
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ...render.paths.traced_paths import TracedPaths
@@ -29,7 +29,6 @@ Samples = list[NDArray[np.float32]]
 Rows = NDArray[np.float32]
 
 BRIGHT = 10.0  # weighted residual: about eleven times the reference
-CHANNELS = 3  # of a tile follow each other
 SURE = 3.0  # standard errors
 GEOMETRIC = ("roughness", "ior")  # they move the paths
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones

@@ -16,6 +16,7 @@ from ...types.parameter import ParameterTable
 from ..plans import TransmissionPlan
 from ..random_streams import Stream
 from ..result.course import Course, Stage
+from ..tolerances import ANOTHER_BASIN
 from .pictures import GEOMETRIC, TracedTiles, is_unsure, two_half_equations
 from .polished import CORE
 
@@ -23,7 +24,6 @@ Vector = NDArray[np.float64]
 
 ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
-DIFFERENT = 0.1  # of the range, in any value: points that are worth to be followed both
 TRUST = 0.25  # of the range: the longest step
 RIVALS = 3  # other ends of a race
 
@@ -194,4 +194,4 @@ def _different(setting: Setting, points: Sequence[Vector], count: int) -> list[V
 
 
 def _is_new(setting: Setting, x: Vector, others: Sequence[Vector]) -> bool:
-    return all(np.max(np.abs(x - other) / setting.width) > DIFFERENT for other in others)
+    return all(np.max(np.abs(x - other) / setting.width) > ANOTHER_BASIN for other in others)

@@ -16,6 +16,7 @@ Rows = NDArray[np.float32]
 
 
 BLOCK = 8  # pixels: the largest tile
+CHANNELS = 3  # of a tile follow each other and share its noise
 
 
 @dataclass(frozen=True, eq=False)
