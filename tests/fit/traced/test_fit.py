@@ -53,7 +53,7 @@ def test_glass_is_recovered_from_a_noisy_picture(tmp_path):
 
 
 def test_the_intervals_hold_the_truth(tmp_path):
-    renderer = load(tmp_path, size=56)
+    renderer = load(tmp_path, size=96)
     x = renderer.table.pack(TRUTH)
     deviations = []
     for seed in range(5, 11):
