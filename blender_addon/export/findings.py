@@ -26,12 +26,14 @@ class ExportError(Exception):
 class Findings:
     """Errors (the fit would be wrong) and notes (ignored or approximated), each sentence once, in order.
 
-    `fixes` has what one press could do about a sentence.
+    `fixes` has what one press could do about a sentence; `left_out` has the notes that may be why a result does not
+    match.
     """
 
     errors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     fixes: dict[str, tuple[Fix, ...]] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
 
     def error(self, sentence: str, *fixes: Fix) -> None:
         """Remember that the export must not go on, and why."""
@@ -39,11 +41,16 @@ class Findings:
             self.errors.append(sentence)
             self.fixes[sentence] = fixes
 
-    def note(self, sentence: str, *fixes: Fix) -> None:
-        """Remember what was left out or approximated."""
+    def note(self, sentence: str, *fixes: Fix, explains: bool = True) -> None:
+        """Remember what was left out or approximated; `explains` says whether it may be why a result does not match.
+
+        What is so in nearly every scene, and what concerns the writing of values, explains nothing.
+        """
         if sentence not in self.notes:
             self.notes.append(sentence)
             self.fixes[sentence] = fixes
+            if explains:
+                self.left_out.append(sentence)
 
     def raise_first(self) -> None:
         """Raise the first error.

@@ -151,7 +151,8 @@ def partial_export(
         findings.raise_first()
         assert data is not None
         if unwritable(obj.active_material):
-            findings.note(f"The values cannot be applied as it is. {unwritable(obj.active_material)}")
+            said = f"The values cannot be applied as it is. {unwritable(obj.active_material)}"
+            findings.note(said, explains=False)
         target = target_shader(obj.active_material)
         assert target is not None
         data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
@@ -161,12 +162,12 @@ def partial_export(
         named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
         named |= {value.name: holder_of(obj.active_material.node_tree, value.place) for value in values}
         for said in animation_notes(named, context.scene.frame_current):
-            findings.note(said)
+            findings.note(said, explains=False)
         tell(0.4)
         size = (data.camera.width, data.camera.height)
         picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
         for said in picture.notes if picture is not None else ():
-            findings.note(said)
+            findings.note(said, explains=False)  # a wrong view shows around the target, too
         graph = None
         if probe is not None:
             data.materials[TARGET_BSDF], graph = evaluate_graph(probe, context, obj, data.materials[TARGET_BSDF])
@@ -261,6 +262,7 @@ def _request(
     }
     request["fit"] = dict(fit)
     request["notes"] = list(findings.notes)
+    request["left_out"] = list(findings.left_out)
     return request
 
 

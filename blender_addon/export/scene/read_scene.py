@@ -153,7 +153,8 @@ def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> di
     if cycles.sample_clamp_indirect > 0.0:
         findings.note(
             f"Clamping of indirect light ({cycles.sample_clamp_indirect:.3g}) works on single samples, and those of "
-            "the fit are not Cycles': how much light it takes away may differ."
+            "the fit are not Cycles': how much light it takes away may differ.",
+            explains=False,  # Blender's default
         )
     if not (cycles.caustics_reflective and cycles.caustics_refractive):
         findings.note("Cycles removes caustics; the fit does not.")

@@ -39,11 +39,16 @@ class Solve(Protocol):
 
 @dataclass(frozen=True)
 class SimplestEnd:
-    """The material chosen, the names of values held at the user's in it, and what else it might be."""
+    """The material chosen, the names of values held at the user's in it, and what else it might be.
+
+    `richer` are materials with more lobes that the recording alone prefers by a chi squared that noise does not
+    explain, if from a few tiles: pictures of their own have to say whether an eye sees it.
+    """
 
     end: Solution
     off: tuple[str, ...]
     rivals: tuple[Rival, ...] = ()
+    richer: tuple[Vector, ...] = ()
 
 
 class OtherEnds:
@@ -115,7 +120,8 @@ class OtherEnds:
         share = float(1.0 / (1.0 + np.exp(-0.5 * against)))  # of all materials with these lobes
         others = [Rival(rival.x, share * rival.share) for rival in found.rivals]
         rest = share - sum(rival.share for rival in others)
-        return SimplestEnd(end, off, (*others, Rival(x, rest)))
+        richer = (*found.richer, x) if it.more > HOPELESS else found.richer
+        return SimplestEnd(end, off, (*others, Rival(x, rest)), richer)
 
     def _without_coat(self, x: Vector, lobes: list[str]) -> Iterator[Vector]:
         yield x
@@ -125,12 +131,11 @@ class OtherEnds:
     def _attempt(self, found: Solution, start: Vector, box: Box) -> Solution | None:
         """The end of another solve on all tiles, first tried on some of them; None where it is hopeless.
 
-        What is hopeless follows from the scatter between tiles: a few of them with fireflies may cost any chi squared.
+        A few tiles with fireflies do not make it so.
         """
         for problem in (self._all,) if self._few is self._all else (self._few, self._all):
             end = self._solve(problem, start, NEAR_EVALUATIONS, box=box, wanted=np.inf)
-            it = compare(problem, found.x, end.x)
-            if not it.more / it.inflation <= HOPELESS:
+            if not compare(problem, found.x, end.x).common <= HOPELESS:
                 return None
             start = end.x
         return end

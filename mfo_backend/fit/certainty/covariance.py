@@ -9,7 +9,8 @@ residual that a solution without them would leave (`solve.leverage`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,15 @@ def certainties(sd: Vector, table: ParameterTable, spread: Vector | None = None)
             level = Level.WEAK if worst < WEAK_BELOW else Level.NOT_VISIBLE
         result[parameter.name] = Certainty(tuple(float(v) for v in part), level, along.get(parameter.name, ()))
     return result
+
+
+def certainties_away(known: Mapping[str, Certainty], away: Vector, table: ParameterTable) -> dict[str, Certainty]:
+    """Certainty of an end that lies `away` (k,) from the one whose certainty is `known`: both explain the picture."""
+    if not known:
+        return {}
+    sd = np.concatenate([known[name].sd for name in table.names])
+    found = certainties(np.hypot(sd, away), table)
+    return {name: replace(certainty, along=known[name].along) for name, certainty in found.items()}
 
 
 def _traded(spread: Vector, table: ParameterTable) -> dict[str, tuple[str, ...]]:

@@ -13,9 +13,11 @@ from ...metrics.display.tone_mapping import DisplayView
 from ...render.camera.primary_rays import TILE
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.sheet.sheet_renderer import SheetRenderer
+from ...types.certainty import Certainty
 from ...types.image import Pixels
 from ...types.result import Contradiction
 from ..alike.unneeded_lobes import box_holding
+from ..certainty.covariance import certainties_away
 from ..certainty.weak_combinations import weak_combinations
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
@@ -35,7 +37,7 @@ from ..squares.residuals import (
     log_residual,
 )
 from ..squares.stage_residuals import finishing_residuals
-from ..tolerances import AT_NOISE, NOISY
+from ..tolerances import AT_NOISE, NOISY, VISIBLE
 from .keep_user_values import Kept, keep_values
 from .perceptual_stages import perceptual_ends
 from .recording import Setting, Vector
@@ -116,18 +118,27 @@ class RecordedRoute:
         kept = keep_values(end, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
         disagree = self._contradiction(end, kept)
         later, notes, counts = self._perceptual(end, kept, others)
-        notes = [*scene.needs.notes, *kept.notes, *notes]
+        notes = [*scene.needs.notes, *notes]
         if setting.fireflies:
             notes.append(f"{setting.fireflies} fireflies in the reference were left out of the search for a start.")
         if setting.sampled and end.recording.number > 1:
             times = end.recording.number
             notes.append(f"The light was recorded {times} times: the solution had moved away from the first.")
         weak = tuple(weak_combinations(kept.spread, setting.table, kept.certainty, kept.held))
-        ends = [End("refine", kept.x), *later]
+        richer = end.refined.richer
+        ends = [
+            End("refine", kept.x, notes=kept.notes),
+            *(End("refine", x) for x in richer),
+            *(replace(other, notes=kept.notes) for other in later),
+        ]
+
+        def known(x: Vector) -> dict[str, Certainty]:
+            return certainties_away(kept.certainty, x - kept.x, setting.table)
+
         return RouteEnds(
-            ends=tuple(replace(end, certainty=kept.certainty, weak_combinations=weak) for end in ends),
-            by_squares=1,
-            choose=self._choose_by(counts),
+            ends=tuple(replace(end, certainty=known(end.x), weak_combinations=weak) for end in ends),
+            by_squares=1 + len(richer),
+            choose=self._unless_seen(len(richer), self._choose_by(counts)),
             stages=tuple(course.reports),
             notes=tuple(notes),
             contradiction=disagree,
@@ -184,6 +195,25 @@ class RecordedRoute:
         task = self._task
         light, mask = task.light, task.mask
         return PictureJudge(self._measure, task.reference, light, mask, task.settings, task.view, blurred=blurred)
+
+    def _unless_seen(self, richer: int, choose: Callable[..., Choice]) -> Callable[..., Choice]:
+        """A choice among start and ends, but for the ends after the first that are `richer`.
+
+        One of these is taken where an eye sees that it is better.
+        """
+        if not richer:
+            return choose
+        seen = self._judge(blurred=self._task.linear).value
+
+        def choice(images: Sequence[Pixels]) -> Choice:
+            chosen = choose([*images[:2], *images[2 + richer :]])
+            end = chosen.end if chosen.end == 0 else chosen.end + richer
+            least, best = min((seen(images[1 + k]), k) for k in range(1, 1 + richer))
+            if least < seen(images[1 + end]) - VISIBLE:
+                return Choice(best, chosen.beats_start or least < seen(images[0]))
+            return replace(chosen, end=end)
+
+        return choice
 
     @staticmethod
     def _choose_by(error: Callable[[Pixels], float]) -> Callable[..., Choice]:

@@ -160,7 +160,7 @@ def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
     )  # fmt: skip
     others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table)
     last = others.simplest(SimplestEnd(found, off))
-    return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals)
+    return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals, richer=last.richer)
 
 
 def _with_width_rivals(found: OnRecording) -> OnRecording:

@@ -86,7 +86,7 @@ class Refined:
     """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials.
 
     `off` names values that were held at the user's, which are off, because the picture does not ask for them; `rivals`
-    are other materials that explain it about as well.
+    are other materials that explain it about as well, and `richer` those of them that pictures have to be asked about.
     """
 
     x: Vector
@@ -94,3 +94,4 @@ class Refined:
     few: Problem
     off: tuple[str, ...] = ()
     rivals: tuple[Rival, ...] = ()
+    richer: tuple[Vector, ...] = ()

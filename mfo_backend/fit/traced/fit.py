@@ -16,7 +16,7 @@ from ...types.certainty import Certainty, Level
 from ...types.errors import UnrecordableError
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
-from ..certainty.covariance import certainties
+from ..certainty.covariance import certainties, certainties_away
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
 from ..judge.verification import Verification
@@ -133,12 +133,16 @@ class TracedRoute:
                 "samples were compared, so that no firefly decides.",
             )
         of_kept = self._known(ends)
+
+        def away(x: Vector) -> dict[str, Certainty]:
+            return certainties_away(of_kept[0], x - found[0], renderer.table)
+
         # the second end is the freest, where there are two
         known = [of_kept, self._known(ends[: freest + 1])] if len(found) == 2 else [of_kept]
         return RouteEnds(
             ends=(
                 *(End("polish", x, certainty, notes=back) for x, (certainty, back) in zip(found, known, strict=True)),
-                *(End(self.stages[-1], x, of_kept[0], notes=of_kept[1]) for x in nearer),
+                *(End(self.stages[-1], x, away(x), notes=of_kept[1]) for x in nearer),
             ),
             by_squares=len(found),
             choose=self._choose(len(found), judge if nearer else None),

@@ -25,7 +25,7 @@ LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size
 WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
-    *("film_exposure", "graph", "fit", "notes", "picture", "more_pictures"),
+    *("film_exposure", "graph", "fit", "notes", "left_out", "picture", "more_pictures"),
 )
 
 
@@ -109,6 +109,7 @@ class Request:
     graph: NodeGraph | None = None
     fit: FitSettings = field(default_factory=FitSettings)
     notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()  # those of the notes that may be why a result does not match
     generator: Mapping[str, Any] = field(default_factory=dict)
     picture: Picture = field(default_factory=Picture)
     more_pictures: tuple[tuple[str, Request], ...] = ()
@@ -184,6 +185,7 @@ def request_from_json(data: Any) -> Request:
         graph=graph_from_json(top.raw("graph", None), WHERE),
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
+        left_out=top.texts("left_out", top.texts("notes", ())),
         generator=_generator(top.mapping("generator", {})),
         picture=_picture(top.raw("picture", None)),
     )
@@ -247,6 +249,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "graph": graph_to_json(request.graph),
         "fit": asdict(request.fit),
         "notes": list(request.notes),
+        "left_out": list(request.left_out),
         **({"picture": asdict(request.picture)} if request.picture != Picture() else {}),
         **({"more_pictures": [path for path, _ in request.more_pictures]} if request.more_pictures else {}),
     }

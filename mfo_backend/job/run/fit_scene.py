@@ -204,7 +204,7 @@ def _fit_scene(
             heard = partial(_of_first, listener, together.renderer.sheet)
         outcome = recover_material(
             renderer, shown, fit_of, display=display, listener=heard, should_stop=should_stop,
-            hand_over=hand_over, noted=any(p.request.notes for p in pictures),
+            hand_over=hand_over, noted=any(p.request.left_out for p in pictures),
         )  # fmt: skip
         result = outcome.result if together is None else with_notes(outcome.result, together.notes)
         sheet = None if together is None else together.renderer.sheet

@@ -114,7 +114,10 @@ def test_a_coat_that_the_picture_shows_stays():
 
 
 def test_two_fireflies_do_not_ask_for_a_coat():
-    """Their chi squared is five times what is hopeless; as it comes from two pixels it says next to nothing."""
+    """Their chi squared is five times what is hopeless; as it comes from two pixels it says next to nothing.
+
+    A narrow highlight asks for one, where more pixels have it.
+    """
     line = Line(WITHOUT, fireflies=40.0)
     narrow = TABLE.pack(dict(zip(NAMES, (0.6, 0.4, 0.15, 0.9, 0.02), strict=True)))
     found = solve(line, narrow, 40, box=(TABLE.lower, TABLE.upper))
@@ -166,7 +169,7 @@ def test_doubts_widen_a_covariance_by_their_share():
 @pytest.mark.parametrize(("distance", "taken"), [(4.9, False), (100.0, True)], ids=["scatter", "noise alone"])
 def test_an_exchange_that_the_user_s_material_speaks_against_has_to_be_clearly_better(monkeypatch, distance, taken):
     # 12 less of chi squared, which scatter between tiles explains where it is larger than the pictures' distance allows
-    monkeypatch.setattr(simplest_end, "compare", lambda *_: Comparison(-12.0, 8.3, distance))
+    monkeypatch.setattr(simplest_end, "compare", lambda *_: Comparison(-12.0, 8.3, distance, -12.0))
     swapped = (0.6, 0.25, 0.12, 0.6, 0.6)
     found, last = simplest_from(swapped, BOTH, TABLE.pack(dict(zip(NAMES, swapped, strict=True))))
     np.testing.assert_allclose(last.end.x, BOTH if taken else found.x, atol=0.04)

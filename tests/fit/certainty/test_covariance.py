@@ -3,10 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from mfo_backend.fit.certainty.covariance import INFLATION, certainties, covariance, standard_deviations
+from mfo_backend.fit.certainty.covariance import (
+    INFLATION,
+    certainties,
+    certainties_away,
+    covariance,
+    standard_deviations,
+)
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
@@ -94,3 +102,16 @@ def test_scores_are_products_of_the_two_samples():
     found = covariance(0.5 * (a + b), 0.5 * (a - b), TABLE)
     # few of 3000 groups rule nothing, so what leverage adds is below a hundredth
     np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(expected)), rtol=0.02)
+
+
+def test_an_end_of_another_stage_is_as_unsure_as_it_is_far():
+    table = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("tint", 3, 0.0, 1.0, 1.0)])
+    known = certainties(np.array([0.004, 0.003, 0.2, 0.003]), table)
+    known["roughness"] = replace(known["roughness"], along=("tint",))
+    assert certainties_away(known, np.zeros(4), table) == known
+    away = certainties_away(known, np.array([-0.03, 0.0, 0.0, 0.0]), table)
+    assert away["roughness"].sd == pytest.approx((np.hypot(0.004, 0.03),))
+    assert (known["roughness"].level, away["roughness"].level) == (Level.DETERMINED, Level.WEAK)
+    assert away["roughness"].along == ("tint",)
+    assert away["tint"] == known["tint"]
+    assert certainties_away({}, np.ones(4), table) == {}

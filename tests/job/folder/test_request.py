@@ -79,6 +79,9 @@ def test_what_the_documentation_shows_is_a_request() -> None:
     request = request_from_json(json.loads(block))
     assert request.materials["target_bsdf"].sockets["Roughness"].linked
     assert request_to_json(request)["notes"] == json.loads(block)["notes"]
+    assert request.left_out == request.notes  # a job of another program does not tell them apart
+    told = request_from_json(json.loads(block) | {"left_out": []})
+    assert (told.left_out, request_from_json(request_to_json(told))) == ((), told)
 
 
 def test_most_keys_have_a_default() -> None:
