@@ -174,3 +174,12 @@ def test_an_exchange_that_the_user_s_material_speaks_against_has_to_be_clearly_b
     found, last = simplest_from(swapped, BOTH, TABLE.pack(dict(zip(NAMES, swapped, strict=True))))
     np.testing.assert_allclose(last.end.x, BOTH if taken else found.x, atol=0.04)
     assert len(last.rivals) == 1
+
+
+@pytest.mark.parametrize(("more", "asked"), [(500.0, True), (20.0, False)])
+def test_pictures_are_asked_where_few_tiles_stand_against_the_simpler(monkeypatch, more, asked):
+    """Such as those of a small highlight: what no noise explains may still be a firefly, or seen."""
+    monkeypatch.setattr(simplest_end, "compare", lambda *_: Comparison(more, 2.0 * more, more, 5.0))
+    found, last = simplest_from((0.6, 0.02, 0.5, 0.8, 0.15), WITHOUT, NO_COAT)
+    assert last.off == ("coat_weight",)
+    assert [list(x) for x in last.richer] == ([list(found.x)] if asked else [])

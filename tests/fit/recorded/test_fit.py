@@ -230,6 +230,25 @@ def test_under_a_view_a_coat_does_not_stand_in_for_the_highlight_of_the_base(tmp
     np.testing.assert_allclose(found["base_color"], truth["base_color"], atol=0.02)
 
 
+@pytest.mark.parametrize(
+    ("richer_error", "chosen"), [(0.100, 0), (0.099, 0), (0.097, 1)], ids=["as good", "unseen", "seen"]
+)
+def test_a_richer_material_is_taken_where_an_eye_sees_that_it_is_better(richer_error, chosen):
+    from types import SimpleNamespace
+
+    from mfo_backend.fit.recorded.fit import RecordedRoute
+    from mfo_backend.fit.result.outcome import Choice
+
+    route = SimpleNamespace(
+        _task=SimpleNamespace(linear=True), _judge=lambda *, blurred: SimpleNamespace(value=lambda image: image)
+    )
+    choose = RecordedRoute._unless_seen(route, 1, lambda images: Choice.of(images))
+    assert choose([0.3, 0.1, richer_error]) == Choice(chosen, True)
+    # the end of a later stage is better still
+    assert choose([0.3, 0.1, richer_error, 0.05]) == Choice(2, True)
+    assert choose([0.05, 0.1, richer_error]) == Choice(chosen, False)
+
+
 def test_a_value_the_picture_does_not_show_stays_the_users(tmp_path):
     # a black dielectric: sheen tint has nothing to colour without sheen
     names = [*REDUCED, "sheen_tint", "sheen"]
