@@ -2,7 +2,9 @@
 """Fits of the values that node graphs leave unlinked, on scenes that Cycles renders and judges.
 
     python -m studies.graphs ROWS.jsonl --size 96 --seeds 1
+    python -m studies.graphs ROWS.jsonl --size 96 --seeds 1 --series values
 
+The first fits values of the shader's sockets, the second such inside the nodes, 4 to 9 numbers a graph (`values.py`).
 Truth and start are drawn at random. Each row has the FLIP over the target, in Cycles, of the start, of the result and
 of another render of the truth (the floor), the largest error of each value, and the seconds. Rows that are in the file
 already are not made again. Needs the bpy module.
@@ -14,8 +16,10 @@ import argparse
 import json
 import math
 import random
+import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +32,11 @@ from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.image import Encoding, Image, Pixels
 
 from .materials import GRAPHS
+from .values import FITTED, SOCKETS, Drawn
 
 LIGHTS = ("lamp", "probe")
-DRAWN = {"Base Color": (0.05, 0.9), "Metallic": (0.0, 1.0), "Roughness": (0.15, 0.8)}  # where they are unlinked
+SERIES = ("sockets", "values")
+NODE_SERVER = (sys.executable, "-m", "blender_addon.probe.server")
 SAMPLES = {"lamp": 128, "probe": 256}
 
 
@@ -74,7 +80,7 @@ def build_scene(graph: str, light: str, size: int) -> Any:
     return target, node
 
 
-def row(graph: str, light: str, seed: int, size: int) -> dict[str, Any]:
+def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, Any]:
     """One fit and what Cycles says of it."""
     import bpy
 
@@ -84,21 +90,24 @@ def row(graph: str, light: str, seed: int, size: int) -> dict[str, Any]:
 
     target, node = build_scene(graph, light, size)
     draw = random.Random(f"{graph} {light} {seed}")
-    names = [name for name in DRAWN if not node.inputs[name].is_linked]
-    truth, start = ({name: _drawn(draw, node.inputs[name], *DRAWN[name]) for name in names} for _ in range(2))
-    _put(node, truth)
+    names = FITTED[graph] if series == "values" else [name for name in SOCKETS if not node.inputs[name].is_linked]
+    drawn = Drawn(target, node, names)
+    truth = drawn.draw(draw)
+    start = drawn.draw(draw, near=truth)
+    drawn.put(truth)
     reference, floor = (_cycles(SAMPLES[light], k) for k in (1, 2))
-    _put(node, start)
+    drawn.put(start)
     before = _cycles(SAMPLES[light], 3)
     with tempfile.TemporaryDirectory() as folder:
         picture, job = Path(folder) / "reference.exr", Path(folder) / "job"
         write_exr(picture, reference)
         began = time.monotonic()
-        parameters = [name.lower().replace(" ", "_") for name in names]
+        parameters = [name if "/" in name else name.lower().replace(" ", "_") for name in names]
         export_job(bpy.context, target, job, reference=picture, fit={"parameters": parameters})
-        done = run_folder(job, fit_scene, is_new=True)
+        done = run_folder(job, partial(fit_scene, blender=NODE_SERVER), is_new=True)
+        known = {"series": series, "graph": graph, "light": light, "seed": seed, "size": size}
         if done.result is None:
-            return {"graph": graph, "light": light, "seed": seed, "size": size, "failed": done.sentence}
+            return {**known, "failed": done.sentence}
         seconds = time.monotonic() - began
         result = read_job_result(job)
         apply_values(target.active_material, result_to_sockets(result), job)
@@ -107,21 +116,12 @@ def row(graph: str, light: str, seed: int, size: int) -> dict[str, Any]:
         counted = np.array(mask.pixels).reshape(size, size, -1)[::-1, :, 0] > 0.5  # Blender's rows begin below
     flips = {name: _flip(floor, other, counted) for name, other in
              (("before", before), ("after", after), ("floor", reference))}  # fmt: skip
-    found = {name: np.ravel(node.inputs[name].default_value)[:3].round(4).tolist() for name in names}
-    wrong = {name: float(np.abs(np.array(found[name]) - np.ravel(truth[name])[:3]).max()) for name in names}
+    sure = {name: result.certainty.get(key, "") for name, key in zip(names, parameters, strict=True)}
     return {
-        "graph": graph, "light": light, "seed": seed, "size": size, "seconds": round(seconds, 1),
-        **{f"flip_{name}": round(value, 5) for name, value in flips.items()}, "wrong": wrong,
+        **known, "seconds": round(seconds, 1), "verdict": result.verdict,
+        **{f"flip_{name}": round(value, 5) for name, value in flips.items()},
+        "wrong": {name: round(error, 4) for name, error in drawn.errors(truth).items()}, "certainty": sure,
     }  # fmt: skip
-
-
-def _drawn(draw: random.Random, socket: Any, low: float, high: float) -> Any:
-    return tuple(draw.uniform(low, high) for _ in range(3)) if socket.type == "RGBA" else draw.uniform(low, high)
-
-
-def _put(node: Any, values: dict[str, Any]) -> None:
-    for name, value in values.items():
-        node.inputs[name].default_value = (*value, 1.0) if isinstance(value, tuple) else value
 
 
 def _cycles(samples: int, seed: int) -> Pixels:
@@ -148,7 +148,8 @@ def main() -> None:
     """Make the rows that are missing."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("rows", type=Path, help="file to append to, one JSON object a line")
-    parser.add_argument("--graphs", nargs="+", choices=GRAPHS, default=list(GRAPHS))
+    parser.add_argument("--series", choices=SERIES, default=SERIES[0], help="values of sockets, or inside the nodes")
+    parser.add_argument("--graphs", nargs="+", choices=GRAPHS, default=None)
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
     parser.add_argument("--seeds", type=int, default=1, help="scenes for each graph and light")
     parser.add_argument("--size", type=int, default=96, help="pixels along each side")
@@ -157,13 +158,15 @@ def main() -> None:
 
     blender_addon.register()  # what was applied is kept in properties of the material
     lines = chosen.rows.read_text("utf-8").splitlines() if chosen.rows.is_file() else []
-    known = {tuple(json.loads(line)[key] for key in ("graph", "light", "seed", "size")) for line in lines}
+    keys = ("series", "graph", "light", "seed", "size")
+    known = {tuple({"series": SERIES[0], **json.loads(line)}[key] for key in keys) for line in lines}
+    graphs = chosen.graphs or [name for name in GRAPHS if chosen.series == SERIES[0] or name in FITTED]
     for seed in range(chosen.seeds):
         for light in chosen.lights:
-            for graph in chosen.graphs:
-                if (graph, light, seed, chosen.size) in known:
+            for graph in graphs:
+                if (chosen.series, graph, light, seed, chosen.size) in known:
                     continue
-                made = row(graph, light, seed, chosen.size)
+                made = row(graph, light, seed, chosen.size, chosen.series)
                 with chosen.rows.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(made) + "\n")
                 print(json.dumps(made), flush=True)

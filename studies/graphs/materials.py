@@ -116,9 +116,25 @@ def checker(tree: Any, node: Any) -> None:
     tree.links.new(cells.outputs["Color"], node.inputs["Base Color"])
 
 
+def scale(tree: Any, node: Any) -> None:
+    """Noise through a Color Ramp, of which the scale is sought."""
+    ramp(tree, node)
+
+
+def mixed(tree: Any, node: Any) -> None:
+    """Magic colours with more contrast, mixed with a colour."""
+    magic = _new(tree, "TexMagic", Scale=3.0).outputs["Color"]
+    contrast, mix = tree.nodes.new("ShaderNodeBrightContrast"), tree.nodes.new("ShaderNodeMix")
+    mix.data_type = "RGBA"
+    tree.links.new(magic, contrast.inputs[0])
+    tree.links.new(contrast.outputs[0], mix.inputs[6])
+    tree.links.new(mix.outputs[2], node.inputs["Base Color"])
+
+
 GRAPHS: dict[str, Build] = {
     build.__name__: build
     for build in (
         ramp, roughness, metallic, low_bump, bump, coat_bump, wave_bump, hue, facing, brushed, gradient, checker,
+        scale, mixed,
     )
 }  # fmt: skip

@@ -9,6 +9,7 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -73,7 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
     Nothing is left to do: Python would take a tenth of a second to take the renderer down, and after a cancel native
     code may still be at work.
     """
-    end_process(work(arguments, fit_scene, prepare=load_everything))
+    fitter = partial(fit_scene, blender=arguments.blender_server)
+    end_process(work(arguments, fitter, prepare=load_everything))
 
 
 def leave(status: Status) -> int:
