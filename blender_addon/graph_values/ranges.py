@@ -22,14 +22,15 @@ MIXES = ("ShaderNodeMix", "ShaderNodeMixRGB")
 
 @dataclass(frozen=True)
 class Range:
-    """Bounds, the group that the value belongs to, whether it counts by factors, and the share of the range that a
-    difference takes."""
+    """Bounds, the group that the value belongs to, whether it counts by factors, the share of the range that a
+    difference takes, and whether it has many minima."""
 
     lower: float
     upper: float
     group: str = NUMBER
     logarithmic: bool = False
     step: float = STEP
+    scanned: bool = False
 
 
 FROM_0_TO_1 = Range(0.0, 1.0, SETTING)
@@ -61,7 +62,8 @@ def range_of_input(node: bpy.types.Node, socket: bpy.types.NodeSocket, value: fl
     if node.bl_idname == "ShaderNodeMapping" and socket.name == "Location":
         return Range(value - 1.0, value + 1.0)
     if socket.name in SCALES and value > 0.0:
-        return Range(value / FACTOR, value * FACTOR, logarithmic=True, step=LOGARITHMIC_STEP)
+        many = socket.name == "Scale" and node.bl_idname != "ShaderNodeBump"
+        return Range(value / FACTOR, value * FACTOR, logarithmic=True, step=LOGARITHMIC_STEP, scanned=many)
     if socket.bl_idname == "NodeSocketFloatFactor":
         step = ROUGH_STEP if node.bl_idname in MIXES else STEP
         return _around(Range(0.0, 1.0, SETTING if node.bl_idname in MIXES else NUMBER, step=step), value)

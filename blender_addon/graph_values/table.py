@@ -44,6 +44,7 @@ class GraphValue:
         return {
             "name": self.name, "value": list(value) if isinstance(value, tuple) else value,
             "lower": self.range.lower, "upper": self.range.upper, "logarithmic": self.range.logarithmic, "step": step,
+            "scanned": self.range.scanned,
             "sockets": list(self.sockets), "place": self.place.request(),
         }  # fmt: skip
 

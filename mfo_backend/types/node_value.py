@@ -26,6 +26,8 @@ class NodeValue:
         Whether it counts by factors, as the scale of a texture does.
     step
         The difference that its derivative is taken over.
+    scanned
+        Whether it has many minima, so that values all over its range are tried first.
     sockets
         Names of the sockets of the shader that it reaches.
     place
@@ -38,6 +40,7 @@ class NodeValue:
     upper: float
     logarithmic: bool
     step: float
+    scanned: bool
     sockets: tuple[str, ...]
     place: Mapping[str, Any]
 

@@ -21,6 +21,7 @@ from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual
 from .recording import Recording, Setting, Vector
 from .solve import solve
+from .texture_scales import Placed, best_scales, placed
 from .where_to_look import all_groups, detail_grid, edges_of_light, fewer_groups, thinned_grid
 
 SPARE = 1.5  # times the lanes a start is found on are recorded for it: its tiles are chosen by what they show
@@ -60,13 +61,16 @@ def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
         stage.picture = None if recording.thinned else recording.preview
         lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
         few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
-        starts = _starts(setting, few, stage)
+        scales = best_scales(setting, recording)
+        starts = _starts(setting, few, stage, scales[0])
         stage.vector = starts[0] if starts else None
     with course.stage("start") as stage:
         stage.picture = None if recording.thinned else recording.preview
         lanes = plan.start_lanes if setting.sampled else plan.exact_start_lanes
         more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
-        basins = _race(setting, more, [*starts, setting.user, random_start(setting.table, setting.seed)], stage)
+        users = [placed(setting.user, scale) for scale in scales]
+        others = [*users, placed(random_start(setting.table, setting.seed), scales[0])]
+        basins = _race(setting, more, [*starts, *others], stage)
         if not np.isfinite(basins[0].equations.cost):
             raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
         stage.vector = basins[0].x
@@ -97,20 +101,20 @@ def _groups(recording: Recording) -> LaneGroups:
     return all_groups(recording.paths, 1, recording.setting.reference)
 
 
-def _starts(setting: Setting, problem: Problem, stage: Stage) -> list[Vector]:
-    """Where two opposite starts agree, their ends; else the best nodes of the scan."""
+def _starts(setting: Setting, problem: Problem, stage: Stage, scale: Placed) -> list[Vector]:
+    """Where two opposite starts agree, their ends; else the best nodes of the scan. All begin at this `scale`."""
     plan, table, scanned = setting.plan, setting.table, setting.scene.model.scanned
     starts: list[Vector] = []
     if plan.same_cost:
         evaluations = plan.agreement_evaluations if setting.sampled else plan.exact_agreement_evaluations
         exact = {} if setting.sampled else {"metal_width": ROUGHER_WIDTH, "most": 0.5 * plan.seen_rms**2}
         starts = agreeing_ends(
-            lambda start: solve(setting, problem, start, evaluations, stage=stage),
+            lambda start: solve(setting, problem, placed(start, scale), evaluations, stage=stage),
             table, scanned, plan.same_cost, **exact,
         )  # fmt: skip
     if not starts and plan.scan:
         nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
-        starts = best_starts(nodes, plan.starts)
+        starts = [placed(start, scale) for start in best_starts(nodes, plan.starts)]
     return starts
 
 

@@ -73,7 +73,7 @@ def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
 
 
 def _value(data: Any, where: str) -> NodeValue:
-    keys = ("name", "value", "lower", "upper", "logarithmic", "step", "sockets", "place")
+    keys = ("name", "value", "lower", "upper", "logarithmic", "step", "scanned", "sockets", "place")
     entry = CheckedObject(data, where, keys)
     lower, upper = (entry.number(key, -LARGEST, LARGEST) for key in ("lower", "upper"))
     if not lower < upper:
@@ -84,7 +84,7 @@ def _value(data: Any, where: str) -> NodeValue:
     return NodeValue(
         name=entry.text("name"), value=_number_or_color(entry), lower=lower, upper=upper,
         logarithmic=logarithmic and lower > 0.0, step=entry.number("step", 1e-9 * (upper - lower), upper - lower),
-        sockets=entry.texts("sockets"), place=entry.mapping("place"),
+        scanned=entry.boolean("scanned", False), sockets=entry.texts("sockets"), place=entry.mapping("place"),
     )  # fmt: skip
 
 

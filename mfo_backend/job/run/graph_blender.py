@@ -190,7 +190,7 @@ def evaluated_graph(
     copy = folder.file(COPY, what="request.json: graph.values, and the copy of the file")
     linked = [name for name, socket in request.materials[request.target.bsdf_id].sockets.items() if socket.graph]
     with GraphBlender(blender, copy, asked) as evaluate:
-        yield GraphPictures(asked.values, evaluate, linked), ()
+        yield GraphPictures(asked.values, evaluate, linked, request.width * request.height), ()
 
 
 def _root() -> Path:

@@ -22,8 +22,10 @@ from ...types.parameter import Value, Vector
 Picture = NDArray[np.float32]  # (height, width, 1 or 3)
 Variant = tuple[Sequence[Value], Sequence[str]]  # all values of a graph, and the sockets that are looked at
 
-# A solve looks at pictures of this many subpixels along a pixel, a scene's textures at those of the export
-SOLVE_SCALE, SOLVE_SAMPLES = 2, 4
+# Subpixels along a pixel, and samples in each, of the pictures that a solve looks at: small pictures, and larger ones,
+# whose evaluation takes the longer; a scene's textures have those of the export
+SMALL, LARGE = (4, 1), (2, 4)
+MOST_SUBPIXELS = 400_000  # of a small picture at its scale
 FINE_SCALE, FINE_SAMPLES = 4, 4
 RECALLED = 6  # answers that are kept
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
@@ -77,8 +79,9 @@ class GraphPictures:
         changes with.
     """
 
-    def __init__(self, values: Sequence[NodeValue], evaluate: Evaluate, linked: Sequence[str]) -> None:
-        """`linked` are all sockets that the graph gives."""
+    def __init__(self, values: Sequence[NodeValue], evaluate: Evaluate, linked: Sequence[str], pixels: int = 0) -> None:
+        """`linked` are all sockets that the graph gives, and `pixels` those of the whole picture."""
+        self._scale, self._samples = SMALL if pixels * SMALL[0] ** 2 <= MOST_SUBPIXELS else LARGE
         self.table = table_of(values)
         self._values, self._evaluate = tuple(values), evaluate
         changed = {name for value in values for name in value.sockets}
@@ -120,6 +123,19 @@ class GraphPictures:
                 self._states.popitem(last=False)
         self._states.move_to_end(key)
         return self._states[key]
+
+    @property
+    def scanned(self) -> tuple[int, ...]:
+        """Entries of the vector that have many minima."""
+        return tuple(j for j, (value, _) in enumerate(self._components) if value.scanned)
+
+    def plain(self, vectors: Sequence[Vector]) -> list[Mapping[str, NDArray[np.float32]]]:
+        """Flat pictures by parameter at each vector, without derivatives."""
+        self.renders += 1
+        variants = [(self._as_values(vector), self._sockets) for vector in vectors]
+        found = self._evaluate(variants, scale=self._scale, samples=1)
+        seen = np.isfinite(found.positions).all(axis=2).ravel()
+        return [{name_of(s): _flat(picture, seen) for s, picture in pictures.items()} for pictures in found.pictures]
 
     def settle(self, vector: Vector) -> None:
         """Evaluate the nodes at this vector, from where nearby states are extrapolated from now on."""
@@ -170,7 +186,7 @@ class GraphPictures:
             there[j] += step
             variants.append((self._as_values(there), self._components[j][0].sockets))
         self.renders += 1
-        found = self._evaluate(variants, scale=SOLVE_SCALE, samples=SOLVE_SAMPLES)
+        found = self._evaluate(variants, scale=self._scale, samples=self._samples)
         self._seen = found.positions, found.camera
         seen = np.isfinite(found.positions).all(axis=2).ravel()
         here = {socket: _flat(picture, seen) for socket, picture in found.pictures[0].items()}

@@ -100,12 +100,20 @@ class RecordedJacobian:
         """Names of the values that lanes hold."""
         return tuple(p.name for p in self._held)
 
-    def __call__(self, vector: NDArray[np.float64], lanes: Lanes, groups: LaneGroups) -> NDArray[np.float32]:
+    def __call__(
+        self,
+        vector: NDArray[np.float64],
+        lanes: Lanes,
+        groups: LaneGroups,
+        pictures: tuple[Any, ...] | None = None,
+    ) -> NDArray[np.float32]:
         """Mean radiance of the groups, whose `lanes` these are, without the constant part, then its derivatives:
-        (samples, g, 3, 1 + K)."""
+        (samples, g, 3, 1 + K). `pictures` may stand in for those that a graph gives at the vector."""
         width = self._width
         theta = own_memory(vector, mi.Float)
-        pictures = () if self._varying is None else self._varying.arrays(vector)
+        if pictures is None:
+            varying = self._varying
+            pictures = () if varying is None else varying.arrays(vector, derivatives=self._derivatives)
         *_, scale = groups.parts
         out = dr.zeros(mi.Float, dr.width(scale) * 3 * width)
         dr.eval(theta, out)
@@ -165,7 +173,7 @@ class RecordedJacobian:
         up = dr.opaque(mi.Vector3f, (0.0, 0.0, 1.0))
         kinds = dict.fromkeys(self.model.normals.names, mi.Vector3f)
         some = [dr.opaque(kinds.get(p.name, mi.Color3f if p.size == 3 else mi.Float), 0.5) for p in self._held]
-        pictures, lane = ((), []) if self._varying is None else self._varying.sample()
+        pictures, lane = ((), []) if self._varying is None else self._varying.sample(derivatives=self._derivatives)
         # traced, never run
         self._columns(theta, self._constants, pictures, up, up, dr.opaque(mi.Color3f, 1.0), [*some, *lane])
 

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -84,7 +84,7 @@ class RecordedScene:
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
-        graph = renderer.graph
+        graph = self.graph = renderer.graph
         self._varying = None if graph is None else VaryingValues(graph, renderer.table, self.model.table)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._varying)
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
@@ -231,6 +231,20 @@ class RecordedScene:
             return glow(vector, TwoSamples.of(self._image(vector, lanes, groups), constant))
 
         return RecordedImage(at, 2)
+
+    def images_of(
+        self, paths: RecordedPaths, groups: LaneGroups, vector: NDArray[np.float64]
+    ) -> Callable[[Mapping[str, NDArray[np.float32]]], NDArray[np.float32]]:
+        """The function from flat pictures of a graph to the image (g, 3) of the groups, all else as in `vector`."""
+        constant = groups.average(paths.constant)
+        lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
+
+        def at(pictures: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+            self.renderer.counter.add(cost)
+            samples = self._image(vector, lanes, groups, VaryingValues.plain_arrays(pictures))
+            return TwoSamples.of(samples, constant).mean[:, :, 0]
+
+        return at
 
     @cached_property
     def _image(self) -> RecordedJacobian:

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import drjit as dr
@@ -54,9 +55,18 @@ class VaryingValues:
             self._surface = SeenSurface(*self._graph.seen(vector[self.first :]))
         return self._surface
 
-    def arrays(self, vector: NDArray[np.float64]) -> tuple[Any, ...]:
-        """The pictures at a vector, each followed by those of its slopes."""
+    @staticmethod
+    def plain_arrays(pictures: Mapping[str, NDArray[np.float32]]) -> tuple[Any, ...]:
+        """Flat pictures without slopes."""
+        flat = tuple(own_memory(picture, mi.Float) for picture in pictures.values())
+        dr.eval(flat)
+        return flat
+
+    def arrays(self, vector: NDArray[np.float64], *, derivatives: bool) -> tuple[Any, ...]:
+        """The pictures at a vector, each followed by those of its slopes if there are to be derivatives."""
         state = self._graph.state(vector[self.first :])
+        if not derivatives:
+            return self.plain_arrays(state.pictures)
         if self._last is None or self._last[0] is not state:
             flat = []
             for name, components in self._graph.varying.items():
@@ -66,10 +76,11 @@ class VaryingValues:
             self._last = state, tuple(flat)
         return self._last[1]
 
-    def sample(self) -> tuple[tuple[Any, ...], list[Any]]:
+    def sample(self, *, derivatives: bool) -> tuple[tuple[Any, ...], list[Any]]:
         """Stand-ins for pictures and for a lane, to trace a kernel that is never run."""
         one = dr.opaque(mi.Float, 0.5, 3)
-        pictures = tuple(one for components in self._graph.varying.values() for _ in range(1 + len(components)))
+        counts = (1 + len(components) * derivatives for components in self._graph.varying.values())
+        pictures = tuple(one for count in counts for _ in range(count))
         up = dr.opaque(mi.Vector3f, (0.0, 0.0, 1.0))
         return pictures, [dr.opaque(mi.UInt32, 0), *([up] * (len(self.lanes) - 1))]
 
@@ -80,7 +91,7 @@ class VaryingValues:
         index, rest = lane[0], iter(pictures)
         values: dict[str, Any] = {}
         for name, components in self._graph.varying.items():
-            kind = self._kinds[name]
+            kind, components = self._kinds[name], components if derivatives else ()
             value, *slopes = (dr.gather(kind, next(rest), index) for _ in range(1 + len(components)))
             moving = {self.first + j: slope for j, slope in zip(components, slopes, strict=True)}
             values[name] = Dual(value, moving) if derivatives else value

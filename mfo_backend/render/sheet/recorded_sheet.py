@@ -39,6 +39,8 @@ class RecordedSheet:
         If the material has textures or a lobe that recorded paths cannot hold.
     """
 
+    graph = None  # values inside nodes are fitted to one picture alone
+
     def __init__(self, renderer: SheetRenderer) -> None:
         self.renderer = renderer
         covered = [int(r.target_mask().sum()) for r in renderer.renderers]

@@ -20,7 +20,9 @@ WORDS = ["blender", "--background", "--python", "server.py", "--"]
 def test_the_blender_reaches_the_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The add-on's command line, read by `mfo run`."""
     script = tmp_path / "python"
-    script.write_text(f"#!{sys.executable}\nimport json, sys\nopen('words.json', 'w').write(json.dumps(sys.argv[3:]))\n")
+    script.write_text(
+        f"#!{sys.executable}\nimport json, sys\nopen('words.json', 'w').write(json.dumps(sys.argv[3:]))\n"
+    )
     script.chmod(0o755)
     process = JobProcess(script, tmp_path, blender=WORDS, root=tmp_path)
     process.backend.process.wait(20.0)

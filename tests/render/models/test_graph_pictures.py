@@ -14,7 +14,7 @@ NOISE = np.random.default_rng(0).uniform(0.0, 1.0, (6, 8, 1)).astype(np.float32)
 
 
 def value(name: str, start: float | tuple[float, ...], sockets: tuple[str, ...], upper: float = 1.0) -> NodeValue:
-    return NodeValue(name, start, 0.0, upper, False, 0.002 * upper, sockets, {})
+    return NodeValue(name, start, 0.0, upper, False, 0.002 * upper, False, sockets, {})
 
 
 class Nodes:

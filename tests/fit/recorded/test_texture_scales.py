@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scale of a pattern is found without its colours."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.recorded.texture_scales import KEPT, TRIED, best_scales, placed
+from mfo_backend.types.parameter import Parameter, ParameterTable
+
+PLACES = np.linspace(0.0, 1.0, 500)
+LIGHT = (0.3 + 0.7 * np.sin(3.0 * PLACES) ** 2)[:, None]
+GRAPH = ParameterTable([Parameter("Noise/Scale", 1, 1.0, 16.0, 4.0), Parameter("Ramp/Stop 0", 3, 0.0, 1.0, (0.5,) * 3)])
+TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), *GRAPH])
+
+
+def pattern(scale: float) -> np.ndarray:
+    """Values in [0, 1] that have nothing in common with those of another scale."""
+    return (0.5 + 0.5 * np.sin(3.0 * scale * PLACES + np.sin(2.0 * scale * PLACES)))[:, None].astype(np.float32)
+
+
+def shown(values: np.ndarray, low: Any, high: Any) -> np.ndarray:
+    """A dielectric's picture: a gloss, and the light on the colour of each place."""
+    return (0.02 + LIGHT * (np.array(low) * (1.0 - values) + np.array(high) * values)).astype(np.float32)
+
+
+class Fake:
+    """Setting and recording of a picture of the pattern at one scale in other colours."""
+
+    def __init__(self, scale: float) -> None:
+        reference = shown(pattern(scale), (0.8, 0.1, 0.3), (0.1, 0.6, 0.2))
+        groups = SimpleNamespace(
+            average=lambda image: image, lanes_of_groups=np.ones(len(PLACES), int), take=lambda which: groups
+        )
+        self.recording: Any = SimpleNamespace(
+            paths=SimpleNamespace(pixel_groups=lambda keep: groups, interior=None), setting=None
+        )
+        graph = SimpleNamespace(scanned=(0,), table=GRAPH, plain=lambda vectors: [self.pictures(v) for v in vectors])
+        scene = SimpleNamespace(graph=graph, images_of=lambda paths, groups, vector: self.image)
+        course = SimpleNamespace(should_stop=lambda: False)
+        self.setting: Any = SimpleNamespace(
+            scene=scene, table=TABLE, user=TABLE.pack({}), calm=reference, course=course
+        )
+
+    @staticmethod
+    def pictures(vector: np.ndarray) -> dict[str, np.ndarray]:
+        values = shown(pattern(float(vector[0])), (0.2, 0.2, 0.2), (0.5, 0.5, 0.5))
+        return {"base_color": np.concatenate([values, values.mean(axis=0, keepdims=True)])}
+
+    @staticmethod
+    def image(pictures: dict[str, np.ndarray]) -> np.ndarray:
+        return 0.02 + LIGHT * pictures["base_color"][:-1]
+
+
+@pytest.mark.parametrize("scale", [3.1, 6.1, 14.0])
+def test_a_scale_is_found_in_any_colours(scale: float) -> None:
+    fake = Fake(scale)
+    found = best_scales(fake.setting, fake.recording)
+    assert len(found) == KEPT
+    spacing = 16.0 ** (1.0 / (TRIED - 1))
+    assert 1.0 / spacing**1.5 < found[0][1] / scale < spacing**1.5
+    assert placed(fake.setting.user, found[0])[1] == found[0][1]
+    assert fake.setting.user[1] == 4.0
+
+
+def test_without_a_scale_nothing_is_tried() -> None:
+    fake = Fake(4.0)
+    fake.setting.scene.graph = None
+    assert best_scales(fake.setting, fake.recording) == [{}]
