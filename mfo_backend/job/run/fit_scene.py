@@ -21,6 +21,7 @@ from ...types.image import Image, Pixels
 from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
 from ...types.status import Status
+from ...types.verdict import Verdict
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request, request_to_json
 from .graph_blender import evaluated_graph
@@ -28,6 +29,7 @@ from .material_classes import (
     MaterialClass,
     brightest_glow,
     changed,
+    doubted,
     is_better,
     is_worth_another,
     other_classes,
@@ -357,6 +359,8 @@ def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapp
     seconds, passes = before.seconds + after.seconds, before.passes + after.passes
     if before.judgement is None or not is_better(after.judgement, before.judgement, other):
         return replace(first, result=replace(before, seconds=seconds, passes=passes))
+    if before.judgement.verdict is Verdict.CLOSE:
+        after = doubted(after, before)
     after = with_values_of(other, after, material)
     result = replace(
         after,

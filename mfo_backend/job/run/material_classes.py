@@ -170,6 +170,18 @@ def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[st
     return replace(result, recovered=values, certainty=certainty, bounds=bounds | dict(result.bounds))
 
 
+def doubted(result: FitResult, other: FitResult) -> FitResult:
+    """A result as unsure as it is far from another one that nearly explains the picture, too."""
+    from ...fit.certainty.covariance import certainties_away  # which needs Mitsuba's variant to be set
+
+    if not result.certainty:
+        return result
+    table = BLENDER_PRINCIPLED.select(result.certainty)
+    near = {name: other.recovered.get(name, result.recovered[name]) for name in table.names}
+    away = table.pack(result.recovered) - table.pack(near)
+    return replace(result, certainty=certainties_away(result.certainty, away, table))
+
+
 def is_better(judgement: Judgement | None, than: Judgement, other: MaterialClass) -> bool:
     """Whether the result of another class is clearly nearer to the reference."""
     if judgement is None or (other.glows and judgement.cause in _AROUND):

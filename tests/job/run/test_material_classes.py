@@ -130,6 +130,19 @@ def test_a_glow_is_written_as_a_full_colour_and_a_strength():
     assert set(found.bounds) == set(found.recovered)
 
 
+@pytest.mark.parametrize(("verdict", "level"), [(Verdict.CLOSE, Level.WEAK), (Verdict.DIFFERENT, Level.DETERMINED)])
+def test_a_class_that_takes_the_place_of_a_close_one_is_unsure_of_what_it_has_changed(verdict, level):
+    """A rough glass of a third stood for a cloth that was close: two values were determined and wrong."""
+    glass = other_classes(material(), 0.0)[0]
+    sure = {"metallic": Certainty((0.004,), Level.DETERMINED), "roughness": Certainty((0.01,), Level.DETERMINED)}
+    after = fitted(0.01, Verdict.SAME)
+    recovered = {"metallic": 0.45, "roughness": 0.3}  # the first fit's metallic is 0.4, it had no roughness
+    after = replace(after, result=replace(after.result, recovered=recovered, certainty=sure))
+    found = module._better(fitted(0.09, verdict), after, glass, material()).result.certainty
+    assert (found["metallic"].level, found["roughness"].level) == (level, Level.DETERMINED)
+    assert found["metallic"].sd == pytest.approx((np.hypot(0.004, 0.05 if verdict is Verdict.CLOSE else 0.0),))
+
+
 def test_what_a_class_has_held_is_part_of_its_result():
     glass = material(Transmission_Weight=1.0, Metallic=0.0)
     opaque = next(other for other in other_classes(glass, 0.0) if other.name == "opaque")
