@@ -50,7 +50,7 @@ BPY_PACKAGES = [
 QUICK = [
     *(f"tests/{folder}" for folder in ("types", "scene", "solve", "metrics", "report", "tools")),
     *("tests/material/arrays", "tests/material/principled/test_properties.py"),
-    *("tests/bench/rows", "tests/bench/report", "tests/bench/judge"),
+    *("tests/bench/report", "tests/bench/judge"),
     *("tests/job/folder/test_request.py", "tests/job/run/test_worker_process.py"),
     *("tests/test_import_arrows.py", "tests/test_repository.py"),
 ]

@@ -27,7 +27,7 @@ def write_bench_scene(scenario: str, number: int, size: int, folder: Path) -> An
 
 def open_bench_scene(scene: Any, preset: str, *, all_values: bool = False) -> tuple[Any, Any]:
     """The scene's renderer and the settings of its fit, which frees the scenario's values or all."""
-    from mfo_backend.bench.runs.method import method_settings
+    from mfo_backend.bench.rows.method import method_settings
     from mfo_backend.bench.scenes.scene import SHAPE
     from mfo_backend.render.pictures.mitsuba_renderer import load_mitsuba_renderer
 

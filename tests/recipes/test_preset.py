@@ -14,7 +14,7 @@ def test_a_new_preset_is_known_everywhere(tmp_path: Path) -> None:
     pytest.importorskip("bpy")
     said = follow("A preset", tmp_path).see("""
         from blender_addon.properties import PRESET_ITEMS
-        from mfo_backend.bench.runs.method import DEFAULT_METHODS
+        from mfo_backend.bench.rows.method import DEFAULT_METHODS
         from mfo_backend.fit.plans import RecordedPlan
         from mfo_backend.fit.settings import FitSettings
         from mfo_backend.job.run.run_job import _BYTES_PER_PIXEL

@@ -6,9 +6,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from ..rows.findings import against_the_loop, promises
 from ..rows.row import Row
 from ..rows.summary import SOLVED_FLIP, comparable_seconds, error_of, grouped, is_at_noise, quantile
+from .findings import against_the_loop, promises
 from .table import Table, number
 
 OURS, PAPERS = "balanced", "mfo-hdr"

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ..rows.method import METHODS
 from ..rows.row import Row
 from ..rows.summary import SOLVED_FLIP, error_of
-from ..runs.method import METHODS
 from .paper_figures import PAPER_NAMES, PaperFigure, paper_figure
 from .table import Table, minutes
 

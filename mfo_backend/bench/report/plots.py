@@ -7,9 +7,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from ..rows.method import METHODS
 from ..rows.row import Row
 from ..rows.summary import comparable_seconds, error_of, quantile
-from ..runs.method import METHODS
 from .figure import COLOURS, legend_above, log_axis, new_figure
 
 if TYPE_CHECKING:

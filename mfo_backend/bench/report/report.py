@@ -10,12 +10,12 @@ from html import escape
 from pathlib import Path
 
 from ...job.folder.atomic_file import write_atomically
-from ..rows.findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
+from ..rows.method import METHODS
 from ..rows.row import Row
 from ..rows.row_file import RowFile
 from ..rows.summary import SOLVED_FLIP, TARGETS, Summary, comparable, quantile, summaries
-from ..runs.method import METHODS
 from .figure import svg
+from .findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
 from .gallery import gallery
 from .hard_section import hard_section
 from .paper_tables import paper_tables

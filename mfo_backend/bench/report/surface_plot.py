@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..judge.surface import Surface
+from ..runs.surface import Surface
 from .figure import GREY, new_figure
 
 if TYPE_CHECKING:

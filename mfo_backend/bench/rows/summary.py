@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from ..runs.method import METHODS
 from ..scenes.scenario import SCENARIOS
+from .method import METHODS
 from .row import Row
 
 SOLVED_FLIP = 0.02  # mean FLIP over the object; set before the runs of docs/bench

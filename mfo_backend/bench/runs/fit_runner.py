@@ -16,6 +16,7 @@ from ...types.event import Event, StageEnd
 from ...types.image import Pixels
 from ...types.status import Status
 from ..judge.judge import Judge, TruePictures
+from ..rows.method import METHODS, method_settings, warm_up_settings
 from ..rows.row import Row, Task
 from ..rows.row_pictures import picture_file, shown_picture
 from ..scenes.assets import Assets
@@ -23,7 +24,6 @@ from ..scenes.cycles_scene import CallsBlender, write_cycles_scene
 from ..scenes.scenario import SCENARIOS, Scenario
 from ..scenes.scene import SHAPE, BenchScene, write_scene
 from .busy import BusyMark
-from .method import METHODS, method_settings, warm_up_settings
 from .stopwatch import Stopwatch
 from .wrapped_renderer import NewSeeds
 

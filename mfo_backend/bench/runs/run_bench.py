@@ -10,9 +10,9 @@ from typing import Any, Protocol
 
 from ...types.errors import MfoError
 from ...types.status import Status
+from ..rows.method import is_quick
 from ..rows.row import Row, Task
 from ..rows.row_file import RowFile
-from .method import is_quick
 
 
 class Runner(Protocol):

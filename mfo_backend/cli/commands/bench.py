@@ -12,9 +12,9 @@ from pathlib import Path
 from ...bench.report.figure import require_matplotlib
 from ...bench.report.headline import fill, has_block
 from ...bench.report.report import write_report
+from ...bench.rows.method import DEFAULT_METHODS, METHODS, missing_for
 from ...bench.rows.row import Row
 from ...bench.rows.row_file import RowFile, keep_setup
-from ...bench.runs.method import DEFAULT_METHODS, METHODS, missing_for
 from ...bench.runs.run_bench import all_tasks, run_bench
 from ...bench.runs.scatter import FitRecipe, run_scattered
 from ...bench.scenes.assets import Assets

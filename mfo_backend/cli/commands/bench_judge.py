@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from ...bench.judge.q_jod import scored, without_score
+from ...bench.rows.method import METHODS
 from ...bench.rows.row_file import RowFile
-from ...bench.runs.method import METHODS
 from ...bench.scenes.assets import Assets
 from ...bench.scenes.scenario import SCENARIOS
 from ...job.output.progress_bar import terminal_columns

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.runs.method import METHODS
+from ...bench.rows.method import METHODS
 from ...bench.scenes.scenario import SCENARIOS
 from ...types.errors import BadInputError
 
@@ -38,8 +38,8 @@ def run_surface(arguments: argparse.Namespace) -> int:
         raise BadInputError("Give two parameters such as roughness,metallic, 8 pixels or more and a grid of 3 or more.")
     if needs_llvm():
         configure_llvm()  # before the first import of drjit
-    from ...bench.judge.surface import measure_surface
     from ...bench.report.surface_plot import surface_figure
+    from ...bench.runs.surface import measure_surface
     from ...metrics.display.tone_mapping import DisplayView
     from ...report.picture import displayed_linear, png_bytes
 

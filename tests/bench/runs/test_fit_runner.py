@@ -10,11 +10,11 @@ import pytest
 
 from mfo_backend.bench.judge import judge as judge_module
 from mfo_backend.bench.judge.judge import DOUBTED_JOD, MORE_PARTS
+from mfo_backend.bench.rows.method import method_settings
 from mfo_backend.bench.rows.row import Task
 from mfo_backend.bench.rows.summary import SOLVED_FLIP
 from mfo_backend.bench.runs import fit_runner
 from mfo_backend.bench.runs.fit_runner import FitRunner
-from mfo_backend.bench.runs.method import method_settings
 from mfo_backend.bench.scenes.assets import Assets
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mfo_backend.bench.runs.method import METHODS, OUR_METHODS, PAPER_METHODS, method_settings
+from mfo_backend.bench.rows.method import METHODS, OUR_METHODS, PAPER_METHODS, method_settings
 from mfo_backend.bench.scenes.assets import Assets, generated_probe
 from mfo_backend.bench.scenes.bumpy_sphere import bumpy_sphere, write_ply
 from mfo_backend.bench.scenes.scenario import SCENARIOS

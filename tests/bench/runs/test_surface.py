@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from mfo_backend.bench.judge import surface as module
-from mfo_backend.bench.judge.surface import Surface, measure_surface
 from mfo_backend.bench.report.figure import svg
 from mfo_backend.bench.report.surface_plot import surface_figure
+from mfo_backend.bench.runs import surface as module
+from mfo_backend.bench.runs.surface import Surface, measure_surface
 from mfo_backend.bench.scenes.assets import Assets
 from mfo_backend.cli.main import main
 

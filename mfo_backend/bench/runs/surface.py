@@ -16,12 +16,12 @@ from ...render.pictures.mitsuba_renderer import MitsubaRenderer, load_mitsuba_re
 from ...types.errors import BadInputError
 from ...types.event import Event, StageEnd
 from ...types.image import Pixels
-from ..runs.method import METHODS, method_settings
-from ..runs.wrapped_renderer import Watched
+from ..judge.judge import Judge
+from ..rows.method import METHODS, method_settings
 from ..scenes.assets import Assets
 from ..scenes.scenario import SCENARIOS
 from ..scenes.scene import SHAPE, materials_of, shown_bsdf, write_scene
-from .judge import Judge
+from .wrapped_renderer import Watched
 
 
 @dataclass(frozen=True)

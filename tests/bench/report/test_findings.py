@@ -8,11 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from mfo_backend.bench.report.hard_section import hard_section
-from mfo_backend.bench.report.paper_figures import PAPER_NAMES, paper_figure
-from mfo_backend.bench.report.paper_tables import paper_tables
-from mfo_backend.bench.report.table import Table, minutes, number
-from mfo_backend.bench.rows.findings import (
+from mfo_backend.bench.report.findings import (
     TOGETHER,
     ablations,
     against_the_loop,
@@ -21,6 +17,10 @@ from mfo_backend.bench.rows.findings import (
     stage_gains,
     time_parts,
 )
+from mfo_backend.bench.report.hard_section import hard_section
+from mfo_backend.bench.report.paper_figures import PAPER_NAMES, paper_figure
+from mfo_backend.bench.report.paper_tables import paper_tables
+from mfo_backend.bench.report.table import Table, minutes, number
 from mfo_backend.bench.rows.row import Task
 from mfo_backend.types.errors import BadInputError
 

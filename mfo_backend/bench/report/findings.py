@@ -10,13 +10,13 @@ import numpy as np
 
 from ...types.certainty import Level
 from ..judge.promise import inside, is_wrongly_determined, miss
-from ..report.table import Table, number
-from ..runs.method import METHODS, OUR_METHODS, PAPER_METHODS
+from ..rows.method import METHODS, OUR_METHODS, PAPER_METHODS
+from ..rows.row import Row
+from ..rows.summary import SOLVED_FLIP, comparable_seconds, error_of, grouped, is_at_noise, quantile
 from ..runs.stopwatch import PARTS
 from ..scenes.scenario import SCENARIOS
 from ..scenes.scene import TABLES
-from .row import Row
-from .summary import SOLVED_FLIP, comparable_seconds, error_of, grouped, is_at_noise, quantile
+from .table import Table, number
 
 TOGETHER = "all"  # scenarios of a table
 # a normal error is inside 1, 2 and 3 standard deviations in these shares
