@@ -24,6 +24,7 @@ def result_text(result: Mapping[str, Any]) -> str:
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     lines += [weak["sentence"] for weak in result.get("weak_combinations", [])]
+    lines += [result["next_picture"]["sentence"]] if result.get("next_picture") else []
     return "\n".join(lines)
 
 

@@ -59,6 +59,7 @@ class Stream(Enum):
     LINEAR_PICTURES = Span(0x6F000000, 8, apart=True)
     VERIFY = Span(0x5EED0000, 1, apart=True)
     GAP = Span(0x6A500000, 2, apart=True)
+    NEXT_PICTURE = Span(0x2E870000, 1, apart=True)
     PREVIEW = Span(0x3E710000, 1, apart=True)
 
     def seed(self, fit: int, number: int = 0) -> int:

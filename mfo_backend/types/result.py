@@ -55,6 +55,27 @@ class Contradiction:
 
 
 @dataclass(frozen=True)
+class NextPicture:
+    """A further picture that would tell more: the first one's camera, turned about the world's Z axis.
+
+    Attributes
+    ----------
+    turn, center
+        Degrees against the clock as seen from above, and the world point that the axis goes through.
+    settles
+        Values that it would determine.
+    predicted
+        Standard deviations that values would have that are not determined now, each in its own unit.
+    """
+
+    turn: float
+    center: tuple[float, float, float]
+    settles: tuple[str, ...]
+    predicted: dict[str, float]
+    sentence: str
+
+
+@dataclass(frozen=True)
 class FitResult:
     """The recovered values and how they came about.
 
@@ -63,6 +84,7 @@ class FitResult:
     determines together only; `notes` are sentences on what was left out or
     kept. `model_gap` and `judgement` are None where they could not be measured. `pictures` are those of a fit of
     several, whose verdict is the worst of theirs, and `contradiction` says which of them do not agree.
+    `next_picture` would determine what these do not.
     """
 
     status: Status
@@ -82,3 +104,4 @@ class FitResult:
     judgement: Judgement | None = None
     pictures: tuple[PictureResult, ...] = ()
     contradiction: Contradiction | None = None
+    next_picture: NextPicture | None = None

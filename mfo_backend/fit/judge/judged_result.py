@@ -44,6 +44,7 @@ def judged_result(
         errors = {name: (before, before) for name, (before, _) in result.errors.items()}
         result = replace(
             result, recovered=dict(result.initial), errors=errors, certainty={}, weak_combinations=(),
+            next_picture=None,
             message=f"{result.status.sentence} {START_KEPT}",
         )  # fmt: skip
         end = start

@@ -11,11 +11,13 @@ import numpy as np
 from ...metrics.display.baked_view import BakedView
 from ...metrics.display.tone_mapping import DisplayView
 from ...render.camera.primary_rays import TILE
+from ...render.paths.recorded_scene import RecordedScene
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.sheet.recorded_sheet import RecordedSheet
 from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.certainty import Certainty
 from ...types.image import Pixels
-from ...types.result import Contradiction
+from ...types.result import Contradiction, NextPicture
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.covariance import certainties_away
 from ..certainty.weak_combinations import weak_combinations
@@ -23,7 +25,9 @@ from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from ..pictures.contradiction import contradiction
+from ..pictures.next_picture import Known, next_picture
 from ..plans import RecordedPlan
+from ..random_streams import Stream
 from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds
 from ..squares.residuals import (
@@ -69,9 +73,6 @@ class RecordedRoute:
     """
 
     def __init__(self, task: FitTask, renderer: MitsubaRenderer | SheetRenderer, plan: RecordedPlan | None) -> None:
-        from ...render.paths.recorded_scene import RecordedScene
-        from ...render.sheet.recorded_sheet import RecordedSheet
-
         settings = task.settings
         self._task, self._renderer = task, renderer
         self._plan = plan or RecordedPlan.of(settings.preset)
@@ -142,7 +143,18 @@ class RecordedRoute:
             stages=tuple(course.reports),
             notes=tuple(notes),
             contradiction=disagree,
+            next_picture=None if disagree else self._next_picture(end, kept),
         )
+
+    def _next_picture(self, end: OnRecording, kept: Kept) -> NextPicture | None:
+        """The further picture that would tell most of the weak values."""
+        task = self._task
+        if task.settings.preset == "fast" or task.should_stop():
+            return None
+        scene = self._scene if isinstance(self._scene, RecordedScene) else self._scene.first
+        covered = int(task.mask.sum())
+        known = Known(kept.x, kept.spread, kept.certainty, end.refined.all, task.light, covered, self._renderer.start)
+        return next_picture(scene, known, Stream.NEXT_PICTURE.seed(task.settings.seed))
 
     def _contradiction(self, end: OnRecording, kept: Kept) -> Contradiction | None:
         """Which of several pictures does not go with the others."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...render.pictures.renderer import Renderer
 from ...types.certainty import Certainty, WeakCombination
 from ...types.image import Pixels
-from ...types.result import Contradiction, FitResult, StageReport
+from ...types.result import Contradiction, FitResult, NextPicture, StageReport
 from ...types.status import Status
 
 START_KEPT = "Nothing was better than the start, so the start was kept."
@@ -75,8 +75,8 @@ class RouteEnds:
         How the last stage ended.
     unverified
         Start and ends with the fit's own pictures, which have to do where there was no time for others.
-    contradiction
-        Of several pictures, which do not agree.
+    contradiction, next_picture
+        Of several pictures, which do not agree, and which further one would tell more.
     """
 
     ends: tuple[End, ...]
@@ -87,6 +87,7 @@ class RouteEnds:
     status: Status = Status.CONVERGED
     unverified: tuple[Candidate, ...] = ()
     contradiction: Contradiction | None = None
+    next_picture: NextPicture | None = None
 
     def chosen_notes(self, choice: Choice) -> tuple[str, ...]:
         """The sentences on a choice among the ends."""
@@ -160,4 +161,5 @@ def final_result(
         notes=(*found.notes, *found.chosen_notes(choice), *notes),
         weak_combinations=end.weak_combinations,
         contradiction=found.contradiction,
+        next_picture=found.next_picture,
     )

@@ -66,6 +66,7 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "weak_combinations": [
             {"parameters": w.parameters, "step": w.step, "sentence": w.sentence} for w in result.weak_combinations
         ],
+        **({"next_picture": asdict(result.next_picture)} if result.next_picture is not None else {}),
         **({"contradiction": asdict(result.contradiction)} if result.contradiction is not None else {}),
         **({"pictures": [_picture(picture) for picture in result.pictures]} if result.pictures else {}),
         "stages": [

@@ -48,6 +48,7 @@ class RecordSettings:
     mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples of the same
     directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need no other
     kernels than a recording with it. With `free_emission` the target's own emission is no part of the constant picture.
+    `sensor` is another camera than the scene's.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -67,6 +68,7 @@ class RecordSettings:
     alike: bool = False
     direct_samples: int = 0
     free_emission: bool = False
+    sensor: Any = None
 
 
 @dataclass
@@ -115,7 +117,7 @@ def record_paths(
         if lamps and settings.light_paths is None:
             # so that paths over other surfaces know they are no camera's
             settings = replace(settings, light_paths=LightPaths())
-        sensor = scene.sensors()[0]
+        sensor = settings.sensor or scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
         every_ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
@@ -160,7 +162,7 @@ def record_paths(
 
         covered, coverage = _coverage(pixels, position, filter_weight)
         constant = recorded_background(
-            scene, rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
+            scene, (height, width), rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
             depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
         )  # fmt: skip
         if glow is not None:
@@ -176,7 +178,7 @@ def record_paths(
 
 def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:
     """Camera rays on the settings' grid, and more of them in narrow highlights if the settings say so."""
-    sensor = scene.sensors()[0]
+    sensor = settings.sensor or scene.sensors()[0]
     order, tile = tile_order(width, height, settings.stride)
     if settings.pixels is not None:
         kept = settings.pixels.reshape(-1)[order]

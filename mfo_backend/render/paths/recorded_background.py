@@ -21,6 +21,7 @@ from ..transport.traced_radiance import traced_radiance
 
 def recorded_background(
     scene: mi.Scene,
+    size: tuple[int, int],
     rays: PrimaryRays,
     met: mi.PreliminaryIntersection3f,
     on_target: mi.Bool,
@@ -32,12 +33,12 @@ def recorded_background(
     light_paths: LightPaths | None,
     hide_emitters: bool,
 ) -> NDArray[np.float32]:
-    """Radiance (height, width, 3), linear Rec.709, of rays that pass by the target, in the `covered` pixels only.
+    """Radiance (height, width, 3) of a picture of this `size`, linear Rec.709, of rays that pass by the target, in the
+    `covered` pixels only.
 
     `met` is what the rays meet, `covered` counts as they do; paths are of up to `depth`.
     """
-    width, height = (int(v) for v in scene.sensors()[0].film().crop_size())
-    image = np.zeros((height, width, 3), np.float32)
+    image = np.zeros((*size, 3), np.float32)
     looked_at = np.zeros(len(rays.pixel), bool)
     looked_at[covered] = True
     position = rays.position(dr.arange(mi.UInt32, len(rays)))

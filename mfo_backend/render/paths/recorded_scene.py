@@ -90,6 +90,11 @@ class RecordedScene:
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
 
     @property
+    def varies(self) -> bool:
+        """Whether values inside of a node graph are free, which only the scene's own camera knows the effect of."""
+        return self._varying is not None
+
+    @property
     def lights_exact(self) -> bool:
         """Whether no light has an extent, so that direct light has no noise but at silhouettes."""
         return lights_have_no_extent(self.renderer.scene)
@@ -170,6 +175,32 @@ class RecordedScene:
         )
         self.renderer.counter.add(1.0)
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
+
+    def record_from(self, sensor: mi.Sensor, vector: NDArray[np.float64], *, grid: int, seed: int) -> RecordedPaths:
+        """Record what another camera would see of the material `vector`, with two samples where light is sampled.
+
+        Raises
+        ------
+        BadInputError
+            If no pixel sees the target.
+        """
+        self.renderer.show(vector)
+        width = self._value(vector, self.model.scanned[0])
+        settings = RecordSettings(
+            grid=grid,
+            seed=seed,
+            depth=self.needs.depth,
+            proposal=DefensiveProposal.around(width) if isinstance(width, float) else DefensiveProposal(),
+            hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
+            two_sided=self.model.two_sided,
+            held=self._held,
+            bumped=self._bumped,
+            light_paths=self.renderer.light_paths,
+            samples=2 if self.needs.sampled else 1,
+            free_emission=EMISSION in self.renderer.table.names,
+            sensor=sensor,
+        )
+        return record_paths(self.renderer.scene, self.renderer.shape, settings, allow_dark=True)
 
     def finest_grid(self, samples: int, lanes: float) -> int:
         """The finest grid with which a recording of so many samples of the light holds every tile in so many lanes, or

@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...types.errors import BadInputError
+from ...types.errors import BadInputError, UnrecordableError
 from ..models.prepared_material import EMISSION
 from ..paths.recorded_image import RecordedImage
 from ..paths.recorded_paths import LaneGroups, RecordedPaths
@@ -36,7 +36,7 @@ class RecordedSheet:
     Raises
     ------
     UnrecordableError
-        If the material has textures or a lobe that recorded paths cannot hold.
+        If the material has a lobe that recorded paths cannot hold, or values inside of a node graph are free.
     """
 
     graph = None  # values inside nodes are fitted to one picture alone
@@ -49,7 +49,14 @@ class RecordedSheet:
             RecordedScene(r, count, part)
             for r, count, part in zip(renderer.renderers, covered, self._parts, strict=True)
         ]
+        if any(scene.varies for scene in self._scenes):
+            raise UnrecordableError("Values inside of a node graph are fitted to one picture.")
         self.model = self._scenes[0].model
+
+    @property
+    def first(self) -> RecordedScene:
+        """That of the first picture."""
+        return self._scenes[0]
 
     @property
     def lights_exact(self) -> bool:

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which further picture would tell most of the values that are not determined.
+
+A candidate is recorded with few lanes at the solution. Its normal equations add to the information that there is, so
+the covariance with it is (C^-1 + J'J / s^2)^-1, before the picture exists (optimal design of experiments; V. Fedorov,
+"Theory of Optimal Experiments", 1972). s^2 is what the residuals of the present pictures count for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...render.paths.recorded_image import TwoSamples
+from ...render.paths.recorded_scene import RecordedScene
+from ...render.sheet.turned_camera import target_center, turned_cameras
+from ...types.certainty import Certainty, Level
+from ...types.errors import BadInputError
+from ...types.parameter import ParameterTable
+from ...types.result import NextPicture
+from ..squares.problem import Problem
+from ..squares.recording_noise import rows_of_samples, without_own_noise
+from ..squares.residuals import RelativeResidual
+from ..tolerances import DETERMINED_BELOW, WEAK_BELOW
+
+Vector = NDArray[np.float64]
+
+TURNS = tuple(range(30, 360, 30))  # degrees
+SIDE = 40  # pixels along the longer side of a candidate: some hundred see the target
+GRID = 2  # squared: camera rays of a pixel
+LEAST_GAIN = 2.0  # times smaller: a deviation that shrinks less is not worth a picture
+NOTHING_KNOWN = 0.3  # of the box: about the deviation of a value that may lie anywhere in it
+_RIDGE = 1e-9  # of the largest entry
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the present pictures tell: the solution, its covariance in widths of the box, and their last problem.
+
+    `covered` pixels see the target; `user` are the scene's own values.
+    """
+
+    x: Vector
+    spread: Vector
+    certainty: Mapping[str, Certainty]
+    problem: Problem
+    reference: NDArray[np.float32]
+    covered: int
+
+    user: Vector
+
+    def open(self, table: ParameterTable) -> tuple[str, ...]:
+        """Values that a further picture is for; none where all that is not determined is the user's own again."""
+        names = tuple(name for name, c in self.certainty.items() if c.level is not Level.DETERMINED)
+        moved = (np.abs(self.x - self.user)[table.slice_of(name)].max() > 0.0 for name in names)
+        return names if any(moved) else ()
+
+
+def next_picture(scene: RecordedScene, known: Known, seed: int) -> NextPicture | None:
+    """The best of the present camera's turns around the target; None where none is worth a picture."""
+    table = scene.renderer.table
+    wanted = known.open(table)
+    if not wanted or scene.varies:
+        return None
+    center = target_center(scene.renderer.shape)
+    with scene.renderer.counter.uncounted():  # the result is known without it
+        variance, density = _residual_variance(known, table), len(known.problem.groups) / max(known.covered, 1)
+        present = np.linalg.inv(_regular(known.spread)) + np.eye(table.length) / NOTHING_KNOWN**2
+        predicted = [
+            (turn, _deviations(present + density * told / variance))
+            for turn, told in _told(scene, known.x, center, seed)
+        ]
+    if not predicted:
+        return None
+    now = _deviations(present)
+    turn, after = min(predicted, key=lambda one: _score(one[1], now, wanted, table))
+    return _proposal(turn, center, after, now, wanted, table)
+
+
+def _residual_variance(known: Known, table: ParameterTable) -> float:
+    """What a relative residual of one group counts for, by the covariance that all of them have led to."""
+    residual = RelativeResidual(known.problem.groups.average(known.reference))
+    rows, own = rows_of_samples(known.problem.evaluate.samples(known.x), residual)
+    gram = _gram(rows, own, table)
+    sure = np.diag(known.spread) < WEAK_BELOW**2
+    ratio = np.diag(known.spread) / np.diag(np.linalg.inv(_regular(gram)))
+    # channels of a group share their noise
+    of_groups = float(np.mean(np.square(rows[:, :, 0].sum(axis=1)))) / 3.0
+    return max(of_groups, float(np.median(ratio[sure])) if sure.any() else 0.0)
+
+
+def _deviations(information: Vector) -> Vector:
+    return np.sqrt(np.maximum(np.diag(np.linalg.inv(information)), 1e-30))
+
+
+def _told(scene: RecordedScene, x: Vector, center: Vector, seed: int) -> Iterator[tuple[float, Vector]]:
+    """Turns with the products of derivatives that a picture of the present size would have, by tile of one pixel."""
+    sensor = scene.renderer.scene.sensors()[0]
+    width, height = (int(n) for n in sensor.film().crop_size())
+    part = SIDE / max(width, height)
+    size = max(round(height * part), 4), max(round(width * part), 4)
+    cameras = turned_cameras(sensor, center, TURNS, size)
+    if cameras is None:
+        return
+    try:
+        paths = scene.record_from(cameras, x, grid=GRID, seed=seed)
+    except BadInputError:  # the target is in no sight
+        return
+    groups = paths.pixel_groups()
+    samples = scene.evaluator(paths, groups).samples(x)
+    numbers = paths.pixel % (size[1] * len(TURNS)) // size[1]
+    for number, turn in enumerate(TURNS):
+        here = numbers == number
+        if not here.any():
+            continue
+        mean = samples.mean[here]
+        half = None if samples.half_difference is None else samples.half_difference[here]
+        rows, own = rows_of_samples(TwoSamples(mean, half), RelativeResidual(np.maximum(mean[:, :, 0], 0.0)))
+        yield float(turn), _gram(rows, own, scene.renderer.table) * (width * height / (size[0] * size[1]))
+
+
+def _gram(rows: Vector, own: Vector | None, table: ParameterTable) -> Vector:
+    """Products of derivatives by values in widths of the box, summed, without the recording's own noise."""
+    width = table.upper - table.lower
+    scaled = (rows[:, :, 1:] * width).reshape(-1, table.length)
+    if own is None:
+        return scaled.T @ scaled
+    half = (own[:, :, 1:] * width).reshape(-1, table.length)
+    return without_own_noise(scaled.T @ scaled, half.T @ half)
+
+
+def _regular(matrix: Vector) -> Vector:
+    return matrix + _RIDGE * max(float(np.diag(matrix).max()), 1e-300) * np.eye(len(matrix))
+
+
+def _score(after: Vector, now: Vector, wanted: Sequence[str], table: ParameterTable) -> float:
+    """How much of the wanted values' deviations is left; what is determined gains nothing by more."""
+    entries = [i for name in wanted for i in range(*table.slice_of(name).indices(table.length))]
+    return float(np.log(np.maximum(after[entries], DETERMINED_BELOW) / now[entries]).mean())
+
+
+def _proposal(
+    turn: float, center: Vector, after: Vector, now: Vector, wanted: Sequence[str], table: ParameterTable
+) -> NextPicture | None:
+    worst = {name: float(after[table.slice_of(name)].max()) for name in wanted}
+    before = {name: float(now[table.slice_of(name)].max()) for name in wanted}
+    settles = tuple(name for name, sd in worst.items() if sd < DETERMINED_BELOW)
+    surer = tuple(name for name, sd in worst.items() if LEAST_GAIN * sd < before[name] and name not in settles)
+    if not settles and not surer:
+        return None
+    width = {name: table[name].upper - table[name].lower for name in wanted}
+    signed = turn if turn <= 180.0 else turn - 360.0
+    what = f"would settle {_listed(settles)}" if settles else f"would make {_listed(surer)} surer"
+    where = (
+        f"with the camera turned by {abs(signed):.0f} degrees around the object "
+        f"({'against the clock' if signed > 0 else 'clockwise'} from above)"
+    )
+    return NextPicture(
+        turn=signed,
+        center=(float(center[0]), float(center[1]), float(center[2])),
+        settles=settles,
+        predicted={name: worst[name] * width[name] for name in wanted},
+        sentence=f"A further picture {where} {what}.",
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    words = [name.replace("_", " ").title() for name in names]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
