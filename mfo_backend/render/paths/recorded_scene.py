@@ -77,7 +77,7 @@ class RecordedScene:
         if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
-        self._covered, self._most_lanes, self._most_rays = covered, part * MOST_LANES, part * MOST_RAYS
+        self._covered, self._part = covered, part
         self._taken = 0  # bytes for the rays of the largest recording so far
         self.model = recorded_model(renderer.model, renderer.shape.bsdf())
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
@@ -152,7 +152,7 @@ class RecordedScene:
         lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if needs.sampled else 1)
         if self._near_target.any():
             grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
-        stride = max(1, math.ceil(math.sqrt(lanes / self._most_lanes)), int(math.sqrt(lanes / enough)))
+        stride = max(1, math.ceil(math.sqrt(lanes / (self._part * MOST_LANES))), int(math.sqrt(lanes / enough)))
         stride, pixels = self._affordable(grid, stride, samples, sampled=needs.sampled)
         two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
@@ -227,9 +227,9 @@ class RecordedScene:
         squares = np.broadcast_to(np.square(grid), (height, width))
         pixels = None
         count = _rays(squares, stride)
-        if count > self._most_rays:
+        if count > self._part * MOST_RAYS:
             pixels = self._near_target
-            while (count := _rays(squares * pixels, stride)) > self._most_rays:
+            while (count := _rays(squares * pixels, stride)) > self._part * MOST_RAYS:
                 stride += 1
         of_a_ray = BYTES_PER_RAY_SAMPLED if sampled else BYTES_PER_RAY_EXACT
         needed, mapped = (count * (size + (samples - 1) * BYTES_PER_SAMPLE) for size in of_a_ray)
