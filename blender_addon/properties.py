@@ -76,6 +76,34 @@ def _has_pixels(_self: object, image: bpy.types.Image) -> bool:
     return image.source in {"FILE", "GENERATED"} and not image.name.startswith("Material Fit ")
 
 
+def _is_camera(_self: object, item: bpy.types.Object) -> bool:
+    return item.type == "CAMERA"
+
+
+class MFO_PG_picture(bpy.types.PropertyGroup):
+    """One of several pictures of a material: its file, and what of the scene it shows."""
+
+    use: BoolProperty(name="Use", description="Fit this picture, too", default=True)
+    path: StringProperty(
+        name="Picture",
+        description="Picture of the same material, of any size",
+        subtype="FILE_PATH",
+        options=RELATIVE_PATH,
+    )
+    camera: PointerProperty(
+        name="Camera", description="Camera that the picture was made with", type=bpy.types.Object, poll=_is_camera
+    )
+    frame: IntProperty(name="Frame", description="Frame that the picture shows", default=1)
+    exposure: FloatProperty(
+        name="Exposure",
+        description="Stops that the picture is brighter than a render of the scene",
+        soft_min=-4.0,
+        soft_max=4.0,
+        min=-32.0,
+        max=32.0,
+    )
+
+
 class MFO_PG_bound(bpy.types.PropertyGroup):
     """Limits of one value during a fit, of every channel of a colour; the parameter's name in `name`."""
 
@@ -108,6 +136,8 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         type=bpy.types.Image,
         poll=_has_pixels,
     )
+    pictures: CollectionProperty(type=MFO_PG_picture)  # those after the first one
+    first_picture: PointerProperty(type=MFO_PG_picture)  # what the first one shows, where there are others
     overlay_opacity: FloatProperty(
         name="Opacity",
         description="How much of the reference is seen over the camera's view",
@@ -268,6 +298,7 @@ class MFO_PG_material(bpy.types.PropertyGroup):
 
 CLASSES = (
     MFO_PG_bound,
+    MFO_PG_picture,
     MFO_PG_settings,
     MFO_PG_message,
     MFO_PG_row,

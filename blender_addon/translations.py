@@ -11,6 +11,20 @@ import bpy
 
 # fmt: off
 _GERMAN = {
+    "Add the camera that the fit proposes, make it the scene's, and list its picture, which is to be made yet": "Die vorgeschlagene Kamera anlegen, zur Kamera der Szene machen und ihr Bild in die Liste nehmen, das noch zu machen ist",
+    "Camera": "Kamera",
+    "Camera that the picture was made with": "Kamera, mit der das Bild gemacht wurde",
+    "EV": "LW",
+    "Exposure": "Belichtung",
+    "Fit one more picture of the same material at once: from another camera, at another frame": "Noch ein Bild desselben Materials zugleich anpassen: von einer anderen Kamera, aus einem anderen Einzelbild",
+    "Fit this picture, too": "Auch dieses Bild anpassen",
+    "Frame": "Einzelbild",
+    "Frame that the picture shows": "Einzelbild, das das Bild zeigt",
+    "Picture": "Bild",
+    "Picture of the same material, of any size": "Bild desselben Materials, in beliebiger Größe",
+    "Stops that the picture is brighter than a render of the scene": "Blendenstufen, um die das Bild heller ist als ein Rendering der Szene",
+    "Take this picture off the list": "Dieses Bild aus der Liste nehmen",
+    "Use": "Verwenden",
     "A photograph, or a render under the view transform Standard: compared under Standard": "Ein Foto oder ein Rendering unter der Ansichtstransformation Standard: verglichen unter Standard",
     "A Python of your own that has Mitsuba; empty: the one that Install makes": "Ein eigenes Python, das Mitsuba hat; leer: das von Installieren angelegte",
     "A backend is loading": "Ein Backend lädt",
@@ -148,6 +162,10 @@ _GERMAN = {
     "linked": "verbunden",
 }
 _GERMAN_OPERATORS = {
+    "Add Another Picture": "Weiteres Bild hinzufügen",
+    "Add Picture": "Bild hinzufügen",
+    "Remove Picture": "Bild entfernen",
+    "Set Up Camera": "Kamera aufstellen",
     "Apply Anyway": "Trotzdem anwenden",
     "Add to Queue": "In die Warteschlange",
     "Apply Earlier Result": "Früheres Ergebnis anwenden",

@@ -53,7 +53,7 @@ class Finding:
 
 def quick_check(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple[Finding, ...]:
     """Everything that can be known about the next fit of the active object without reading geometry; worst first."""
-    found = [*_target(scene, view_layer), *_picture(scene, view_layer), *_reference(scene)]
+    found = [*_target(scene, view_layer), *_picture(scene, view_layer), *_reference(scene), *_more_pictures(scene)]
     return in_order(found)
 
 
@@ -161,6 +161,25 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
     if not findings.errors:
         width, height = picture_size(scene.render)
         found.append(Finding(FINE, f"Camera '{scene.camera.name}', {width} x {height} pixels."))
+    return found
+
+
+def _more_pictures(scene: bpy.types.Scene) -> list[Finding]:
+    """The further pictures of the list: those without a file or at a frame that the scene does not have."""
+    found, settings = [], scene.mfo
+    for number, entry in enumerate(settings.pictures, 2):
+        if not entry.use:
+            continue
+        path = Path(bpy.path.abspath(entry.path))
+        if not entry.path:
+            found.append(Finding(TO_CHOOSE, f"Choose the file of picture {number}, or do not use it."))
+        elif not path.is_file():
+            found.append(Finding(STOPS, f"Picture {number} ({path}) does not exist: choose another file."))
+        elif not scene.frame_start <= entry.frame <= scene.frame_end:
+            frames = f"{scene.frame_start} to {scene.frame_end}"
+            found.append(Finding(STOPS, f"Picture {number}: frame {entry.frame} is outside of the frames {frames}."))
+        else:
+            found.append(Finding(FINE, f"Picture {number}: {path.name}, frame {entry.frame}."))
     return found
 
 

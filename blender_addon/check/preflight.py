@@ -134,4 +134,5 @@ def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
             frozenset(settings.sockets),
         ),
         [(bound.name, bound.lower, bound.upper) for bound in settings.bounds],
+        [(one.use, one.path, one.frame, getattr(one.camera, "name", "")) for one in settings.pictures],
     )

@@ -14,6 +14,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from ..backend.preferences import chosen_python, new_job_folder
 from ..export.job import ExportError, export_job
 from ..export.nodes.target_shader import target_shader
+from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference_view import REFERENCE_VIEWS
 from ..graph_values.table import graph_values
 from ..process.backend_python import BackendPythonError
@@ -80,6 +81,8 @@ class FitOptions:
         if unwritable(material):  # before the fit, since its values could not be applied
             raise FitError(unwritable(material))
         reference = _reference(settings, self.reference)
+        if settings.pictures and not self.reference:
+            reference = _pictures(settings, reference)
         made = self.reference_view or settings.reference_view
         if made not in REFERENCE_VIEWS:
             raise FitError(f"reference_view is {made!r}: give 'scene' or 'standard'.")
@@ -198,6 +201,22 @@ def _chosen_inside(obj: bpy.types.Object, settings: bpy.types.PropertyGroup, mod
     if model != "blender_principled" or target is None or not settings.node_values:
         return []
     return [value.name for value in graph_values(target) if value.name in settings.node_values]
+
+
+def _pictures(settings: bpy.types.PropertyGroup, first: Path | bpy.types.Image) -> list[PictureSetup]:
+    """All pictures of the list that are used, with what each shows."""
+    found = []
+    for number, entry in enumerate((settings.first_picture, *settings.pictures), 1):
+        if not entry.use:
+            continue
+        if number > 1 and not entry.path:
+            raise FitError(f"Picture {number} has no file: choose it, or do not use this picture.")
+        reference = first if number == 1 else Path(bpy.path.abspath(entry.path))
+        camera = entry.camera.name if entry.camera is not None else ""
+        found.append(PictureSetup(reference, number, entry.frame, camera, exposure=entry.exposure))
+    if not found:
+        raise FitError("No picture is used: tick one at least.")
+    return found
 
 
 def _chosen(settings: bpy.types.PropertyGroup, model: str) -> list[str]:

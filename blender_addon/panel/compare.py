@@ -26,6 +26,7 @@ class Compare:
         if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
             layout.label(text=f"Of material {runtime.material}", icon="MATERIAL")
         draw_pictures(layout, context, ("reference", "start", "result"), clickable=True)
+        _draw_each_picture(layout)
         column = layout.column(align=True)
         row = column.row(align=True)
         row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
@@ -40,6 +41,20 @@ class Compare:
         header.label(text="Details")
         if body:
             _draw_details(body, context, runtime)
+
+
+def _draw_each_picture(layout: bpy.types.UILayout) -> None:
+    """Of a fit of several pictures each one's verdict and error; a press shows it side by side."""
+    found = shown_result.result
+    if found is None or not found.pictures:
+        return
+    column = layout.column(align=True)
+    for picture in found.pictures:
+        icon = shown_result.VERDICT_ICONS.get(picture.verdict, "IMAGE_DATA")
+        row = column.row(align=True)
+        text = f"{picture.label}: FLIP {picture.flip[1]:.3f}"
+        shown = row.operator("mfo.show_pictures", text=text, icon=icon)
+        shown.show, shown.job_folder = "strip", str(picture.folder)
 
 
 def _draw_details(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:

@@ -32,6 +32,7 @@ class Reference:
             column.prop(settings, "reference_path", text="")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
+        _draw_more_pictures(column, settings)
         shown = overlay.is_shown(context.scene.camera)
         row = layout.row(align=True)
         row.operator(
@@ -45,6 +46,32 @@ class Reference:
             narrow = letters(context) < _LETTERS_OF_A_ROW
             choice = question.column(align=True) if narrow else question.row(align=True)
             choice.prop(settings, "reference_view", expand=True)
+
+
+def _draw_more_pictures(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """What the first picture shows and the further ones, where there are some; a button to add one."""
+    pictures = settings.pictures
+    if pictures:
+        _draw_what_it_shows(column.box().column(align=True), settings.first_picture, "1")
+    for index, picture in enumerate(pictures):
+        box = column.box().column(align=True)
+        _draw_what_it_shows(box, picture, str(index + 2), index)
+        box.prop(picture, "path", text="")
+    column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
+
+
+def _draw_what_it_shows(
+    box: bpy.types.UILayout, picture: bpy.types.PropertyGroup, number: str, index: int | None = None
+) -> None:
+    row = box.row(align=True)
+    row.prop(picture, "use", text=f"Picture {number}")
+    row.prop(picture, "exposure", text="EV")
+    if index is not None:
+        row.operator("mfo.remove_picture", text="", icon="X").index = index
+    row = box.row(align=True)
+    row.active = picture.use
+    row.prop(picture, "camera", text="", icon="CAMERA_DATA")
+    row.prop(picture, "frame")
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

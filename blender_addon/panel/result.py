@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..export.nodes.target_shader import target_shader
-from ..result import previews
+from ..result import previews, shown_result
 from ..result.animated_sockets import animation_of
 from ..result.job_result import must_ask
 from .layout import draw_sentence, letters
@@ -48,6 +48,7 @@ class Result:
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         if runtime.has_result:
             _draw_values(layout, context, runtime.values)
+            _draw_next_picture(layout, context)
 
 
 def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: bpy.types.bpy_prop_collection) -> None:
@@ -74,6 +75,16 @@ def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: b
         draw_sentence(box, context, "Bar: how sure the value is.", "INFO")
     if kept:
         draw_sentence(box, context, f"Not visible in the picture, kept: {', '.join(kept)}.", "HIDE_ON")
+
+
+def _draw_next_picture(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Which further picture would tell more, and a button that sets its camera up."""
+    found = shown_result.result
+    if found is None or not found.next_sentence:
+        return
+    box = layout.box()
+    draw_sentence(box, context, found.next_sentence, "CAMERA_DATA")
+    box.operator("mfo.set_up_next_picture", icon="VIEW_CAMERA")
 
 
 def _cells(

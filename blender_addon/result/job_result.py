@@ -23,6 +23,16 @@ class JobResultError(Exception):
 
 
 @dataclass(frozen=True)
+class PastPicture:
+    """One of the pictures of a fit of several: what it is called, its verdict, its FLIP, and its folder."""
+
+    label: str
+    verdict: str
+    flip: tuple[float, float]
+    folder: Path
+
+
+@dataclass(frozen=True)
 class JobResult:
     """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result).
 
@@ -50,6 +60,10 @@ class JobResult:
     image: tuple[int, int] = (0, 0)  # width and height of the job's pictures
     spread: Mapping[str, float] = field(default_factory=dict)  # standard deviation, of a colour's least sure channel
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # what the fit could have chosen
+    pictures: tuple[PastPicture, ...] = ()  # of a fit of several
+    next_sentence: str = ""  # on the further picture that would tell more
+    next_turn: float | None = None  # degrees that its camera is turned about the vertical
+    next_center: tuple[float, ...] = (0.0, 0.0, 0.0)  # a point of that axis
 
     def likely(self, name: str, value: float) -> tuple[float, float] | None:
         """The range that holds a value in 95 of 100 cases, None where it is not known."""
@@ -110,6 +124,8 @@ def read_job_result(folder: Path) -> JobResult:
             weak_combinations=tuple(str(c["sentence"]) for c in result.get("weak_combinations", ())),
             spread={str(k): _spread(c["sd"]) for k, c in result.get("certainty", {}).items() if c.get("sd")},
             bounds={str(k): (float(a), float(b)) for k, (a, b) in (result.get("bounds") or {}).items()},
+            pictures=tuple(_picture(folder, p) for p in result.get("pictures", ())),
+            **_next_picture(result.get("next_picture")),
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -133,6 +149,25 @@ def _read_json(path: Path) -> dict[str, Any]:
             f"{path} has schema_version {version!r} and this add-on reads {SCHEMA_VERSION}: run the fit again."
         )
     return data
+
+
+def _picture(folder: Path, data: dict[str, Any]) -> PastPicture:
+    before, after = data["errors"]["flip"]
+    name = f"{int(data['number'])} {data.get('name', '')}".strip()
+    inner = (folder / str(data.get("folder", "."))).resolve()
+    if not inner.is_relative_to(folder.resolve()):
+        raise ValueError(f"picture {name} is outside of the job")
+    return PastPicture(name, str(data.get("verdict") or ""), (float(before), float(after)), inner)
+
+
+def _next_picture(data: dict[str, Any] | None) -> dict[str, Any]:
+    if not data:
+        return {}
+    center = tuple(float(v) for v in data["center"])
+    turn = float(data["turn"])
+    if len(center) != 3 or not all(map(math.isfinite, (turn, *center))):
+        raise ValueError("the proposed camera is no place")
+    return {"next_sentence": str(data["sentence"]), "next_turn": turn, "next_center": center}
 
 
 def _spread(deviations: list[Any]) -> float:

@@ -65,7 +65,7 @@ def contradiction(
         gains[number] = together.mean() / max(np.delete(squares(found), number).mean(), 1e-12)
     if should_stop() or gains.max() < AGAINST_REST:
         return None
-    named = tuple(labels[n] for n in np.flatnonzero(gains > gains.max() / CLEARLY))
+    named = tuple(label for label, gain in zip(labels, gains, strict=True) if gain > gains.max() / CLEARLY)
     return Contradiction(named, _sentence(named, len(labels)))
 
 

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The list of pictures in the panel: what is added, what the export gets, and the camera that a fit proposes."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from blender_addon.check.checks import STOPS, TO_CHOOSE, quick_check
+from blender_addon.result import shown_result
+from blender_addon.result.job_result import JobResultError, read_job_result
+
+from . import fake_backend
+from .conftest import HEIGHT, WIDTH
+
+
+def listed(scene: SimpleNamespace):
+    """The scene's settings with a second picture from another camera."""
+    bpy = scene.bpy
+    settings = bpy.context.scene.mfo
+    settings.reference_path = scene.reference
+    assert bpy.ops.mfo.add_picture() == {"FINISHED"}
+    side = bpy.context.scene.camera.copy()
+    side.name = "Side"
+    bpy.context.collection.objects.link(side)
+    side.location.x += 0.3
+    second = Path(scene.reference).with_name("side.png")
+    fake_backend.png(second, (60, 60, 40), WIDTH, HEIGHT)
+    settings.pictures[0].camera, settings.pictures[0].path, settings.pictures[0].frame = side, str(second), 7
+    return settings
+
+
+def fit(scene: SimpleNamespace) -> dict:
+    assert scene.bpy.ops.mfo.fit(job_folder=scene.job, object="Väse") == {"FINISHED"}
+    return json.loads((Path(scene.job) / "request.json").read_text("utf-8"))
+
+
+def test_one_picture_needs_no_list(scene: SimpleNamespace) -> None:
+    scene.bpy.context.scene.mfo.reference_path = scene.reference
+    request = fit(scene)
+    assert "more_pictures" not in request
+    assert "picture" not in request
+
+
+def test_listed_pictures_are_exported_with_what_they_show(scene: SimpleNamespace) -> None:
+    settings = listed(scene)
+    assert settings.first_picture.camera == scene.bpy.context.scene.camera
+    request = fit(scene)
+    assert request["more_pictures"] == ["more_pictures/2"]
+    more = json.loads((Path(scene.job) / "more_pictures" / "2" / "request.json").read_text("utf-8"))
+    assert (more["picture"]["camera"], more["picture"]["frame"]) == ("Side", 7)
+    assert scene.bpy.context.scene.frame_current == 1
+
+
+def test_a_picture_that_is_not_used_is_left_out_and_keeps_its_number(scene: SimpleNamespace) -> None:
+    settings = listed(scene)
+    settings.first_picture.use = False
+    request = fit(scene)
+    assert request["picture"]["number"] == 2
+    assert not request.get("more_pictures")
+    settings.pictures[0].use = False
+    with pytest.raises(RuntimeError, match="No picture is used"):
+        scene.bpy.ops.mfo.fit(job_folder=scene.job, object="Väse")
+
+
+def test_what_is_missing_is_said_before_the_fit(scene: SimpleNamespace) -> None:
+    bpy, settings = scene.bpy, listed(scene)
+
+    def said() -> dict[str, str]:
+        found = quick_check(bpy.context.scene, bpy.context.view_layer)
+        return {f.sentence: f.level for f in found if f.sentence.startswith(("Picture 2", "Choose the file"))}
+
+    settings.pictures[0].frame = 900
+    assert said() == {"Picture 2: frame 900 is outside of the frames 1 to 250.": STOPS}
+    settings.pictures[0].path = ""
+    assert said() == {"Choose the file of picture 2, or do not use it.": TO_CHOOSE}
+    with pytest.raises(RuntimeError, match="Picture 2 has no file"):
+        bpy.ops.mfo.fit(job_folder=scene.job, object="Väse")
+    assert bpy.ops.mfo.remove_picture(index=0) == {"FINISHED"}
+    assert not settings.pictures
+
+
+def propose(scene: SimpleNamespace, **changes: object) -> Path:
+    """A finished job whose result proposes a camera and has two pictures."""
+    scene.bpy.context.scene.mfo.reference_path = scene.reference
+    fit(scene)
+    path = Path(scene.job) / "result.json"
+    proposal = {"turn": 90.0, "center": [1.0, 0.0, 0.5], "settles": [], "predicted": {}, "sentence": "Turn by 90."}
+    pictures = [
+        {"number": n, "name": f"{n}.exr", "folder": folder, "verdict": "same", "errors": {"flip": [0.5, 0.1]}}
+        for n, folder in ((1, "."), (3, "more_pictures/3"))
+    ]
+    result = json.loads(path.read_text("utf-8")) | {"next_picture": proposal | changes, "pictures": pictures}
+    path.write_text(json.dumps(result), "utf-8")
+    return Path(scene.job)
+
+
+def test_the_proposed_camera_is_set_up_around_the_object_and_listed(scene: SimpleNamespace) -> None:
+    bpy = scene.bpy
+    found = read_job_result(propose(scene))
+    assert [picture.label for picture in found.pictures] == ["1 1.exr", "3 3.exr"]
+    shown_result.clear(bpy.context.window_manager.mfo_runtime)
+    shown_result.show(found, 0)
+    before = bpy.context.scene.camera
+    assert bpy.ops.mfo.set_up_next_picture() == {"FINISHED"}
+    camera = bpy.context.scene.camera
+    bpy.context.view_layer.update()
+    assert camera != before
+    assert bpy.context.scene.mfo.pictures[0].camera == camera
+    assert bpy.context.scene.mfo.first_picture.camera == before
+    center = np.array([1.0, 0.0, 0.5])
+    old, new = (np.array(one.matrix_world)[:3, 3] - center for one in (before, camera))
+    turn = math.radians(90.0)
+    rotation = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+    np.testing.assert_allclose(new, rotation @ old, atol=1e-5)
+
+
+@pytest.mark.parametrize("wrong", [{"center": [0.0]}, {"turn": "far"}, {"turn": None}])
+def test_a_proposal_that_is_none_is_refused(scene: SimpleNamespace, wrong: dict[str, object]) -> None:
+    with pytest.raises(JobResultError):
+        read_job_result(propose(scene, **wrong))
