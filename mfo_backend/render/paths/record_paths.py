@@ -48,7 +48,6 @@ class RecordSettings:
     mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples of the same
     directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need no other
     kernels than a recording with it. With `free_emission` the target's own emission is no part of the constant picture.
-    `sensor` is another camera than the scene's.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -68,7 +67,7 @@ class RecordSettings:
     alike: bool = False
     direct_samples: int = 0
     free_emission: bool = False
-    sensor: Any = None
+    sensor: Any = None  # a camera that the scene lacks
 
 
 @dataclass
@@ -99,11 +98,7 @@ class _Hits:
 
 
 def record_paths(
-    scene: mi.Scene,
-    shape: mi.Shape,
-    settings: RecordSettings,
-    *,
-    allow_dark: bool = False,
+    scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, *, allow_dark: bool = False
 ) -> RecordedPaths:
     """Record the light that reaches the first hit on `shape` from the scene's sensor.
 
