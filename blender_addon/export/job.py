@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 import tomllib
 
-from ..graph_values.place import holder_of
+from ..graph_values.place import holder_of, is_there
 from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
 from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
@@ -158,9 +158,10 @@ def partial_export(
         data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
         findings.raise_first()
         fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not values)
+        tree = obj.active_material.node_tree
         unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
         named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
-        named |= {value.name: holder_of(obj.active_material.node_tree, value.place) for value in values}
+        named |= {v.name: holder_of(tree, v.place) for v in values if is_there(tree, v.place)}
         for said in animation_notes(named, context.scene.frame_current):
             findings.note(said, explains=False)
         tell(0.4)

@@ -11,9 +11,10 @@ import bpy
 import numpy as np
 
 from ..export.images.color_space import from_rec709, to_rec709
+from .tint import TINT_GAIN, TINT_OFFSET, tint_held, tint_holder, tint_of
 
 INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, CURVE_POINT = "input", "output", "stop_color", "stop_position", "curve_point"
-KINDS = (INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, CURVE_POINT)
+TINTS = (TINT_GAIN, TINT_OFFSET)
 Value = float | tuple[float, ...]
 
 
@@ -27,7 +28,7 @@ class Place:
         Names of the groups that hold the node and its own, in the material's tree.
     kind
         An unlinked input, the output of a Value or RGB node, colour or position of a ramp's stop, height of a curve's
-        point.
+        point, gain or offset of the picture that is linked to an input.
     key
         The socket's identifier, the stop's number, or curve and point as ``"3/1"``.
     component
@@ -69,11 +70,11 @@ def holder_of(tree: bpy.types.NodeTree, place: Place) -> tuple[Any, str]:
     KeyError, IndexError, AttributeError
         If the tree has no such place.
     """
-    for group in place.path[:-1]:
-        tree = tree.nodes[group].node_tree
-    node = tree.nodes[place.path[-1]]
+    node = _node(tree, place)
+    if place.kind in TINTS:
+        return tint_holder(_input(node, place.key), place.kind)
     if place.kind == INPUT:
-        return next(s for s in node.inputs if s.identifier == place.key), "default_value"
+        return _input(node, place.key), "default_value"
     if place.kind == OUTPUT:
         return next(s for s in node.outputs if s.identifier == place.key), "default_value"
     if place.kind == CURVE_POINT:
@@ -85,6 +86,8 @@ def holder_of(tree: bpy.types.NodeTree, place: Place) -> tuple[Any, str]:
 
 def held(tree: bpy.types.NodeTree, place: Place) -> Value:
     """The numbers as they are kept, colours in the scene's working space and with their alpha."""
+    if place.kind in TINTS:  # a look puts no node there
+        return tint_held(_input(_node(tree, place), place.key), place.kind)
     owner, name = holder_of(tree, place)
     value = getattr(owner, name)
     if isinstance(value, (int, float)):
@@ -100,9 +103,22 @@ def hold(tree: bpy.types.NodeTree, place: Place, value: Value) -> None:
     else:
         setattr(owner, name, value)
     if place.kind == CURVE_POINT:
-        for group in place.path[:-1]:
-            tree = tree.nodes[group].node_tree
-        tree.nodes[place.path[-1]].mapping.update()
+        _node(tree, place).mapping.update()
+
+
+def is_there(tree: bpy.types.NodeTree, place: Place) -> bool:
+    """Whether the value has a node; a tint has none before it is written."""
+    return place.kind not in TINTS or tint_of(_input(_node(tree, place), place.key)) is not None
+
+
+def _node(tree: bpy.types.NodeTree, place: Place) -> bpy.types.Node:
+    for group in place.path[:-1]:
+        tree = tree.nodes[group].node_tree
+    return tree.nodes[place.path[-1]]
+
+
+def _input(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
+    return next(socket for socket in node.inputs if socket.identifier == identifier)
 
 
 def read(tree: bpy.types.NodeTree, place: Place) -> Value:

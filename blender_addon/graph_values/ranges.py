@@ -33,6 +33,7 @@ class Range:
     scanned: bool = False
 
 
+GAIN, OFFSET = Range(0.0, 4.0), Range(-0.5, 0.5)  # of a picture
 FROM_0_TO_1 = Range(0.0, 1.0, SETTING)
 # by node and name of the input; what is not here goes by its value
 SETTINGS = {

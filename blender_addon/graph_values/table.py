@@ -13,10 +13,12 @@ import bpy
 
 from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
 from ..export.nodes.shader_graph import source_of
+from ..export.nodes.target_shader import Place as SocketPlace
 from ..export.nodes.target_shader import TargetShader
 from . import ranges
 from .place import CURVE_POINT, INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, Place, Value, read
-from .ranges import COLOR, NUMBER, Range, plain_range, range_of_input, range_of_stop
+from .ranges import COLOR, GAIN, NUMBER, OFFSET, Range, plain_range, range_of_input, range_of_stop
+from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
 # what a fit on recorded light does not change: light that the target emits, and what lets light through
 NOT_FITTED = ("Emission Color", "Emission Strength", "Alpha", "Transmission Weight")
@@ -57,6 +59,8 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
         if name in NOT_FITTED or not place.socket.is_linked:
             continue
         is_color = place.socket.type == "RGBA"
+        for met in _tints(name, place):
+            found[met.place] = met
         for met in _upstream(place.socket, place.groups):
             known = found.setdefault(met.place, met)
             known.sockets.append(name) if name not in known.sockets else None
@@ -108,6 +112,7 @@ class _Met:
     range: Range | None  # None where it hangs on the value, which is read later
     sockets: list[str]
     asks_color: bool = False
+    label: str = ""  # in place of the node's
 
 
 def _upstream(
@@ -126,11 +131,25 @@ def _upstream(
     if node.bl_idname not in (GROUP, GROUP_INPUT):
         yield from _own_values(node, groups, source)
     for further, within in feeding(node, source, groups):
+        if is_tint(node) and not further.is_linked:
+            continue  # it has names of its own
         if further.is_linked:
             if source_of(further) is not None:
                 yield from _upstream(further, within, seen)
         elif further.node.bl_idname != GROUP_INPUT:
             yield from _input_values(further, within)
+
+
+def _tints(name: str, place: SocketPlace) -> Iterator[_Met]:
+    """Gain and offset of a picture that is linked to a socket as it is."""
+    tint = tint_of(place.socket)
+    source = source_of(place.socket if tint is None else tint.inputs[0])
+    if source is None or source.node.bl_idname != IMAGE or place.socket.type not in ("RGBA", "VALUE"):
+        return
+    is_color, path = place.socket.type == "RGBA", _path(place.socket.node, place.groups)
+    for kind, inside, limits in ((TINT_GAIN, "Gain", GAIN), (TINT_OFFSET, "Offset", OFFSET)):
+        where = Place(path, kind, place.socket.identifier, size=3 if is_color else 1)
+        yield _Met(where, place.socket.node, place.groups, inside, False, limits, [name], is_color, label=name)
 
 
 def _path(node: bpy.types.Node, groups: tuple[bpy.types.Node, ...]) -> tuple[str, ...]:
@@ -189,7 +208,7 @@ def _finished(met: _Met, tree: bpy.types.NodeTree) -> GraphValue:
     numbers = value if isinstance(value, tuple) else (value,)
     limits = met.range or plain_range(numbers[0])
     limits = replace(limits, lower=min(limits.lower, *numbers, limits.upper), upper=max(limits.upper, *numbers))
-    label, inside = _one_word(met.node.label or met.node.name), _one_word(met.inside)
+    label, inside = _one_word(met.label or met.node.label or met.node.name), _one_word(met.inside)
     return GraphValue(f"{label}/{inside}", label, place, limits, tuple(met.sockets))
 
 

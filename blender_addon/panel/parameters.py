@@ -8,7 +8,7 @@ from itertools import groupby
 import bpy
 
 from ..export.nodes.target_shader import TargetShader, target_shader
-from ..graph_values.place import holder_of
+from ..graph_values.place import holder_of, is_there
 from ..graph_values.table import GraphValue, graph_values
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
 from ..running import running_job
@@ -97,5 +97,7 @@ def _draw_node_value(
     is_chosen = value.name in settings.node_values
     text, icon = value.name.rpartition("/")[2], "CHECKBOX_HLT" if is_chosen else "LOCKED"
     split.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen).name = value.name
+    if not is_there(tree, value.place):
+        return
     owner, attribute = holder_of(tree, value.place)
     split.row(align=True).prop(owner, attribute, text="", index=max(value.place.component, -1))

@@ -13,7 +13,7 @@ import bpy
 from ..export.materials.principled_mapping import mitsuba_to_sockets
 from ..export.nodes.target_shader import TargetShader, make_own, target_shader
 from ..graph_values.own_groups import make_groups_own
-from ..graph_values.place import INPUT, Place, as_held, held, hold, holder_of
+from ..graph_values.place import INPUT, TINTS, Place, as_held, held, hold, holder_of, is_there
 from ..graph_values.table import graph_values
 from ..versions import node_tree_of
 from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_at, key_here, left_note, remove_driver
@@ -85,7 +85,7 @@ def apply_values(
     if unwritable(material):
         raise WriteBackError(unwritable(material))
     kept, slots = material.mfo, _slots(material)
-    moved = animation_at({name: slot.holder for name, slot in slots.items() if not slot.is_linked})
+    moved = animation_at(_holders(slots))
     notes, changes = [], {}
     for name, value in values.items():
         slot = slots.get(name)
@@ -161,7 +161,7 @@ def _restore(material: bpy.types.Material, values: bpy.types.bpy_prop_collection
     fitted_shader(material)
     notes = _make_own(material, [entry.name for entry in values])  # shared again, by a copy of the material
     slots = _slots(material)
-    moved = animation_at({name: slot.holder for name, slot in slots.items() if not slot.is_linked})
+    moved = animation_at(_holders(slots))
     for entry in values:
         slot = slots.get(entry.name)
         if slot is None:
@@ -199,7 +199,9 @@ class _Slot:
     @property
     def kept(self) -> Value:
         """The number or numbers as they are held."""
-        return held(self.tree, self.place) if hasattr(*self.holder) else ()  # a shader socket has none
+        if self.place.kind == INPUT and not hasattr(*self.holder):  # a shader socket has none
+            return ()
+        return held(self.tree, self.place)
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -232,8 +234,15 @@ class _Slot:
     @property
     def is_color(self) -> bool:
         """Whether it holds a colour with its alpha."""
+        if self.place.kind in TINTS:
+            return self.place.size == 3
         owner, attribute = self.holder
         return attribute == "color" or getattr(owner, "type", "") == "RGBA"
+
+
+def _holders(slots: Mapping[str, _Slot]) -> dict[str, tuple[Any, str]]:
+    """What holds the values that may be set and are there."""
+    return {n: s.holder for n, s in slots.items() if not s.is_linked and is_there(s.tree, s.place)}
 
 
 def _slots(material: bpy.types.Material) -> dict[str, _Slot]:
