@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 
+from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
 from ...graph_values.table import GraphValue, GraphValueError, chosen_values, graph_values
 from ...probe.own_blender import save_copy
@@ -40,13 +41,21 @@ def chosen_graph_values(
     names = () if isinstance(wanted, str) else tuple(name for name in wanted if "/" in str(name))
     rest = fit if isinstance(wanted, str) else fit | {"parameters": [name for name in wanted if name not in names]}
     target = None if obj is None else target_shader(obj.active_material)
-    if target is None or (isinstance(wanted, str) and wanted != "all") or not (names or isinstance(wanted, str)):
+    if obj is None or target is None or (not names and wanted != "all"):
         return [], rest
     try:
         chosen = chosen_values(graph_values(target), wanted if isinstance(wanted, str) else names)
     except GraphValueError as error:
         raise ExportError(str(error)) from error
     reason = _not_fitted(target, fit) if alone else "a fit to several pictures changes the values of sockets alone"
+    if reason is None:
+        material = obj.active_material
+        for name in shared_groups(material, [value.place for value in chosen]):
+            findings.note(
+                f"The group '{name}' of material '{material.name}' is used elsewhere too: an apply gives the material "
+                "a copy of its own.",
+                explains=False,
+            )
     if not chosen or reason is None:
         return chosen, rest
     if names:
