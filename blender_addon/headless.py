@@ -54,6 +54,8 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     """Write the job folder of an object's active material."""
     bpy = _open(chosen.file)
     from .export.job import ExportError, export_job
+    from .export.nodes.closure_leaves import ClosureError
+    from .export.nodes.target_shader import leaf_called
     from .result.local_copy import unwritable
 
     obj = bpy.context.scene.objects.get(chosen.object)
@@ -71,6 +73,11 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
         raise HeadlessError(f"--fit is not JSON ({error}).") from error
     if not isinstance(fit, dict):
         raise HeadlessError("--fit is not a JSON object.")
+    if chosen.shader:
+        try:
+            obj.active_material.mfo.leaf = leaf_called(obj.active_material, chosen.shader)
+        except ClosureError as error:
+            raise HeadlessError(str(error)) from error
     if chosen.will_apply and not chosen.make_local and unwritable(obj.active_material):
         raise HeadlessError(unwritable(obj.active_material))
     try:
@@ -142,7 +149,8 @@ def _put_values(bpy: Any, chosen: argparse.Namespace) -> tuple[Any, Any, dict[st
         if material is None:
             raise HeadlessError(f"{chosen.file} has no material {name!r}: give the one to change with --material.")
         values = result_to_sockets(result)
-        return material, result, values, apply_values(material, values, result.folder, animated=chosen.animated)
+        notes = apply_values(material, values, result.folder, animated=chosen.animated, leaf=result.leaf or None)
+        return material, result, values, notes
     except (JobResultError, WriteBackError, LocalCopyError) as error:
         raise HeadlessError(str(error)) from error
 
@@ -226,6 +234,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--fit", default="{}", help="the `fit` object of request.json")
     command.add_argument("--reference-view", default="scene", help="scene or standard: how a display picture was made")
     command.add_argument("--upright", action="store_true", help="turn the picture as its EXIF data say")
+    command.add_argument("--shader", default="", help="of a mix of shaders the one to fit")
     command.add_argument("--will-apply", action="store_true", help="refuse a material that cannot be changed")
     command.add_argument("--make-local", action="store_true", help="its object will be made local by apply")
     command = add("apply", apply)

@@ -282,6 +282,7 @@ class MFO_PG_past_result(bpy.types.PropertyGroup):
     flip: FloatProperty(default=-1.0)
     partial: BoolProperty()
     verdict: StringProperty()  # same, close or different; empty where unknown
+    leaf: StringProperty()  # the shader that the values belong to; empty where unknown
     values: CollectionProperty(type=MFO_PG_socket_value)
 
 
@@ -291,6 +292,11 @@ class MFO_PG_material(bpy.types.PropertyGroup):
     job_folder: StringProperty(subtype="DIR_PATH")
     originals: CollectionProperty(type=MFO_PG_socket_value)
     applied: CollectionProperty(type=MFO_PG_socket_value)
+    leaf: StringProperty(
+        name="Shader",
+        description="The shader node of a mix that is fitted, after the groups it lies in; empty: the one that covers "
+        "most",
+    )
     shows_original: BoolProperty()  # A of A/B: the sockets hold `originals`, not `applied`
     history: CollectionProperty(type=MFO_PG_past_result)
     history_index: IntProperty(name="Result", description="One of the results this material had", options=set())

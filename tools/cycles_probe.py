@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+PRINCIPLED = "ShaderNodeBsdfPrincipled"
 
 
 def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (sys.executable,)) -> list[Array]:
@@ -34,7 +35,8 @@ def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (s
     ----------
     batches
         Each has `view` and `light` (cases, 3), unit vectors in the frame tangent, bitangent, normal; `sockets`, a
-        mapping of Blender's socket name to (cases,) or (cases, 3); optionally `distribution` ("MULTI_GGX" or "GGX").
+        mapping of the node's socket name to (cases,) or (cases, 3); optionally `distribution` ("MULTI_GGX" or "GGX")
+        and `node`, "ShaderNodeBsdfPrincipled" without it.
     command
         A Python that has `bpy`, or a Blender program with the arguments up to and including `-P`.
     """
@@ -43,7 +45,8 @@ def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (s
         for index, batch in enumerate(batches):
             source = Path(folder) / f"{index:03d}.npz"
             arrays = {f"socket {name}": np.asarray(value, np.float64) for name, value in batch["sockets"].items()}
-            settings = json.dumps({"distribution": batch.get("distribution", "MULTI_GGX")})
+            settings = {"distribution": batch.get("distribution", "MULTI_GGX"), "node": batch.get("node", PRINCIPLED)}
+            settings = json.dumps(settings)
             np.savez(source, view=batch["view"], light=batch["light"], settings=np.array(settings), **arrays)
             files += [str(source), str(source.with_suffix(".out.npy"))]
         between = ["--"] if command[-1] == "-P" else []
@@ -105,26 +108,29 @@ class Probe:
         scene.collection.objects.link(self.sun)
         scene.camera = self.camera
 
-    def material(self, sockets: Mapping[str, Array], distribution: str) -> Any:
-        """A Principled node whose named sockets read face attributes."""
+    def material(self, sockets: Mapping[str, Array], kind: str, distribution: str) -> Any:
+        """A shader node whose named sockets read face attributes."""
         material = self.bpy.data.materials.new("probe")
         material.use_nodes = True
         nodes, links = material.node_tree.nodes, material.node_tree.links
         nodes.clear()
-        principled, output = nodes.new("ShaderNodeBsdfPrincipled"), nodes.new("ShaderNodeOutputMaterial")
-        principled.distribution = distribution
-        links.new(principled.outputs[0], output.inputs["Surface"])
+        shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
+        if hasattr(shader, "distribution"):
+            shader.distribution = distribution
+        links.new(shader.outputs[0], output.inputs["Surface"])
         for name, values in {**sockets, "Tangent": np.zeros((1, 3))}.items():
+            if name not in shader.inputs:
+                continue
             attribute = nodes.new("ShaderNodeAttribute")
             attribute.attribute_name = f"probe {name}"
-            links.new(attribute.outputs["Fac" if values.ndim == 1 else "Vector"], principled.inputs[name])
+            links.new(attribute.outputs["Fac" if values.ndim == 1 else "Vector"], shader.inputs[name])
         return material
 
     def answer(self, data: Mapping[str, Array]) -> Array:
         """f_r |cos| (cases, 3) of one batch."""
         settings = json.loads(str(data["settings"]))
         sockets = {key.removeprefix("socket "): data[key] for key in data if key.startswith("socket ")}
-        material = self.material(sockets, settings["distribution"])
+        material = self.material(sockets, settings["node"], settings["distribution"])
         frames, angles = facet_frames(data["view"], data["light"])
         result = np.full((len(angles), 3), np.nan)
         keys = np.round(angles, 7)

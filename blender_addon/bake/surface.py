@@ -17,8 +17,8 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot, slot_count
+from ..probe.closure_tree import ClosureTree, Leaf, Value
 from ..versions import active_output
-from .closure_tree import ClosureTree, Leaf, Value
 from .dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from .light_path import SCATTERED, answer_light_paths, light_path_outputs
 from .unwrap import unwrapped

@@ -15,12 +15,14 @@ import tomllib
 from ..graph_values.place import holder_of, is_there
 from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
+from ..versions import PRINCIPLED
 from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
 from .findings import ExportError, Findings
-from .material_model import Material
+from .material_model import Material, Socket
 from .materials.chosen_values import by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
-from .materials.node_graph import evaluate_graph, probe_for
+from .materials.node_graph import evaluate_graph, largest_leaf, probe_for
+from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, shown
 from .reference.reference import Reference, read_reference
@@ -34,6 +36,7 @@ SCHEMA_VERSION = 1
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
+MOST_UNKNOWN = 0.5  # share of a mix that a shader without an exact model may have
 
 __all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job"]
 
@@ -146,14 +149,17 @@ def partial_export(
     findings = Findings()
     values, fit = chosen_graph_values(obj, fit, findings, alone=alone)
     with probe_for(obj, always=bool(values)) as probe:
+        # names that the user chose are those of the leaf that the panel shows
+        by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
+        leaf = largest_leaf(probe, context, obj) if probe is not None and by_share else None
         with SceneBakes(context) as bakes:
-            data = read_scene(context, obj, findings, bakes)
+            data = read_scene(context, obj, findings, bakes, leaf)
         findings.raise_first()
         assert data is not None
         if unwritable(obj.active_material):
             said = f"The values cannot be applied as it is. {unwritable(obj.active_material)}"
             findings.note(said, explains=False)
-        target = target_shader(obj.active_material)
+        target = target_shader(obj.active_material, leaf)
         assert target is not None
         data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
         findings.raise_first()
@@ -172,6 +178,7 @@ def partial_export(
         graph = None
         if probe is not None:
             data.materials[TARGET_BSDF], graph = evaluate_graph(probe, context, obj, data.materials[TARGET_BSDF])
+        _name_shares(data.materials[TARGET_BSDF], findings)
         files = scene_files(data, findings)
         tell(0.5)
         request = _request(context, obj, data, files, picture, fit, findings)
@@ -204,21 +211,65 @@ def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findin
 
 
 def _fit_of(target: TargetShader, material: Material, fit: dict[str, Any], *, alone: bool) -> dict[str, Any]:
-    """The fit of what the target's node has: of a Diffuse BSDF its two values, `alone` or with its graph's."""
-    if not target.is_diffuse:
+    """The fit of what the target's node has, `alone` or with its graph's values.
+
+    Values are called as the node or as the Principled BSDF calls them.
+    """
+    if not material.is_mixed and target.node.bl_idname == PRINCIPLED:
         return fit
+    label = target.node.bl_label
     if fit.get("model", "blender_principled") != "blender_principled":
-        raise ExportError("A Diffuse BSDF is fitted with the model blender_principled alone: choose that.")
-    names = {name.lower().replace(" ", "_"): name for name in target.places}
-    free = [name for name, socket in names.items() if not material.sockets[socket].linked]
+        said = f"A {label}" if target.node.bl_idname != PRINCIPLED else "A mix of shaders"
+        raise ExportError(f"{said} is fitted with the model blender_principled alone: choose that.")
+    if target.node.bl_idname == PRINCIPLED:
+        return fit
+    free = {name: socket for name, socket in material.sockets.items() if name in target.places and not socket.linked}
+    known = {parameter_of(name): parameter_of(name) for name in target.places}
+    known |= {parameter_of(target.own_name(name)): parameter_of(name) for name in target.places}
     wanted = fit.get("parameters", "all")
-    chosen = free if isinstance(wanted, str) else [name for name in wanted if name in names]
+    if isinstance(wanted, str):
+        values = {name: socket.value for name, socket in free.items()}
+        chosen = [parameter_of(name) for name in default_names(values)]
+    else:
+        chosen = list(dict.fromkeys(known[parameter_of(name)] for name in wanted if parameter_of(name) in known))
     if not chosen and alone:
+        names = [f"{target.own_name(name)} ({parameter_of(name)})" for name in target.places]
+        listed = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]
         raise ExportError(
-            "A Diffuse BSDF has Color (base_color) and Roughness (diffuse_roughness) alone, and none of them is left "
-            "to fit: choose one that has no link."
+            f"A {label} has {listed} alone, and none of them is left to fit: choose one that has no link."
         )
     return fit | {"parameters": chosen}
+
+
+def _name_shares(material: Material, findings: Findings) -> None:
+    """Say how much of a mix each leaf is.
+
+    Raises
+    ------
+    ExportError
+        If what has no model is most of it.
+    """
+    leaves = (material, *material.leaves)
+    if len(leaves) < 2:
+        return
+    listed = ", ".join(f"'{'/'.join(leaf.node)}' {100.0 * float(leaf.weight.value):.0f} %" for leaf in leaves)
+    findings.note(f"Shares of the target's shaders: {listed}; the first is fitted.", explains=False)
+    for leaf in material.leaves:
+        if leaf.is_nearest and float(leaf.weight.value) > MOST_UNKNOWN:
+            raise ExportError(
+                f"'{leaf.name}' is {100.0 * float(leaf.weight.value):.0f} % of material '{material.name}', and the fit "
+                "has no model of it: its values cannot be told from the others'. Unlink it, or fit another material."
+            )
+
+
+def parameter_of(name: str) -> str:
+    """A socket's name as that of a parameter."""
+    return name.strip().lower().replace(" ", "_")
+
+
+def _labels(material: Material) -> dict[str, str]:
+    """What the target's node calls values of the fit, by their names there."""
+    return {parameter_of(name): label for name, label in material.labels.items()}
 
 
 def _request(
@@ -241,6 +292,8 @@ def _request(
             "object": obj.name,
             "material": data.materials[TARGET_BSDF].name,
             "slot": obj.active_material_index,
+            "node": list(data.materials[TARGET_BSDF].node),
+            "labels": _labels(data.materials[TARGET_BSDF]),
         },
         "image": {
             "width": data.camera.width,
@@ -268,21 +321,30 @@ def _request(
 
 
 def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
-    sockets: dict[str, Any] = {}
-    for name, socket in material.sockets.items():
-        value = socket.value
-        plain = list(value) if isinstance(value, (list, tuple)) else value
-        sockets[name] = {"value": plain, "linked": socket.linked}
-        if socket.texture is not None:
-            sockets[name]["texture"] = files.texture(socket.texture)
-        if socket.seen is not None:
-            sockets[name]["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
-    return {
+    described: dict[str, Any] = {
         "name": material.name,
         "distribution": material.distribution,
         "subsurface_method": material.subsurface_method,
-        "sockets": sockets,
+        "sockets": {name: _socket(socket, files) for name, socket in material.sockets.items()},
     }
+    shader = {"null": "transparent", "emission": "emission"}.get(material.model, material.shader)
+    if shader != "principled":
+        described["shader"] = shader
+    if material.is_mixed:
+        described["weight"] = _socket(material.weight, files)
+    if material.leaves:
+        described["leaves"] = [_material(leaf, files) for leaf in material.leaves]
+    return described
+
+
+def _socket(socket: Socket, files: SceneFiles) -> dict[str, Any]:
+    value = socket.value
+    described = {"value": list(value) if isinstance(value, (list, tuple)) else value, "linked": socket.linked}
+    if socket.texture is not None:
+        described["texture"] = files.texture(socket.texture)
+    if socket.seen is not None:
+        described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
+    return described
 
 
 def _version() -> str:

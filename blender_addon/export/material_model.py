@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,12 @@ class Texture:
     uv_matrix: NDArray[np.float64]
     wrap: str = "repeat"
     filter_type: str = "bilinear"
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is looked up as a bitmap of Mitsuba is without further words."""
+        plain = self.wrap == "repeat" and self.filter_type == "bilinear"
+        return plain and bool(np.allclose(self.uv_matrix, np.eye(3)))
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,11 @@ class Material:
 
     A mix and a bumped surface have `parts`, and of sockets those of emission alone. `normal` (height, width, 3) has
     normals in the frame of the UV map, n / 2 + 1 / 2. Without `transparent_shadows` no light passes into a shadow.
+    `shader` is the backend's word for lobes that are not all of a Principled BSDF.
+
+    The target may be one leaf of a mix: `weight` is its share, and `leaves` are the others with theirs. `node` is the
+    path of names to its node, `labels` what that calls sockets that have another name here, and `is_nearest` says that
+    its model is only the nearest.
     """
 
     name: str
@@ -55,6 +67,23 @@ class Material:
     parts: tuple[Part, ...] = ()
     normal: Texture | None = None
     transparent_shadows: bool = True
+    shader: str = "principled"
+    weight: Socket = Socket(1.0)
+    leaves: tuple[Material, ...] = ()
+    node: tuple[str, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
+    is_nearest: bool = False
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether the surface is more, or less, than this leaf."""
+        return bool(self.leaves) or self.weight.linked or self.weight.value != 1.0
+
+    @property
+    def asks_graph(self) -> bool:
+        """Whether Cycles has to evaluate nodes for it."""
+        own = any(socket.by_graph for socket in (self.weight, *self.sockets.values()))
+        return own or any(leaf.asks_graph for leaf in self.leaves)
 
     def value(self, name: str, default: Any) -> Any:
         """Value of socket `name`, or `default` if this Blender's Principled has no such socket."""
@@ -63,9 +92,10 @@ class Material:
 
     @property
     def emission(self) -> NDArray[np.float64]:
-        """Emitted radiance, linear Rec.709; coat and sheen above it are not counted."""
+        """Mean emitted radiance, linear Rec.709; coat and sheen above it are not counted."""
         color = np.asarray(self.value("Emission Color", (1.0, 1.0, 1.0)), dtype=np.float64)
-        return color * float(self.value("Emission Strength", 0.0))
+        own = float(self.weight.value) * color * float(self.value("Emission Strength", 0.0))
+        return own + sum((leaf.emission for leaf in self.leaves), np.zeros(3))
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,7 @@ class MFO_OT_apply(bpy.types.Operator):
                 result_to_sockets(result),
                 result.folder,
                 animated=self.animated or context.scene.mfo.animated,
+                leaf=result.leaf or None,
             )
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, str(error))

@@ -14,7 +14,7 @@ from ..process import waiting_backend
 from ..result import shown_result
 from ..running import fit_queue, running_job
 from .check import thorough_check
-from .fit_options import FitError, FitOptions, python_of, selected_targets, target_of
+from .fit_options import FitError, FitOptions, choose_shader, python_of, selected_targets, target_of
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -159,9 +159,31 @@ class MFO_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MFO_OT_choose_shader(bpy.types.Operator):
+    """Fit this shader of the material's mix and hold the others"""
+
+    bl_idname = "mfo.choose_shader"
+    bl_label = "Choose Shader to Fit"
+    bl_options = {"REGISTER", "UNDO"}
+
+    shader: StringProperty(name="Shader", description="Its node, after the groups it lies in", options={"SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Keep the choice with the material."""
+        try:
+            material = target_of(context, "").active_material
+            if material is None:
+                raise FitError("The active object has no material in its active slot.")
+            choose_shader(material, self.shader)
+        except FitError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 def _error_summary() -> str:
     found = shown_result.result
     return "; ".join(f"{name} {a:.4g} to {b:.4g}" for name, (a, b) in found.errors.items()) if found else ""
 
 
-CLASSES = (MFO_OT_fit, MFO_OT_fit_selected, MFO_OT_drop_queued, MFO_OT_cancel)
+CLASSES = (MFO_OT_choose_shader, MFO_OT_fit, MFO_OT_fit_selected, MFO_OT_drop_queued, MFO_OT_cancel)

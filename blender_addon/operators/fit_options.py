@@ -13,7 +13,8 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.preferences import chosen_python, new_job_folder
 from ..export.job import ExportError, export_job
-from ..export.nodes.target_shader import target_shader
+from ..export.nodes.closure_leaves import ClosureError
+from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference_view import REFERENCE_VIEWS
 from ..graph_values.table import graph_values
@@ -43,6 +44,9 @@ class FitOptions:
         name="Parameters",
         description='"all", "reduced" or names with commas; empty: the scene\'s setting',
         options=_SCRIPT,
+    )
+    shader: StringProperty(
+        name="Shader", description="Of a mix of shaders the one to fit; empty: the material's setting", options=_SCRIPT
     )
     model: StringProperty(name="Model", description="Material model; empty: the scene's setting", options=_SCRIPT)
     range: StringProperty(
@@ -80,6 +84,8 @@ class FitOptions:
         material = _active_material(obj)
         if unwritable(material):  # before the fit, since its values could not be applied
             raise FitError(unwritable(material))
+        if self.shader:
+            choose_shader(material, self.shader)
         reference = _reference(settings, self.reference)
         if settings.pictures and not self.reference:
             reference = _pictures(settings, reference)
@@ -182,6 +188,14 @@ def _active_material(obj: bpy.types.Object) -> bpy.types.Material:
     except WriteBackError as error:
         raise FitError(str(error)) from error
     return material
+
+
+def choose_shader(material: bpy.types.Material, wanted: str) -> None:
+    """Let a shader of a mix be the one that is fitted; raises `FitError` where there is none of that name."""
+    try:
+        material.mfo.leaf = leaf_called(material, wanted)
+    except ClosureError as error:
+        raise FitError(str(error)) from error
 
 
 def _reference(settings: bpy.types.PropertyGroup, given: str) -> Path | bpy.types.Image:

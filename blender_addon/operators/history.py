@@ -75,7 +75,11 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
             return {"CANCELLED"}
         try:
             notes = apply_values(
-                material, history.values_of(entry), Path(entry.job_folder), animated=context.scene.mfo.animated
+                material,
+                history.values_of(entry),
+                Path(entry.job_folder),
+                animated=context.scene.mfo.animated,
+                leaf=entry.leaf or None,
             )
         except WriteBackError as error:
             self.report({"ERROR"}, str(error))

@@ -7,7 +7,7 @@ from itertools import groupby
 
 import bpy
 
-from ..export.nodes.target_shader import TargetShader, target_shader
+from ..export.nodes.target_shader import TargetShader, fitted_leaves, leaf_name, target_shader
 from ..graph_values.place import holder_of, is_there
 from ..graph_values.table import GraphValue, graph_values
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
@@ -35,6 +35,7 @@ class Parameters:
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice and, for Chosen, a line for each value."""
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
+        _draw_leaves(layout, context)
         layout.row().prop(settings, "parameter_set", expand=True)
         if settings.parameter_set != "chosen":
             return
@@ -48,6 +49,20 @@ class Parameters:
         else:
             for key, name, *_ in PARAMETER_ITEMS:
                 column.prop_enum(settings, chosen_of(settings.model), key, text=name)
+
+
+def _draw_leaves(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Of a mix of shaders, a button for each that can be fitted."""
+    material = context.object.active_material if context.object else None
+    leaves = fitted_leaves(material)
+    if len(leaves) < 2:
+        return
+    target, column = target_shader(material), layout.column(align=True)
+    column.label(text="Shader to Fit", icon="NODE_MATERIAL")
+    for leaf in leaves:
+        name = leaf_name(leaf)
+        shown = target is not None and target.name == name
+        column.operator("mfo.choose_shader", text=name, translate=False, depress=shown).shader = name
 
 
 def _draw_value(

@@ -19,6 +19,7 @@ from ..export.images.color_space import to_rec709
 from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
 from .aov_render import Frame, frame_of, render_outputs, world_to_frame
+from .closure_tree import ClosureTree, Leaf
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
 from .server import ProbeRequestError
 
@@ -27,13 +28,25 @@ DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
 SEEN = 0.05  # share of a subpixel's samples on the target from which on it has a value
 
 
+@dataclass(frozen=True)
+class _Output:
+    """One AOV, its socket's kind, and what it is called in the answer: a leaf's number and a socket, or its weight."""
+
+    name: str
+    kind: str
+    leaf: int
+    socket: str | None
+
+
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """Write one .npy file, float32 (height, width, 1 or 3), for each socket, and the positions, NaN beside the target.
 
-    Requested are `scene`, `layer`, `object`, `slot`, the shader's `node` (a path of names), its `sockets`, the `scale`
-    in subpixels along a pixel, `samples` of each subpixel and the `folder` for the files. Answered are `files` by
-    socket, `means` over the target, the file `positions`, and `camera`, the (3, 4) matrix from the world to columns and
-    rows of the files. Colours are linear Rec.709, directions unit vectors of the world or zero.
+    Requested are `scene`, `layer`, `object`, `slot`, for each of the `leaves` of its shaders the `node` (a path of
+    names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples` of
+    each subpixel and the `folder` for the files. Answered are for each of the `leaves` the `sockets` by name and the
+    `weight`, each a `file` and its `mean` over the target, the file `positions`, and `camera`, the (3, 4) matrix from
+    the world to columns and rows of the files. Colours are linear Rec.709, directions unit vectors of the world or
+    zero.
 
     Raises
     ------
@@ -44,9 +57,9 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     scene, obj, material = target.scene, target.obj, target.material
     copy = own_copy(material)
     try:
-        make_opaque(copy)
-        kinds = write_outputs(copy.node_tree, request["node"], {name: f"mfo {name}" for name in request["sockets"]})
-        wanted = [*((f"mfo {name}", kind != "VALUE") for name, kind in kinds.items()), (MASK, False), (POSITION, True)]
+        outputs = _leaf_outputs(copy.node_tree, request["leaves"])
+        make_opaque(copy, ours=True)
+        wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
         frame = frame_of(scene, obj, request["scale"], len(wanted))
         widen_bumps(copy.node_tree, frame.scale)
         found = target.outputs(copy, wanted, frame, request["samples"])
@@ -57,16 +70,20 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     if not seen.any():
         raise ProbeRequestError(f"The camera does not see '{obj.name}': move it into the picture.")
     folder = Path(request["folder"])
-    files, means = {}, {}
-    for number, (name, kind) in enumerate(kinds.items()):
-        values = cleaned(found[f"mfo {name}"] / np.maximum(mask, SEEN), seen, name, kind)
-        files[name] = f"socket_{number:02d}.npy"
-        np.save(folder / files[name], values)
-        means[name] = values[seen].mean(axis=0, dtype=np.float64).tolist()
+    leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
+    for number, each in enumerate(outputs):
+        values = cleaned(found[each.name] / np.maximum(mask, SEEN), seen, each.socket or "", each.kind)
+        file = f"socket_{number:02d}.npy"
+        np.save(folder / file, values)
+        said = {"file": file, "mean": values[seen].mean(axis=0, dtype=np.float64).tolist()}
+        if each.socket is None:
+            leaves[each.leaf]["weight"] = said
+        else:
+            leaves[each.leaf]["sockets"][each.socket] = said
     positions = np.where(seen[..., None], found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
     np.save(folder / "positions.npy", positions.astype(np.float32))
     camera = world_to_frame(scene, frame).tolist()
-    return {"files": files, "means": means, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
+    return {"leaves": leaves, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
 
 
 @dataclass(frozen=True)
@@ -109,12 +126,14 @@ class Target:
             self.slot.link = was_link
 
 
-def make_opaque(copy: bpy.types.Material) -> None:
-    """Give a copied material a surface of its own, without the user's outputs and with those for mask and position."""
+def make_opaque(copy: bpy.types.Material, *, ours: bool = False) -> None:
+    """Give a copied material a surface of its own, with outputs for mask and position.
+
+    The user's outputs go, unless those that are there are `ours` already.
+    """
     tree = copy.node_tree
-    for node in list(nodes_of(tree)):
-        if node.bl_idname == "ShaderNodeOutputAOV":  # the user's own, perhaps of the same name
-            node.id_data.nodes.remove(node)
+    if not ours:
+        remove_outputs(tree)
     one = tree.nodes.new("ShaderNodeValue")
     one.outputs[0].default_value = 1.0
     _output(tree, MASK, one.outputs[0], False)
@@ -126,6 +145,42 @@ def make_opaque(copy: bpy.types.Material) -> None:
     tree.links.new(grey.outputs[0], output.inputs["Surface"])
     for link in list(output.inputs["Volume"].links):
         tree.links.remove(link)
+
+
+def remove_outputs(tree: bpy.types.NodeTree) -> None:
+    """Remove the user's own outputs, perhaps of the same names, from a copied tree and its groups."""
+    for node in list(nodes_of(tree)):
+        if node.bl_idname == "ShaderNodeOutputAOV":
+            node.id_data.nodes.remove(node)
+
+
+def _leaf_outputs(tree: bpy.types.NodeTree, leaves: list[Mapping[str, Any]]) -> list[_Output]:
+    """Put output nodes on sockets and weights of leaves; a leaf that is reached in several ways has their sum."""
+    remove_outputs(tree)
+    outputs: list[_Output] = []
+    closures = ClosureTree(tree, own_groups=False) if any(leaf["weight"] for leaf in leaves) else None
+    for number, leaf in enumerate(leaves):
+        names = {name: f"mfo {number} {name}" for name in leaf["sockets"]}
+        for name, kind in write_outputs(tree, leaf["node"], names).items():
+            outputs.append(_Output(names[name], kind, number, name))
+        if not leaf["weight"] or closures is None:
+            continue
+        ways = [each.weight for each in closures.leaves if _path(each) == leaf["node"]]
+        total = tree.nodes.new("ShaderNodeValue").outputs[0]
+        total.default_value = sum(way for way in ways if isinstance(way, float))
+        for way in ways:
+            if not isinstance(way, float):
+                node = tree.nodes.new("ShaderNodeMath")  # an Add: not clamped
+                tree.links.new(total, node.inputs[0])
+                tree.links.new(way, node.inputs[1])
+                total = node.outputs[0]
+        outputs.append(_Output(f"mfo {number} weight", "VALUE", number, None))
+        _output(tree, outputs[-1].name, total, False)
+    return outputs
+
+
+def _path(leaf: Leaf) -> list[str]:
+    return [node.name for node in (*leaf.path, leaf.node)]
 
 
 def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[str, str]) -> dict[str, str]:

@@ -29,7 +29,7 @@ def record(material: bpy.types.Material, result: JobResult) -> bpy.types.Propert
     entry = history.add()
     entry.name = _time_of(result.folder)
     entry.job_folder, entry.preset, entry.partial = str(result.folder), _preset_of(result.folder), result.partial
-    entry.verdict = result.verdict
+    entry.verdict, entry.leaf = result.verdict, result.leaf
     entry.flip_before, entry.flip = result.errors.get("flip", (-1.0, -1.0))
     for name, value in values.items():
         keep_value(entry.values, name, value).certainty = result.certainty.get(socket_to_parameter(name), "")

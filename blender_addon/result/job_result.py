@@ -64,6 +64,8 @@ class JobResult:
     next_sentence: str = ""  # on the further picture that would tell more
     next_turn: float | None = None  # degrees that its camera is turned about the vertical
     next_center: tuple[float, ...] = (0.0, 0.0, 0.0)  # a point of that axis
+    leaf: str = ""  # the name of the fitted shader node, after the groups it lies in; empty where that is not known
+    labels: Mapping[str, str] = field(default_factory=dict)  # what it calls values, where it has another name for them
 
     def likely(self, name: str, value: float) -> tuple[float, float] | None:
         """The range that holds a value in 95 of 100 cases, None where it is not known."""
@@ -124,6 +126,8 @@ def read_job_result(folder: Path) -> JobResult:
             weak_combinations=tuple(str(c["sentence"]) for c in result.get("weak_combinations", ())),
             spread={str(k): _spread(c["sd"]) for k, c in result.get("certainty", {}).items() if c.get("sd")},
             bounds={str(k): (float(a), float(b)) for k, (a, b) in (result.get("bounds") or {}).items()},
+            leaf="/".join(map(str, target.get("node", ()))),
+            labels={str(k): str(v) for k, v in target.get("labels", {}).items()},
             pictures=tuple(_picture(folder, p) for p in result.get("pictures", ())),
             **_next_picture(result.get("next_picture")),
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),

@@ -36,7 +36,8 @@ def show(found: JobResult, uid: int) -> None:
         if name in _ERROR_LABELS:
             _add_row(runtime.errors, _ERROR_LABELS[name], before, after)
     for name, value in sockets.items():
-        _add_row(runtime.values, name, found.sockets_start.get(name, found.initial.get(name)), value)
+        label = found.labels.get(socket_to_parameter(name), name)
+        _add_row(runtime.values, label, found.sockets_start.get(name, found.initial.get(name)), value)
         _say_how_sure(runtime.values[-1], found, socket_to_parameter(name), value)
     for note in found.notes:
         if note not in runtime.messages:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 
 from ..export.materials.principled_mapping import mitsuba_to_sockets
-from ..export.nodes.target_shader import TargetShader, make_own, target_shader
+from ..export.nodes.target_shader import TargetShader, fitted_leaves, make_own, target_shader, why_no_target
 from ..graph_values.own_groups import make_groups_own
 from ..graph_values.place import INPUT, TINTS, Place, as_held, held, hold, holder_of, is_there
 from ..graph_values.table import graph_values
@@ -20,24 +20,30 @@ from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_at, k
 from .job_result import JobResult, Value
 from .local_copy import unwritable
 
+OF_LEAF = "|"  # between the name of a mix's leaf and that of a value
+
 
 class WriteBackError(Exception):
     """The values cannot be applied; the message is one sentence for the user."""
 
 
-def fitted_shader(material: bpy.types.Material) -> TargetShader:
-    """The Principled or Diffuse node that the Cycles output of `material` shows.
+def fitted_shader(material: bpy.types.Material, leaf: str | None = None) -> TargetShader:
+    """The shader node that is fitted of those that the Cycles output of `material` shows; `leaf` names one of a mix.
 
     Raises
     ------
     WriteBackError
         If there is none.
     """
-    target = target_shader(material)
-    if target is None:
+    target = target_shader(material, leaf)
+    if target is None and leaf and len(fitted_leaves(material)) < 2:  # it may have another name by now
+        target = target_shader(material, "")
+    if target is None and leaf and fitted_leaves(material):
         raise WriteBackError(
-            f"Material {material.name!r} has no Principled BSDF on its output: connect one and apply again."
+            f"Material {material.name!r} has no shader {leaf!r} on its output any more: run the fit again."
         )
+    if target is None:
+        raise WriteBackError(why_no_target(material))
     return target
 
 
@@ -69,13 +75,19 @@ def socket_to_parameter(socket_name: str) -> str:
 
 
 def apply_values(
-    material: bpy.types.Material, values: Mapping[str, Value], folder: Path, *, animated: str = LEAVE
+    material: bpy.types.Material,
+    values: Mapping[str, Value],
+    folder: Path,
+    *,
+    animated: str = LEAVE,
+    leaf: str | None = None,
 ) -> list[str]:
     """Set the unlinked sockets in `values` (linear Rec.709), keep what they were, return what was skipped and why.
 
-    Nothing is set before all of it is known to fit. A second call keeps the originals of the first one, so that
-    `revert_values` always leads to the user's own material. Sockets with keyframes or a driver stay as they are, or
-    with `REPLACE` get a key at the current frame and lose the driver, which `revert_values` does not bring back.
+    `leaf` names the shader of a mix that they belong to. Nothing is set before all of it is known to fit. A second call
+    keeps the originals of the first one, so that `revert_values` always leads to the user's own material. Sockets with
+    keyframes or a driver stay as they are, or with `REPLACE` get a key at the current frame and lose the driver, which
+    `revert_values` does not bring back.
 
     Raises
     ------
@@ -84,7 +96,8 @@ def apply_values(
     """
     if unwritable(material):
         raise WriteBackError(unwritable(material))
-    kept, slots = material.mfo, _slots(material)
+    target, kept = fitted_shader(material, leaf), material.mfo
+    slots = _slots(material, target.name)
     moved = animation_at(_holders(slots))
     notes, changes = [], {}
     for name, value in values.items():
@@ -101,19 +114,19 @@ def apply_values(
             changes[name] = slot.fitting(value)
     if kept.shows_original:
         toggle_values(material)  # so that what is kept as the original stays apart from what was applied
-    notes += _make_own(material, changes)
-    slots = _slots(material)
+    notes += _make_own(material, changes, target.name)
+    slots = _slots(material, target.name)
     for name, value in changes.items():
-        slot = slots[name]
-        if name not in kept.originals:
-            keep_value(kept.originals, name, slot.kept)
+        slot, key = slots[name], _key(target, name)
+        if key not in kept.originals:
+            keep_value(kept.originals, key, slot.kept)
         if moved.get(name) == DRIVER:
             remove_driver(*slot.holder)
             notes.append(f"The driver of {slot.label} was removed.")
         slot.set(value, moved.get(name))
         if moved.get(name) == KEYFRAMES:
             notes.append(f"{slot.label} got a key at the current frame; its other keys stay.")
-        keep_value(kept.applied, name, slot.kept)
+        keep_value(kept.applied, key, slot.kept)
     kept.job_folder = str(folder)
     return notes
 
@@ -123,7 +136,9 @@ def toggle_values(material: bpy.types.Material) -> list[str]:
 
     Returns what could not be set.
     """
-    kept, slots = material.mfo, _slots(material)
+    fitted_shader(material)
+    kept = material.mfo
+    slots = _kept_slots(material, [*kept.originals, *kept.applied])
     left, entered = (kept.originals, kept.applied) if kept.shows_original else (kept.applied, kept.originals)
     for value in left:
         slot = slots.get(value.name)
@@ -159,26 +174,59 @@ def kept_value(entry: bpy.types.PropertyGroup) -> Value:
 
 def _restore(material: bpy.types.Material, values: bpy.types.bpy_prop_collection) -> list[str]:
     fitted_shader(material)
-    notes = _make_own(material, [entry.name for entry in values])  # shared again, by a copy of the material
-    slots = _slots(material)
+    notes = []
+    for leaf in dict.fromkeys(_leaf_of(entry.name) for entry in values):  # shared again, by a copy of the material
+        names = [_name_of(entry.name) for entry in values if _leaf_of(entry.name) == leaf]
+        notes += _make_own(material, names, leaf)
+    slots = _kept_slots(material, values)
     moved = animation_at(_holders(slots))
     for entry in values:
-        slot = slots.get(entry.name)
+        slot, name = slots.get(entry.name), _name_of(entry.name)
         if slot is None:
-            notes.append(f"{entry.name} does not exist any more and was skipped.")
+            notes.append(f"{name} does not exist any more and was skipped.")
         elif entry.size != len(slot.numbers):  # it became another kind of socket, or the file was tampered with
-            notes.append(f"{entry.name} was kept as {entry.size} numbers and could not be set.")
+            notes.append(f"{name} was kept as {entry.size} numbers and could not be set.")
         else:
             slot.set(kept_value(entry), moved.get(entry.name))
     return notes
 
 
-def _make_own(material: bpy.types.Material, names: Collection[str]) -> list[str]:
+def _key(target: TargetShader, name: str) -> str:
+    """What a value is kept under: of a mix with the leaf that it belongs to."""
+    return f"{target.name}{OF_LEAF}{name}" if target.is_mixed else name
+
+
+def _leaf_of(key: str) -> str | None:
+    leaf, found, _ = key.rpartition(OF_LEAF)
+    return leaf if found else None
+
+
+def _name_of(key: str) -> str:
+    return key.rpartition(OF_LEAF)[2]
+
+
+def _kept_slots(material: bpy.types.Material, values: Iterable[bpy.types.PropertyGroup]) -> dict[str, _Slot]:
+    """Where kept values belong, by what they are kept under; those that are gone are missing."""
+    entries = list(values)
+    slots = {}
+    for leaf in dict.fromkeys(_leaf_of(entry.name) for entry in entries):
+        if target_shader(material, leaf) is None:
+            continue
+        of_leaf = _slots(material, leaf)
+        names = {entry.name: _name_of(entry.name) for entry in entries if _leaf_of(entry.name) == leaf}
+        slots |= {key: of_leaf[name] for key, name in names.items() if name in of_leaf}
+    return slots
+
+
+def _make_own(material: bpy.types.Material, names: Collection[str], leaf: str | None) -> list[str]:
     """Give the material copies of the groups that hold these values and are used elsewhere."""
-    notes = make_own(material, [name for name in names if "/" not in name])
+    target = target_shader(material, leaf)
+    if target is None:
+        return []
+    notes = make_own(material, [name for name in names if "/" not in name], leaf)
     if not any("/" in name for name in names):
         return notes
-    places = [value.place for value in graph_values(fitted_shader(material)) if value.name in names]
+    places = [value.place for value in graph_values(fitted_shader(material, leaf)) if value.name in names]
     return notes + make_groups_own(material, places)
 
 
@@ -245,9 +293,9 @@ def _holders(slots: Mapping[str, _Slot]) -> dict[str, tuple[Any, str]]:
     return {n: s.holder for n, s in slots.items() if not s.is_linked and is_there(s.tree, s.place)}
 
 
-def _slots(material: bpy.types.Material) -> dict[str, _Slot]:
+def _slots(material: bpy.types.Material, leaf: str | None) -> dict[str, _Slot]:
     """Where each value of the material is: sockets of its shader by their names, values inside its nodes by theirs."""
-    target = fitted_shader(material)
+    target = fitted_shader(material, leaf)
     tree = node_tree_of(material)
     assert tree is not None  # it holds the target
     slots = {}

@@ -9,11 +9,14 @@ from typing import Any
 
 def result_text(result: Mapping[str, Any]) -> str:
     """Values and image differences before and after, from the content of result.json."""
-    rows = [("", "start", "result", "")]
+    labels = result.get("labels") or {}
+    rows = [(result.get("shader") or "", "start", "result", "")]
     for name, value in result["recovered"].items():
         certainty = result.get("certainty", {}).get(name, {})
         level = certainty.get("words") or certainty.get("level", "")
-        rows.append((name, _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " ")))
+        rows.append(
+            (labels.get(name, name), _numbers(result["initial"].get(name)), _numbers(value), level.replace("_", " "))
+        )
     rows += [(f"mean {name}", *map(_numbers, pair), "") for name, pair in result["errors"].items()]
     for picture in result.get("pictures", []):
         name = f"FLIP of picture {picture['number']} {picture['name']}".rstrip()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What distinguishes the Principled BSDF of one Blender version from that of another."""
+"""What distinguishes the Principled BSDF of one Blender version from that of another, and other nodes from both."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from ..types.errors import BadInputError
 
 DISTRIBUTIONS = ("MULTI_GGX", "GGX")
+# nodes whose lobes are those of the Principled BSDF but for their Fresnel terms and tints
+SHADERS = ("principled", "glossy", "glass", "refraction", "translucent")
 
 
 @dataclass(frozen=True)
@@ -26,30 +28,40 @@ class CyclesModel:
     film_fourier
         Thin film through the Fourier transform of the colour matching functions and also on metal (from 5.0); before,
         through Gaussian fits of them and on dielectrics only.
+    shader
+        The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "glass" tints what it reflects
+        and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
+        lobe on the other side times the base colour.
     """
 
     multiple_scattering: bool = True
     coat_compensation: bool = True
     diffuse_roughness: bool = True
     film_fourier: bool = True
+    shader: str = "principled"
 
 
-def cycles_model(version: Sequence[int] = (5, 0), distribution: str = "MULTI_GGX") -> CyclesModel:
+def cycles_model(
+    version: Sequence[int] = (5, 0), distribution: str = "MULTI_GGX", shader: str = "principled"
+) -> CyclesModel:
     """The switches of Blender `version` (major, minor, ...), 4.2 or newer.
 
     Raises
     ------
     BadInputError
-        If the version is older than 4.2 or the distribution is unknown.
+        If the version is older than 4.2, or the distribution or the shader is unknown.
     """
     major_minor = tuple(version)[:2]
     if major_minor < (4, 2):
         raise BadInputError(f"Blender {'.'.join(map(str, version))} has another Principled BSDF: use 4.2 or newer.")
     if distribution not in DISTRIBUTIONS:
         raise BadInputError(f"Unknown distribution {distribution!r}: choose {' or '.join(DISTRIBUTIONS)}.")
+    if shader not in SHADERS:
+        raise BadInputError(f"Unknown shader {shader!r}: choose one of {', '.join(SHADERS)}.")
     return CyclesModel(
         multiple_scattering=distribution == "MULTI_GGX",
         coat_compensation=major_minor >= (4, 5),
         diffuse_roughness=major_minor >= (4, 3),
         film_fourier=major_minor >= (5, 0),
+        shader=shader,
     )

@@ -138,7 +138,7 @@ def _pictures(pictures: Mapping[str, bytes]) -> str:
 
 
 def _value_table(result: FitResult) -> str:
-    heads = ["Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"]
+    heads = [result.shader or "Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"]
     if result.certainty:
         heads.append("How sure")
     table = _table(heads, value_rows(result))

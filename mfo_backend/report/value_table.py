@@ -34,7 +34,8 @@ def swatch_colour(value: Value) -> str:
 
 def _row(name: str, result: FitResult) -> str:
     recovered, initial, bounds = result.recovered[name], result.initial.get(name), result.bounds.get(name)
-    cells = [f'<th scope="row">{escape(name.replace("_", " "))}</th>']
+    label = result.labels.get(name, name.replace("_", " "))
+    cells = [f'<th scope="row">{escape(label)}</th>']
     cells += [f"<td>{_shown(value)}</td>" for value in (initial, recovered)]
     cells.append(f'<td class="bounds">{bounds[0]:.4g} to {bounds[1]:.4g}</td>' if bounds else "<td></td>")
     cells.append(f'<td class="where">{_track(initial, recovered, bounds)}</td>')

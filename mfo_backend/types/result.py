@@ -84,7 +84,8 @@ class FitResult:
     determines together only; `notes` are sentences on what was left out or
     kept. `model_gap` and `judgement` are None where they could not be measured. `pictures` are those of a fit of
     several, whose verdict is the worst of theirs, and `contradiction` says which of them do not agree.
-    `next_picture` would determine what these do not.
+    `next_picture` would determine what these do not. Where the fitted shader is a part of a mix, or no Principled BSDF,
+    `shader` names its node, and `labels` have what that calls values by their names here.
     """
 
     status: Status
@@ -105,3 +106,5 @@ class FitResult:
     pictures: tuple[PictureResult, ...] = ()
     contradiction: Contradiction | None = None
     next_picture: NextPicture | None = None
+    shader: str = ""
+    labels: dict[str, str] = field(default_factory=dict)

@@ -83,8 +83,8 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     flat_camera: "Camera 'Camera' has a scale of zero: give it and its parents a scale other than zero.",
     no_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
     empty_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
-    no_principled: "Material 'Plain' has no Principled BSDF linked to Surface of its output: link one, directly or in "
-    "a group.",
+    no_principled: "Material 'Plain' shows Emission alone, which reflects no light: link a Principled BSDF, directly, "
+    "in a group or in a mix.",
     slot_without_faces: "No face of 'Target' uses its active material slot 2: choose another.",
     outside: "The camera does not see 'Target': move it into the frame.",
     behind: "The camera does not see 'Target': move it into the frame.",

@@ -70,6 +70,8 @@ def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:
         return "the model mitsuba_principled takes the averages of what nodes give"
     if fit.get("preset", "balanced") not in ON_RECORDED_LIGHT or fit.get("losses"):
         return "the preset paper fits the values of sockets alone"
+    if target.is_mixed:
+        return "the material mixes shaders, and nodes may feed several of them"
     for name, opaque in OPAQUE.items():
         socket = target.sockets.get(name)
         if socket is not None and (socket.is_linked or plain_value(socket) != opaque):

@@ -71,9 +71,11 @@ def _mixed(parts: Sequence[Part], identifier: str, save: Callable[[Texture], str
 def emission_element(material: Material, scale: float, save: Callable[[Texture], str]) -> Element | None:
     """Return the `<emitter>` for a shape of `material`, its radiance times `scale`; None if it emits nothing."""
     color, strength = material.sockets.get("Emission Color"), material.sockets.get("Emission Strength")
-    if material.emission.max(initial=0.0) <= 0.0 or color is None or strength is None:
+    if material.emission.max(initial=0.0) <= 0.0:
         return None
     emitter = plugin("emitter", "area")
+    if material.is_mixed or color is None or strength is None:  # of a mix the mean; the backend has the whole of it
+        return add(emitter, rgb("radiance", material.emission * scale))
     if color.texture is not None and strength.texture is None:
         pixels = (color.texture.pixels * float(strength.value) * scale).astype(np.float32)
         shown = Texture(pixels, color.texture.uv_matrix, color.texture.wrap, color.texture.filter_type)

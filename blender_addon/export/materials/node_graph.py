@@ -14,8 +14,8 @@ import bpy
 
 from ...probe.client import Probe, ProbeError
 from ..findings import ExportError, Findings
-from ..material_model import Material
-from ..nodes.target_shader import target_shader
+from ..material_model import Material, Socket
+from ..nodes.target_shader import chosen_leaf, fitted_leaves, leaf_name, target_shader
 from .read_material import read_target
 
 FOLDER = "graph"
@@ -60,7 +60,7 @@ def probe_for(obj: bpy.types.Object | None, *, always: bool = False) -> Iterator
         yield None
         return
     described = read_target(material, obj.name, slot, Findings())
-    if described is None or not (always or names_by_graph(described)):
+    if described is None or not (always or described.asks_graph):
         yield None
         return
     try:
@@ -68,6 +68,37 @@ def probe_for(obj: bpy.types.Object | None, *, always: bool = False) -> Iterator
             yield probe
     except ProbeError as error:
         raise ExportError(str(error)) from error
+
+
+def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
+    """The name of the leaf that covers most of the target in the picture; None where there is nothing to choose.
+
+    Raises
+    ------
+    ProbeError
+        If Cycles cannot evaluate the graph.
+    """
+    material = obj.active_material
+    leaves = fitted_leaves(material)
+    if len(leaves) < 2 or chosen_leaf(material) or not any(leaf.is_linked for leaf in leaves):
+        return None
+    asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
+    answer = _ask(probe, context, obj, asked, scale=1)
+    shares = [
+        found["weight"]["mean"][0] if leaf.is_linked else leaf.share
+        for leaf, found in zip(leaves, answer["leaves"], strict=True)
+    ]
+    return leaf_name(leaves[shares.index(max(shares))])
+
+
+def _ask(
+    probe: Probe, context: bpy.types.Context, obj: bpy.types.Object, leaves: list[dict[str, Any]], scale: int
+) -> dict[str, Any]:
+    return probe.ask(
+        "sockets",
+        scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=obj.active_material_index,
+        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(probe.folder),
+    )  # fmt: skip
 
 
 def names_by_graph(material: Material) -> list[str]:
@@ -85,19 +116,33 @@ def evaluate_graph(
     ProbeError
         If Cycles cannot evaluate the graph.
     """
-    slot = obj.active_material_index
-    target = target_shader(obj.material_slots[slot].material)
-    assert target is not None
-    names = {target.own_name(name): name for name in names_by_graph(material)}
-    answer = probe.ask(
-        "sockets",
-        scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=slot, node=target.path,
-        sockets=list(names), scale=SCALE, samples=SAMPLES, folder=str(probe.folder),
-    )  # fmt: skip
-    files = {names[own]: probe.folder / file for own, file in answer["files"].items()}
-    sockets = dict(material.sockets)
-    for name, file in files.items():
-        mean = answer["means"][target.own_name(name)]
-        sockets[name] = replace(sockets[name], value=mean if len(mean) > 1 else mean[0], seen=file)
-    positions = probe.folder / answer["positions"]
-    return replace(material, sockets=sockets), NodeGraph(answer["camera"], positions, (positions, *files.values()))
+    leaves = (material, *material.leaves)
+    asked = [
+        {
+            "node": list(leaf.node),
+            "sockets": [_own_name(leaf, name) for name in names_by_graph(leaf)],
+            "weight": leaf.weight.by_graph,
+        }
+        for leaf in leaves
+    ]
+    answer = _ask(probe, context, obj, asked, SCALE)
+    files = [probe.folder / answer["positions"]]
+
+    def seen(socket: Socket, found: dict[str, Any]) -> Socket:
+        files.append(probe.folder / found["file"])
+        mean = found["mean"]
+        return replace(socket, value=mean if len(mean) > 1 else mean[0], seen=files[-1])
+
+    def evaluated(leaf: Material, found: dict[str, Any]) -> Material:
+        sockets = dict(leaf.sockets)
+        for name in names_by_graph(leaf):
+            sockets[name] = seen(sockets[name], found["sockets"][_own_name(leaf, name)])
+        weight = seen(leaf.weight, found["weight"]) if leaf.weight.by_graph else leaf.weight
+        return replace(leaf, sockets=sockets, weight=weight)
+
+    fitted, *held = map(evaluated, leaves, answer["leaves"])
+    return replace(fitted, leaves=tuple(held)), NodeGraph(answer["camera"], files[0], tuple(files))
+
+
+def _own_name(leaf: Material, name: str) -> str:
+    return leaf.labels.get(name, name)

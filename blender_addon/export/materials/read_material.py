@@ -3,9 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import bpy
+import numpy as np
 
 from ...versions import (
+    DIFFUSE,
     PRINCIPLED,
     active_output,
     cycles_settings,
@@ -19,7 +24,9 @@ from ..findings import Findings, Fix
 from ..images.color_space import to_rec709
 from ..images.image_pixels import without_pixels
 from ..material_model import Material, Socket, grey
+from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
 from ..nodes.graph_findings import graph_problem
+from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, WITHOUT_SPECULAR, inputs_of, only_nearest
 from ..nodes.shader_graph import (
     MissingPictureError,
     UnsupportedNodeError,
@@ -28,12 +35,12 @@ from ..nodes.shader_graph import (
     source_of,
     surface_of,
 )
-from ..nodes.target_shader import DIRECTIONS, Place, TargetShader, target_shader
+from ..nodes.target_shader import DIRECTIONS, Place, TargetShader, leaf_name, target_shader, why_no_target
+from .leaf_sockets import distribution_of, other_sockets
 
 SKIPPED_SOCKETS = ("Weight",)
 # sockets without an effect in the fit, whatever is linked to them
 UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
-EMISSION_SOCKETS = ("Emission Color", "Emission Strength")
 # what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
 DEFAULT_SOCKETS = {
     "Base Color": Socket((0.8, 0.8, 0.8)),
@@ -41,15 +48,6 @@ DEFAULT_SOCKETS = {
     "Roughness": Socket(0.5),
     "IOR": Socket(1.5),
     "Specular IOR Level": Socket(0.5),
-}
-# what of a Principled BSDF makes it a Diffuse BSDF (Roughness has no effect then), and keeps it opaque
-WITHOUT_SPECULAR = {
-    "Metallic": 0.0,
-    "Roughness": 1.0,
-    "IOR": 1.5,
-    "Specular IOR Level": 0.0,
-    "Alpha": 1.0,
-    "Transmission Weight": 0.0,
 }
 # shaders of other objects with a simple equivalent: node -> (our model, {our socket: the node's socket}, constants)
 SIMPLE_SHADERS = {
@@ -67,23 +65,17 @@ SIMPLE_SHADERS = {
 }
 
 
-def read_target(material: bpy.types.Material | None, owner: str, slot: int, findings: Findings) -> Material | None:
-    """Return the material to fit, or None with an error in `findings`."""
+def read_target(
+    material: bpy.types.Material | None, owner: str, slot: int, findings: Findings, leaf: str | None = None
+) -> Material | None:
+    """Return the material to fit, or None with an error in `findings`; `leaf` names the one of a mix to fit."""
     if material is None:
         findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
                        Fix("new_material"))  # fmt: skip
         return None
-    target = target_shader(material)
-    muted = next((each.name for each in _nodes(material) if each.bl_idname == PRINCIPLED and each.mute), None)
-    if target is None and muted is not None:
-        findings.error(f"Node '{muted}' of material '{material.name}' is muted: press M over it in the Shader Editor.")
-        return None
+    target = target_shader(material, leaf)
     if target is None:
-        findings.error(
-            f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one, directly "
-            "or in a group.",
-            Fix("principled"),
-        )
+        findings.error(why_no_target(material), Fix("principled"))
         return None
     note_volume(material, findings)
     shared = target.shared_group([name for name, place in target.places.items() if not place.socket.is_linked])
@@ -92,7 +84,120 @@ def read_target(material: bpy.types.Material | None, owner: str, slot: int, find
             f"The group '{shared.name}' of material '{material.name}' is used elsewhere too: an apply gives the "
             "material a copy of its own."
         )
-    return _read_diffuse(material, target, findings) if target.is_diffuse else _read_fitted(material, target, findings)
+    found = _read_leaf(material, target, findings)
+    found.node, found.labels = tuple(target.path), _labels(inputs_of(target.node))
+    if target.is_mixed:
+        found.weight = _read_weight(material, target.leaf, findings)
+        found.leaves = tuple(_read_held(material, leaf, findings) for leaf in target.others)
+        note_leaves(material.name, target, findings)
+    return found
+
+
+def note_leaves(material: str, target: TargetShader, findings: Findings) -> None:
+    """Say which leaf of a mix is fitted, and how the others may be."""
+    others = ", ".join(f"'{leaf_name(leaf)}' ({leaf.node.bl_label})" for leaf in target.others)
+    if others:
+        said = f"Material '{material}' mixes shaders: '{target.name}' is fitted, and held are {others}."
+        findings.note(said, explains=False)
+
+
+def _labels(inputs: Mapping[str, bpy.types.NodeSocket]) -> dict[str, str]:
+    """What a node calls its values, where that is not their name in the Principled BSDF."""
+    return {name: socket.name for name, socket in inputs.items() if name != socket.name}
+
+
+def _read_leaf(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
+    """The fitted leaf alone."""
+    if target.node.bl_idname == PRINCIPLED:
+        return _read_fitted(material, target, findings)
+    kind, node = target.kind, target.node
+    sockets = {name: Socket(value, True) for name, value in kind.held.items()}
+    sockets |= {
+        name: _read(target.own_name(name), place, material.name, True, findings)
+        for name, place in target.places.items()
+    }
+    sockets |= other_sockets(material.name, node, findings)
+    if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
+        sockets["Diffuse Roughness"] = _no_roughness(sockets["Diffuse Roughness"], material.name, findings)
+    if only_nearest(node):
+        findings.note(f"Material '{material.name}': {node.bl_label} is fitted as its nearest model.")
+    for name in ("Normal", "Tangent"):
+        if name in node.inputs:
+            place = Place(node.inputs[name], target.groups)
+            sockets[name] = _read_direction(name, place, material.name, findings)
+    return Material(material.name, "principled", sockets, distribution_of(node), shader=kind.shader)
+
+
+def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findings) -> Material:
+    """A leaf that is not fitted; one without a model is black."""
+    node = leaf.node
+
+    def read(named: Mapping[str, bpy.types.NodeSocket]) -> dict[str, Socket]:
+        places = {name: Place(socket, leaf.groups) for name, socket in named.items()}
+        return {name: _read_at(node, place, material.name, findings) for name, place in places.items()}
+
+    name, weight = leaf_name(leaf), _read_weight(material, leaf, findings)
+    if node.bl_idname == EMISSION:
+        named = {"Emission Color": node.inputs["Color"], "Emission Strength": node.inputs["Strength"]}
+        return Material(name, "emission", read(named), weight=weight, node=tuple(leaf.path), labels=_labels(named))
+    if node.bl_idname == TRANSPARENT:
+        named = {"Base Color": node.inputs["Color"]}
+        return Material(name, "null", read(named), weight=weight, node=tuple(leaf.path), labels=_labels(named))
+    kind = KINDS.get(node.bl_idname)
+    if kind is None:
+        findings.note(f"Material '{material.name}': '{name}' ({node.bl_label}) is held as black.")
+        sockets = {key: Socket(value, True) for key, value in {**WITHOUT_SPECULAR, "Base Color": [0.0] * 3}.items()}
+        return Material(name, "principled", sockets, weight=weight, node=tuple(leaf.path), is_nearest=True)
+    skipped = (*SKIPPED_SOCKETS, *UNUSED_SOCKETS, *DIRECTIONS)
+    sockets = {name: Socket(value, True) for name, value in kind.held.items()}
+    sockets |= read({name: socket for name, socket in inputs_of(node).items() if name not in skipped})
+    sockets |= other_sockets(material.name, node, findings)
+    if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
+        sockets["Diffuse Roughness"] = Socket(0.0, True)
+    for direction in DIRECTIONS:
+        if direction in node.inputs:
+            place = Place(node.inputs[direction], leaf.groups)
+            sockets[direction] = _read_direction(direction, place, material.name, findings)
+    if only_nearest(node):
+        findings.note(f"Material '{material.name}': '{name}' ({node.bl_label}) is held as its nearest model.")
+    return Material(
+        name, "principled", sockets, distribution_of(node), shader=kind.shader, weight=weight,
+        node=tuple(leaf.path), labels=_labels(inputs_of(node)), is_nearest=only_nearest(node),
+    )  # fmt: skip
+
+
+def _read_at(node: bpy.types.Node, place: Place, material: str, findings: Findings) -> Socket:
+    """A socket of a held leaf; pictures whose place the backend would not find are Cycles' to evaluate."""
+    found = _read(f"{place.socket.name} of '{node.name}'", place, material, True, findings)
+    if found.texture is None or found.texture.is_plain:
+        return found
+    return Socket(plain_value(place.socket), True, by_graph=True)
+
+
+def _read_weight(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findings) -> Socket:
+    """The share of a leaf: a number, the picture of the one factor that has one, or what Cycles evaluates."""
+    linked = [factor for way in leaf.ways for factor in way if factor.value is None]
+    for factor in linked:
+        _refuse("Factor", Place(factor.socket, factor.groups), material.name, findings, is_copied=True)
+    if not linked:
+        return Socket(leaf.share, leaf.share != 1.0)
+    if len(linked) == 1 and len(leaf.ways) == 1:
+        try:
+            read = read_socket(linked[0].socket)
+        except UnsupportedNodeError:
+            read = Socket(UNKNOWN, True)
+        if read.texture is not None and read.texture.is_plain:
+            rest = leaf.share / UNKNOWN
+            pixels = np.clip(read.texture.pixels, 0.0, 1.0)
+            pixels = np.float32(rest) * (pixels if linked[0].second else 1.0 - pixels)
+            return Socket(float(pixels.mean()), True, replace(read.texture, pixels=pixels))
+    return Socket(leaf.share, True, by_graph=True)
+
+
+def _no_roughness(rough: Socket, material: str, findings: Findings) -> Socket:
+    if rough.linked or rough.value > 0.0:
+        findings.note(f"Material '{material}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.")
+    return Socket(0.0, True)
 
 
 def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
@@ -102,33 +207,11 @@ def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: F
             sockets[name] = _read_direction(name, place, material.name, findings)
         elif name not in SKIPPED_SOCKETS:
             sockets[name] = _read(name, place, material.name, name not in UNUSED_SOCKETS, findings)
-            if name in EMISSION_SOCKETS and sockets[name].by_graph:
-                findings.note(f"Material '{material.name}': what is linked to {name} counts with its average.")
     method = getattr(target.node, "subsurface_method", "RANDOM_WALK")
     found = Material(material.name, "principled", sockets, target.node.distribution, method)
     found.transparent_shadows = material.use_transparent_shadow
     _note_default_tangent(found, findings)
     return found
-
-
-def _read_diffuse(material: bpy.types.Material, target: TargetShader, findings: Findings) -> Material:
-    """A Diffuse BSDF as the Principled BSDF that it is exactly: no specular, and nothing else free."""
-    sockets = {
-        name: _read(target.own_name(name), place, material.name, True, findings)
-        for name, place in target.places.items()
-    }
-    rough = sockets["Diffuse Roughness"]
-    if not has_diffuse_roughness():
-        sockets["Diffuse Roughness"] = Socket(0.0, True)
-        if rough.linked or rough.value > 0.0:
-            findings.note(f"Material '{material.name}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.")
-    findings.note(
-        f"Material '{material.name}' has a Diffuse BSDF, fitted as a Principled BSDF without specular: Base Color is "
-        "its Color, Diffuse Roughness its Roughness."
-    )
-    held = {name: Socket(value, True) for name, value in WITHOUT_SPECULAR.items()}
-    normal = _read_direction("Normal", Place(target.node.inputs["Normal"], target.groups), material.name, findings)
-    return Material(material.name, "principled", {**held, **sockets, "Normal": normal})
 
 
 def _read_direction(name: str, place: Place, material: str, findings: Findings) -> Socket:
@@ -138,11 +221,6 @@ def _read_direction(name: str, place: Place, material: str, findings: Findings) 
     if by_graph:
         _refuse(name, place, material, findings, is_copied=True)
     return Socket(plain_value(socket), source is not None, by_graph=by_graph)
-
-
-def _nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
-    tree = node_tree_of(material)
-    return [] if tree is None else list(tree.nodes)
 
 
 def read_context(material: bpy.types.Material | None, owner: str, findings: Findings) -> Material:

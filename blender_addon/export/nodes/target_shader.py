@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader of a material that is fitted: its node, in groups to any depth, and the sockets that hold its values."""
+"""The shader of a material that is fitted: its node, in groups and mixes to any depth, and the sockets that hold its
+values."""
 
 from __future__ import annotations
 
@@ -9,15 +10,12 @@ from functools import cached_property
 
 import bpy
 
-from ...versions import DIFFUSE, PRINCIPLED, active_output, node_tree_of
-from .graph_findings import GROUP, GROUP_INPUT, group_output
-from .shader_graph import source_of
+from ...versions import PRINCIPLED, node_tree_of
+from .closure_leaves import ClosureError, ClosureLeaf, Groups, by_identifier, closure_leaves
+from .graph_findings import GROUP_INPUT
+from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, why_not_fitted
 
-Groups = tuple[bpy.types.Node, ...]  # group nodes, outermost first
-# what a Diffuse BSDF calls the values of the Principled BSDF that it is fitted as
-_DIFFUSE_NAMES = {"Base Color": "Color", "Diffuse Roughness": "Roughness"}
 DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
-DEEPEST = 64  # groups within each other; more is a circle
 
 
 @dataclass(frozen=True)
@@ -30,24 +28,45 @@ class Place:
 
 @dataclass(frozen=True)
 class TargetShader:
-    """A Principled or Diffuse BSDF and the group nodes it lies in."""
+    """The leaf of a material's shaders that is fitted, a Principled BSDF or another of `leaf_kinds`, and the others."""
 
-    node: bpy.types.Node
-    groups: Groups
+    leaf: ClosureLeaf
+    others: tuple[ClosureLeaf, ...] = ()
 
     @property
-    def is_diffuse(self) -> bool:
-        """Whether it is a Diffuse BSDF, which is fitted as a Principled BSDF without specular."""
-        return self.node.bl_idname == DIFFUSE
+    def node(self) -> bpy.types.Node:
+        """The shader node."""
+        return self.leaf.node
+
+    @property
+    def groups(self) -> Groups:
+        """The group nodes it lies in."""
+        return self.leaf.groups
+
+    @property
+    def kind(self) -> LeafKind:
+        """How the node is fitted."""
+        return KINDS[self.node.bl_idname]
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether it is only a part of the surface."""
+        return bool(self.others) or self.leaf.is_linked or self.leaf.share != 1.0
 
     @property
     def path(self) -> list[str]:
         """Names of the groups and of the node."""
-        return [node.name for node in (*self.groups, self.node)]
+        return self.leaf.path
+
+    @property
+    def name(self) -> str:
+        """The path as one word, by which a user chooses a leaf."""
+        return leaf_name(self.leaf)
 
     def own_name(self, name: str) -> str:
         """What the node calls the value `name` of a Principled BSDF."""
-        return _DIFFUSE_NAMES.get(name, name) if self.is_diffuse else name
+        socket = inputs_of(self.node).get(name)
+        return name if socket is None else socket.name
 
     @property
     def own_names(self) -> dict[str, str]:
@@ -60,11 +79,7 @@ class TargetShader:
 
         That is the node's own socket, or the input of a group that leads to it alone.
         """
-        if self.is_diffuse:
-            named = {name: self.node.inputs[own] for name, own in _DIFFUSE_NAMES.items()}
-        else:
-            named = {socket.name: socket for socket in self.node.inputs}
-        return {name: self._place(name, socket) for name, socket in named.items()}
+        return {name: self._place(name, socket) for name, socket in inputs_of(self.node).items()}
 
     @property
     def sockets(self) -> dict[str, bpy.types.NodeSocket]:
@@ -90,29 +105,104 @@ class TargetShader:
         return Place(socket, groups)
 
 
-def target_shader(material: bpy.types.Material | None) -> TargetShader | None:
-    """The shader linked to the output that Cycles uses, through groups and reroutes, if it is one that is fitted."""
-    output = active_output(node_tree_of(material)) if material is not None else None
-    socket, groups = None if output is None else output.inputs["Surface"], ()
-    while socket is not None and len(groups) <= DEEPEST:
-        source = source_of(socket)
-        if source is None:
-            return None
-        node = source.node
-        if node.bl_idname == GROUP:
-            inner = None if node.node_tree is None else group_output(node.node_tree)
-            socket, groups = None if inner is None else _by_identifier(inner.inputs, source.identifier), (*groups, node)
-        elif node.bl_idname == GROUP_INPUT and groups:
-            socket, groups = _by_identifier(groups[-1].inputs, source.identifier), groups[:-1]
-        else:
-            is_fitted = node.bl_idname in (PRINCIPLED, DIFFUSE) and not node.mute
-            return TargetShader(node, groups) if is_fitted else None
-    return None
+def target_shader(material: bpy.types.Material | None, leaf: str | None = None) -> TargetShader | None:
+    """The shader that is fitted of those that Cycles shows, through groups, mixes and reroutes, or None.
+
+    `leaf` is its name; without one it is the leaf that the user chose for the material, or else that of the largest
+    share.
+    """
+    try:
+        leaves = closure_leaves(material)
+    except ClosureError:
+        return None
+    fitted = [each for each in leaves if is_fitted(each.node)]
+    if not fitted:
+        return None
+    wanted = chosen_leaf(material) if leaf is None else leaf
+    named = next((each for each in fitted if leaf_name(each) == wanted), None)
+    if named is None and leaf:
+        return None
+    chosen = named or max(fitted, key=lambda each: each.share)
+    return TargetShader(chosen, tuple(each for each in leaves if each is not chosen))
 
 
-def make_own(material: bpy.types.Material, names: Collection[str]) -> list[str]:
-    """Give `material` copies of the groups that hold values `names` and are used elsewhere; returns what was done."""
-    target = target_shader(material)
+def chosen_leaf(material: bpy.types.Material | None) -> str:
+    """The name of the leaf that the user chose for a material, empty where it is left to the shares."""
+    kept = getattr(material, "mfo", None)
+    return "" if kept is None else kept.leaf
+
+
+def leaf_name(leaf: ClosureLeaf) -> str:
+    """What a leaf is called where a user chooses one: its node, after the groups it lies in."""
+    return "/".join(leaf.path)
+
+
+def leaf_called(material: bpy.types.Material, wanted: str) -> str:
+    """The name of the one leaf that a user calls `wanted`: by its name, its node's, its label or its kind's.
+
+    Raises
+    ------
+    ClosureError
+        If there is none, or there are several; the message is one sentence.
+    """
+    leaves = fitted_leaves(material)
+    called = [(leaf_name(leaf), leaf.node.name, leaf.node.label, leaf.node.bl_label) for leaf in leaves]
+    for names in zip(*called, strict=True):
+        if names.count(wanted) == 1:
+            return leaf_name(leaves[names.index(wanted)])
+    listed = ", ".join(f"'{leaf_name(leaf)}'" for leaf in leaves) or "none"
+    raise ClosureError(f"Material '{material.name}' has no shader '{wanted}' that can be fitted: give one of {listed}.")
+
+
+def fitted_leaves(material: bpy.types.Material | None) -> list[ClosureLeaf]:
+    """The leaves of which a user may choose one."""
+    try:
+        return [leaf for leaf in closure_leaves(material) if is_fitted(leaf.node)]
+    except ClosureError:
+        return []
+
+
+def why_no_target(material: bpy.types.Material) -> str:
+    """The sentence for a material of which no shader can be fitted."""
+    try:
+        leaves = closure_leaves(material)
+    except ClosureError as error:
+        return f"Material '{material.name}' {error}."
+    tree = node_tree_of(material)
+    muted = (
+        next((each.name for each in tree.nodes if each.bl_idname == PRINCIPLED and each.mute), None) if tree else None
+    )
+    if muted is not None:
+        return f"Node '{muted}' of material '{material.name}' is muted: press M over it in the Shader Editor."
+    for leaf in leaves:
+        problem = why_not_fitted(leaf.node) if leaf.node.bl_idname in KINDS else None
+        if problem is not None:
+            return f"'{leaf.node.name}' ({leaf.node.bl_label}) of material '{material.name}' {problem}."
+    shown = ", ".join(
+        dict.fromkeys(leaf.node.bl_label for leaf in leaves if leaf.node.bl_idname not in (EMISSION, TRANSPARENT))
+    )
+    if shown:
+        return (
+            f"Material '{material.name}' shows {shown}, which no model of the fit has: link a Principled BSDF or "
+            "another shader of its kind."
+        )
+    if leaves:
+        return (
+            f"Material '{material.name}' shows {' and '.join(dict.fromkeys(leaf.node.bl_label for leaf in leaves))} "
+            "alone, which reflects no light: link a Principled BSDF, directly, in a group or in a mix."
+        )
+    return (
+        f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one, directly, in a "
+        "group or in a mix."
+    )
+
+
+def make_own(material: bpy.types.Material, names: Collection[str], leaf: str | None = None) -> list[str]:
+    """Give `material` copies of the groups that hold values `names` and are used elsewhere; returns what was done.
+
+    `leaf` names the shader of a mix that the values belong to.
+    """
+    target = target_shader(material, leaf)
     first = None if target is None else target.shared_group(names)
     if target is None or first is None:
         return []
@@ -139,17 +229,13 @@ def _sole_input(socket: bpy.types.NodeSocket, group: bpy.types.Node) -> bpy.type
             return None
         identifier = link.from_socket.identifier
         inside = [node for node in group.node_tree.nodes if node.bl_idname == GROUP_INPUT]
-        twins = [_by_identifier(node.outputs, identifier) for node in inside]
+        twins = [by_identifier(node.outputs, identifier) for node in inside]
         if sum(len(twin.links) for twin in twins if twin is not None) != 1:
             return None
-        return _by_identifier(group.inputs, identifier)
+        return by_identifier(group.inputs, identifier)
     return None
 
 
 def is_shared(tree: bpy.types.NodeTree) -> bool:
     """Whether a group is used elsewhere too, so that a change in it would be seen there."""
     return tree.library is not None or tree.users - int(tree.use_fake_user) > 1
-
-
-def _by_identifier(sockets: Collection[bpy.types.NodeSocket], identifier: str) -> bpy.types.NodeSocket | None:
-    return next((socket for socket in sockets if socket.identifier == identifier), None)

@@ -49,17 +49,22 @@ FEW_GLOSSY_BOUNCES = 2
 
 
 def read_scene(
-    context: bpy.types.Context, target: bpy.types.Object, findings: Findings, bakes: SceneBakes | None = None
+    context: bpy.types.Context,
+    target: bpy.types.Object,
+    findings: Findings,
+    bakes: SceneBakes | None = None,
+    leaf: str | None = None,
 ) -> SceneData | None:
     """Return the scene as the render would see it, or None with errors in `findings`.
 
-    What only Cycles can tell is asked of `bakes`, while the rest is read.
+    What only Cycles can tell is asked of `bakes`, while the rest is read. `leaf` names the shader of the target's mix
+    that is fitted.
     """
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
         findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
         with context.temp_override(view_layer=layer):
-            return read_scene(bpy.context, target, findings, bakes)
+            return read_scene(bpy.context, target, findings, bakes, leaf)
     scene, view_layer = context.scene, context.view_layer
     others = [each.name for each in scene.view_layers if each.use and each != view_layer]
     if others and view_layer.use:
@@ -83,7 +88,7 @@ def read_scene(
         settings = _read_settings(scene, findings)
         slot = target.active_material_index
         slots = target.material_slots
-        material = read_target(slots[slot].material if slot < len(slots) else None, target.name, slot, findings)
+        material = read_target(slots[slot].material if slot < len(slots) else None, target.name, slot, findings, leaf)
         if camera is None or material is None:
             return None
         _name_settings(scene, view_layer, findings)

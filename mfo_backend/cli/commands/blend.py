@@ -62,6 +62,13 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument(
         "--upright", action="store_true", help="turn the picture as its EXIF data say (Blender shows it as stored)"
     )
+    parser.add_argument(
+        "--shader",
+        default="",
+        metavar="NAME",
+        help="of a material that mixes shaders the node to fit, after the groups it lies in (Group/Glossy BSDF; "
+        "default: the one that covers most of the picture)",
+    )
     # its name until the scene's view became the default
     parser.add_argument(
         "--bake-view", dest="reference_view", action="store_const", const="scene", help=argparse.SUPPRESS
@@ -109,6 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
         options,
         reference_view=arguments.reference_view,
         upright=arguments.upright,
+        shader=arguments.shader,
         will_apply=arguments.apply,
         make_local=arguments.make_local,
     )
@@ -151,6 +159,7 @@ def fit_blend(
     *,
     reference_view: str = "scene",
     upright: bool = False,
+    shader: str = "",
     will_apply: bool = False,
     make_local: bool = False,
 ) -> BlendFit:
@@ -179,6 +188,7 @@ def fit_blend(
         f"--fit={json.dumps(fit)}",
         f"--reference-view={reference_view}",
         *(["--upright"] if upright else []),
+        *([f"--shader={shader}"] if shader else []),
         *(["--will-apply"] if will_apply else []),
         *(["--make-local"] if make_local else []),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -37,6 +38,16 @@ def check_graph_files(folder: JobFolder, positions: str | None, sockets: Mapping
         found = _size(folder.file(file, what=f"request.json: graph of {name}"))
         if found[:2] != size[:2]:
             raise BadInputError(f"{file} is {found[1]} x {found[0]}, but {positions} {size[1]} x {size[0]}.")
+
+
+def locate_files(folder: JobFolder, graph: Any, name: str, socket: dict[str, Any]) -> None:
+    """Give the files of a socket, as in request.json, by their absolute paths, and those of the `graph` with them."""
+    if socket.get("texture"):
+        socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
+    if socket.get("graph") and graph is not None:
+        socket["graph"] = str(folder.file(socket["graph"], what=f"request.json: graph of {name}"))
+        socket["positions"] = str(folder.file(graph.positions, what="request.json: graph.positions"))
+        socket["camera"] = graph.camera
 
 
 def _size(path: Path) -> tuple[int, int, int]:

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ...fit.settings import FitSettings
+from ...material.cycles_model import SHADERS
 from ...metrics.display.tone_mapping import DisplayView
 from ...types.errors import BadInputError
 from ...types.image import Encoding
@@ -21,6 +22,8 @@ from .scene_files import check_scene_files
 
 SCHEMA_VERSION = 1
 MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
+MOST_LEAVES = 64  # of a mix
+OTHER_LEAVES = ("transparent", "emission")
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
 _KEYS = (
@@ -31,13 +34,19 @@ _KEYS = (
 
 @dataclass(frozen=True)
 class Target:
-    """The shape and BSDF of `scene` being fitted, and the Blender names they come from."""
+    """The shape and BSDF of `scene` being fitted, and the Blender names they come from.
+
+    `node` is the path to the fitted shader node, group nodes first; `labels` has what it calls values whose parameters
+    are named after other sockets.
+    """
 
     shape_id: str
     bsdf_id: str = ""
     object: str = ""
     material: str = ""
     slot: int = 0
+    node: tuple[str, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -56,12 +65,27 @@ class Socket:
 
 @dataclass(frozen=True)
 class Material:
-    """A Blender Principled material by socket name; colours are linear Rec.709."""
+    """A Blender Principled material, or another `shader` by the sockets it has in common, by socket name.
+
+    Colours are linear Rec.709. A mix has the `weight` of its fitted material and the other `leaves` with theirs, among
+    them what is "transparent" (Base Color passes straight through) and "emission" (Emission Color and Strength).
+    """
 
     name: str
     distribution: str
     sockets: Mapping[str, Socket]
     subsurface_method: str = "RANDOM_WALK"
+    shader: str = "principled"
+    weight: Socket = field(default_factory=lambda: Socket(1.0))
+    leaves: tuple[Material, ...] = ()
+
+    @property
+    def all_sockets(self) -> Iterator[tuple[str, Socket]]:
+        """Every socket with a name that says where it is, weights and those of leaves included."""
+        yield "weight", self.weight
+        yield from self.sockets.items()
+        for leaf in self.leaves:
+            yield from ((f"{name} of {leaf.name}", socket) for name, socket in leaf.all_sockets)
 
 
 @dataclass(frozen=True)
@@ -143,11 +167,11 @@ def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = Fals
         folder.file(request.view_table.path, what=f"{WHERE}: view.lut.path")
     check_scene_files(folder, request.scene, trusted=trusted)
     for bsdf_id, material in request.materials.items():
-        for name, socket in material.sockets.items():
+        for name, socket in material.all_sockets:
             if socket.texture is not None:
                 folder.file(socket.texture, what=f"{WHERE}: materials.{bsdf_id}.sockets.{name}.texture")
     named = request.materials.get(request.target.bsdf_id)
-    held = {name: socket.graph for name, socket in named.sockets.items() if socket.graph} if named else {}
+    held = {name: socket.graph for name, socket in named.all_sockets if socket.graph} if named else {}
     check_graph_files(folder, request.graph.positions if request.graph else None, held)
     return request
 
@@ -224,10 +248,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
     """The JSON form of a request; `request_from_json` is its inverse."""
     materials = asdict(request)["materials"]
     for material in materials.values():
-        material["sockets"] = {
-            name: {key: value for key, value in socket.items() if key not in ("texture", "graph") or value is not None}
-            for name, socket in material["sockets"].items()
-        }
+        _without_nothing(material)
     view = asdict(request.view) if request.view is not None else None
     if request.view_table is not None:
         view = {**(view or {}), "lut": asdict(request.view_table)}
@@ -255,6 +276,16 @@ def request_to_json(request: Request) -> dict[str, Any]:
     }
 
 
+def _without_nothing(material: dict[str, Any]) -> None:
+    """Leave out textures and graphs that are not there."""
+    for socket in (*material["sockets"].values(), material["weight"]):
+        for key in ("texture", "graph"):
+            if socket[key] is None:
+                del socket[key]
+    for leaf in material["leaves"]:
+        _without_nothing(leaf)
+
+
 def _generator(data: Mapping[str, Any]) -> dict[str, Any]:
     version = data.get("blender", [5, 0])
     if not isinstance(version, (list, tuple)) or not all(type(part) is int and 0 <= part < 1000 for part in version):
@@ -263,35 +294,54 @@ def _generator(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _target(data: Any) -> Target:
-    target = CheckedObject(data, f"{WHERE}: target", ("shape_id", "bsdf_id", "object", "material", "slot"))
+    target = CheckedObject(
+        data, f"{WHERE}: target", ("shape_id", "bsdf_id", "object", "material", "slot", "node", "labels")
+    )
     return Target(
         shape_id=target.text("shape_id"),
         bsdf_id=target.text("bsdf_id", ""),
         object=target.text("object", ""),
         material=target.text("material", ""),
         slot=target.integer("slot", 0, 32766, 0),
+        node=target.texts("node", ()),
+        labels={key: str(label) for key, label in target.mapping("labels", {}).items()},
     )
 
 
 def _material(bsdf_id: str, data: Any) -> Material:
-    where = f"{WHERE}: materials.{bsdf_id}"
-    material = CheckedObject(data, where, ("name", "distribution", "subsurface_method", "sockets"))
-    sockets = {}
-    for name, entry in material.mapping("sockets").items():
-        socket = CheckedObject(entry, f"{where}.sockets.{name}", ("value", "linked", "texture", "graph"))
-        value = socket.raw("value", None)
-        numbers = value if isinstance(value, list) else [value]
-        if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
-            raise socket.wrong("value", "a number, a list of one to four, true, false or null")
-        texture = socket.text("texture") if socket.raw("texture", None) is not None else None
-        graph = socket.text("graph") if socket.raw("graph", None) is not None else None
-        sockets[name] = Socket(value, socket.boolean("linked", False), texture, graph)
+    return _shader(data, f"{WHERE}: materials.{bsdf_id}", SHADERS)
+
+
+def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
+    keys = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves")
+    material = CheckedObject(data, where, keys)
+    leaves = material.raw("leaves", [])
+    if not isinstance(leaves, (list, tuple)) or len(leaves) > MOST_LEAVES:
+        raise material.wrong("leaves", f"a list of at most {MOST_LEAVES} materials")
+    if leaves and shaders is not SHADERS:
+        raise material.wrong("leaves", "empty: a leaf has none")
     return Material(
         name=material.text("name"),
         distribution=material.text("distribution", "MULTI_GGX"),
-        sockets=sockets,
+        sockets={
+            name: _socket(entry, f"{where}.sockets.{name}") for name, entry in material.mapping("sockets").items()
+        },
         subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
+        shader=material.choice("shader", list(shaders), "principled"),
+        weight=_socket(material.raw("weight", {"value": 1.0}), f"{where}.weight"),
+        leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", (*SHADERS, *OTHER_LEAVES)) for k, leaf in enumerate(leaves)),
     )
+
+
+def _socket(data: Any, where: str) -> Socket:
+    socket = CheckedObject(data, where, ("value", "linked", "texture", "graph"))
+    value = socket.raw("value", None)
+    numbers = value if isinstance(value, list) else [value]
+    if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
+        raise socket.wrong("value", "a number, a list of one to four, true, false or null")
+    texture = socket.text("texture") if socket.raw("texture", None) is not None else None
+    graph = socket.text("graph") if socket.raw("graph", None) is not None else None
+    return Socket(value, socket.boolean("linked", False), texture, graph)
 
 
 def _fit(data: Any) -> FitSettings:

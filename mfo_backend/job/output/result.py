@@ -54,6 +54,8 @@ def result_to_json(result: FitResult, *, notes: Sequence[str] = (), variant: str
         "sentence": result.message,
         **_verdict(result.judgement),
         "model": result.model,
+        "shader": result.shader,
+        "labels": result.labels,
         "partial": result.status is Status.CANCELLED,
         "initial": result.initial,
         "recovered": result.recovered,

@@ -22,6 +22,7 @@ from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
 from ...types.status import Status
 from ...types.verdict import Verdict
+from ..folder.graph_files import locate_files
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request, request_to_json
 from .graph_blender import evaluated_graph
@@ -246,7 +247,7 @@ def _fit_scene(
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    result = replace(result, notes=(*notes, *result.notes, *_graph_notes(request, result)))
+    result = replace(result, notes=(*notes, *result.notes, *_graph_notes(request, result)), **_named(request))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
 
 
@@ -265,7 +266,7 @@ def of_one_material(first: dict[str, Any] | None, here: dict[str, Any]) -> dict[
     if first is None:
         return here
     own = {name: socket for name, socket in here["sockets"].items() if socket.get("graph") or socket.get("texture")}
-    return first | {"sockets": first["sockets"] | own}
+    return first | {"sockets": first["sockets"] | own, "weight": here["weight"], "leaves": here["leaves"]}
 
 
 def load_everything() -> None:
@@ -301,10 +302,18 @@ def load_native_code() -> str:
     return load_variant()
 
 
+def _named(request: Request) -> dict[str, Any]:
+    """What the fitted shader and its values are called, where they are not those of a plain Principled BSDF."""
+    material = request.materials.get(request.target.bsdf_id)
+    if material is None or not (request.target.labels or material.leaves):
+        return {}
+    return {"shader": "/".join(request.target.node), "labels": dict(request.target.labels)}
+
+
 def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     """What is not held of the values that nodes give the target, in sentences."""
     material = request.materials.get(request.target.bsdf_id)
-    held = [name for name, socket in material.sockets.items() if socket.graph] if material is not None else []
+    held = [name for name, socket in material.all_sockets if socket.graph] if material is not None else []
     if not held:
         return ()
     names = ", ".join(held)
@@ -379,11 +388,7 @@ def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str
     for material in materials.values():
         material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
         material["film_exposure"] = request.film_exposure
-        for name, socket in material["sockets"].items():
-            if socket.get("texture"):
-                socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
-            if socket.get("graph") and request.graph is not None:
-                socket["graph"] = str(folder.file(socket["graph"], what=f"request.json: graph of {name}"))
-                socket["positions"] = str(folder.file(request.graph.positions, what="request.json: graph.positions"))
-                socket["camera"] = request.graph.camera
+        for leaf in (material, *material["leaves"]):
+            for name, socket in (*leaf["sockets"].items(), ("weight", leaf["weight"])):
+                locate_files(folder, request.graph, name, socket)
     return materials

@@ -91,11 +91,14 @@ def brightest_glow(reference: Image, view: View, target: NDArray[np.bool_]) -> f
 
 
 def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClass]:
-    """The classes that a material, as in request.json, is not of and may be changed to; none where links decide.
+    """The classes that a material, as in request.json, is not of and may be changed to; none where links decide, or of
+    a mix of shaders.
 
     The one that glows comes first, for its fit is the quickest; its emission is at most of the radiance `glow`.
     """
     sockets = material["sockets"]
+    if material.get("leaves"):
+        return []
     own = _class_of(sockets)
     classes = (_glowing(glow), *_CLASSES) if glow > 0.0 else _CLASSES
     return [

@@ -31,6 +31,17 @@ class MetalTerm:
 
 
 @dataclass(frozen=True)
+class ConstantTerm:
+    """The same reflectance (RGB) at every angle."""
+
+    f0: Any
+
+    def __call__(self, c: Any) -> Any:
+        """Reflectance for the cosine `c` of view and half vector, RGB."""
+        return self.f0 + 0 * c
+
+
+@dataclass(frozen=True)
 class DielectricTerm:
     """Generalised Schlick reflectance between `f0` (RGB) and white along the true curve of index `n`."""
 

@@ -2,7 +2,8 @@
 """The Mitsuba plugin `blender_principled`. Choose the variant, an RGB one with derivatives, before importing this.
 
 Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a nested texture read at the surface point,
-further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0") and `free`: comma-separated names that will
+further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0"), `shader` ("principled", or another node of
+`cycles_model.SHADERS`) and `free`: comma-separated names that will
 change after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later
 brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
 no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `filtered` (false) reads
@@ -64,7 +65,8 @@ class BlenderPrincipled(mi.BSDF):
         if not mi.is_rgb:
             raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
         version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
-        self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")))
+        shader = str(props.get("shader", "principled"))
+        self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader)
         self.filtered = bool(props.get("filtered", False))
         self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
@@ -99,6 +101,8 @@ class BlenderPrincipled(mi.BSDF):
             components.append(mi.BSDFFlags.DiffuseReflection | both | varying)
         if self.lobes.transmission:
             components.append(mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.NonSymmetric | both | varying)
+        if self.model.shader == "translucent":
+            components.append(mi.BSDFFlags.DiffuseTransmission | both | varying)
         if self.lobes.alpha:
             components.append(mi.BSDFFlags.Null | both | varying)
         if self.lobes.anisotropic:
@@ -240,6 +244,8 @@ class BlenderPrincipled(mi.BSDF):
         diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         kind = dr.select(glass & (local.z < 0), mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
+        through = lobe == NAMES.index("translucent")
+        kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.DiffuseTransmission), kind)
         if choice["transparent"] is not None:
             through = lobe == NAMES.index("transparent")
             density = dr.select(through, choice["transparent"], density)
@@ -257,6 +263,11 @@ class BlenderPrincipled(mi.BSDF):
         """Share of light that passes unchanged, 1 - alpha."""
         alpha = self.values_at(si, active)["alpha"]
         return dr.select(active, mi.Color3f(1 - alpha), 0) if self.lobes.alpha else mi.Color3f(0)
+
+    def passing_chance(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, active: Any) -> Any:
+        """Probability that `sample` goes straight through."""
+        choice = self._choice(ctx, self._layers(si, active).layers)
+        return choice["transparent"] if self.lobes.alpha else mi.Float(0)
 
     def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
         """Base colour."""

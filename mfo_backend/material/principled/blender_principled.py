@@ -64,7 +64,13 @@ def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     value = dr.select((wo.z > 0) & (wi.z > 0), value, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
         value += refracted(layers, wo, reachable_only=reachable_only)
+    if layers.translucent is not None:
+        value += layers.translucent * lambert(_turned_over(wo))
     return value
+
+
+def _turned_over(wo: Any) -> Any:
+    return dr.kind_of(wo)(wo.x, wo.y, -wo.z)
 
 
 def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_only: bool) -> Any:
@@ -84,6 +90,8 @@ def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_
     value += dr.select(normals.lit(normals.diffuse, wo), diffuse * normals.terminator(wo), 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
         value += refracted(layers, wo, reachable_only=reachable_only)
+    if layers.translucent is not None:
+        value += layers.translucent * lambert(_turned_over(wo))
     return value
 
 
@@ -121,7 +129,7 @@ def _glass_reflection(layers: Layers, wo: Any, half: Half) -> Any:
         return 0
     h, c = half
     lobe = reflection(layers.wi, wo, h, layers.glass_alpha, layers.glass_alpha)
-    return layers.glass * layers.glass_fresnel(c) * lobe
+    return layers.glass * layers.glass_reflected * layers.glass_fresnel(c) * lobe
 
 
 def _diffuse(layers: Layers, wi: Any, wo: Any) -> Any:

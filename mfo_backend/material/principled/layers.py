@@ -25,7 +25,7 @@ from ..lobes.fresnel import (
     index_from_normal_incidence,
     normal_incidence,
 )
-from ..lobes.fresnel_term import DielectricTerm, MetalTerm
+from ..lobes.fresnel_term import ConstantTerm, DielectricTerm, MetalTerm
 from ..lobes.sheen import SheenLobe, sheen_lobe
 from ..lobes.thin_film import ThinFilm
 from .bumped_normals import BumpedNormals, about
@@ -37,9 +37,9 @@ from .principled_parameters import BLENDER_PRINCIPLED
 class Layers:
     """Weights (RGB, compensation included) and shapes of the lobes; None where a lobe is left out.
 
-    `normals` are there where nodes give them; then the frame is that of the microfacet lobes. `wi`, in the frame of the
-    anisotropy, lies on the side of the normal. `cos_rotation`, `sin_rotation` turn a direction of the surface's own
-    frame into it.
+    `glass_colour` tints what glass lets through and `glass_reflected` what it reflects. `normals` are there where nodes
+    give them; then the frame is that of the microfacet lobes. `wi`, in the frame of the anisotropy, lies on the side of
+    the normal. `cos_rotation`, `sin_rotation` turn a direction of the surface's own frame into it.
     """
 
     wi: Any
@@ -56,18 +56,20 @@ class Layers:
     coat_alpha: Any = None
     coat_ior: Any = None
     metal: Any = None
-    metal_fresnel: MetalTerm | None = None
+    metal_fresnel: MetalTerm | ConstantTerm | None = None
     glass: Any = None
     glass_alpha: Any = None
     glass_ior: Any = None
-    glass_fresnel: DielectricTerm | None = None
+    glass_fresnel: DielectricTerm | ConstantTerm | None = None
     glass_colour: Any = None
+    glass_reflected: Any = 1
     specular: Any = None
     specular_fresnel: DielectricTerm | None = None
     diffuse: Any = None
     base: Any = None
     diffuse_roughness: Any = None
     subsurface: Any = None
+    translucent: Any = None
     normals: BumpedNormals | None = None
 
     def to_frame(self, direction: Any) -> Any:
@@ -133,10 +135,17 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
 
     film = ThinFilm(p["thin_film_thickness"], p["thin_film_ior"], model) if lobes.thin_film else None
     metallic = saturate(p["metallic"])
+    if model.shader == "translucent":
+        return Layers(**stack, translucent=w * at_least(p["base_color"], 0))
     clamped_base = dr.minimum(at_least(p["base_color"], 0), 1)
     # The reflecting lobes share these two look-ups
     white = reflection_albedo(lobe_roughness, mu) if model.multiple_scattering else None
-    if lobes.metal:
+    if lobes.metal and model.shader == "glossy":
+        colour_of_all = at_least(p["base_color"], 0)
+        gain = _compensation(white, colour_of_all)
+        stack |= {"metal": w * metallic * gain.scale, "metal_fresnel": ConstantTerm(colour_of_all)}
+        w = w * (1 - metallic)
+    elif lobes.metal:
         slope = f82_slope(clamped_base, dr.minimum(at_least(p["specular_tint"], 0), 1)) if lobes.edge_tint else None
         gain = _compensation(white, average_f82(clamped_base, slope))
         stack["metal"] = w * metallic * gain.scale
@@ -197,7 +206,8 @@ def _add_glass(
     inside = wi.z < 0
     n = dr.select(inside, dr.rcp(ior), ior)
     f0 = saturate(normal_incidence(ior) * p["specular_tint"])
-    colour = root(base)
+    # a Glass BSDF tints both sides by its colour, the Principled BSDF what is let through, once in and once out
+    colour = base if model.shader in ("glass", "refraction") else root(base)
     gain = _compensation(glass_albedo(roughness, mu, n, ior) if model.multiple_scattering else None, colour)
     stack |= {
         "glass": w * weight * gain.scale,
@@ -207,6 +217,10 @@ def _add_glass(
         "glass_fresnel": DielectricTerm(f0, n, film.seen_from_inside(inside, ior) if film else None),
         "glass_colour": colour,
     }
+    if model.shader == "glass":
+        stack["glass_reflected"] = colour
+    elif model.shader == "refraction":
+        stack |= {"glass": w * weight, "glass_fresnel": ConstantTerm(0 * colour)}
     return w * (1 - weight)
 
 

@@ -18,7 +18,7 @@ from ..lobes.microfacet import sample_visible, visible_pdf
 from .blender_principled import refraction_normal
 from .layers import Layers
 
-NAMES = ("transparent", "sheen", "coat", "base", "glass", "diffuse")
+NAMES = ("transparent", "sheen", "coat", "base", "glass", "diffuse", "translucent")
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,8 @@ def lobe_choice(layers: Layers, with_transparency: bool, least_diffuse: float = 
         strength["glass"] = mean(layers.glass)
     if layers.diffuse is not None:
         strength["diffuse"] = mean(layers.diffuse if layers.subsurface is None else layers.diffuse + layers.subsurface)
+    if layers.translucent is not None:
+        strength["translucent"] = mean(layers.translucent)
     # The floor keeps a direction for every material, black ones included
     strength = {name: dr.maximum(dr.detach(value), 0) for name, value in strength.items()}
     last = "diffuse" if "diffuse" in strength else next(reversed(strength))
@@ -94,6 +96,8 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = F
         through = visible_pdf(wi, h, alpha, alpha) * jacobian * (1 - reflect_probability(layers, dr.abs(dr.dot(wi, h))))
         counted = (wo.z < 0) & (wi.z > 0)
         density += dr.select(counted & possible if reachable_only else counted, choice["glass"] * through, 0)
+    if choice["translucent"] is not None:
+        density += dr.select(wi.z > 0, choice["translucent"] * dr.maximum(-wo.z, 0) / dr.pi, 0)
     return dr.detach(density)
 
 
@@ -101,7 +105,7 @@ def reflect_probability(layers: Layers, c: Any) -> Any:
     """Probability that glass reflects at a microfacet seen under cosine `c`."""
     assert layers.glass_fresnel is not None
     fresnel = layers.glass_fresnel(c)
-    reflected = mean(layers.glass * fresnel)
+    reflected = mean(layers.glass * layers.glass_reflected * fresnel)
     through = mean(layers.glass * layers.glass_colour * (1 - fresnel))
     return dr.detach(reflected / dr.maximum(reflected + through, 1e-20))
 
@@ -139,6 +143,9 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
             below |= chosen["glass"] & refracts
     if "sheen" in chosen and layers.sheen_shape is not None:
         wo = dr.select(chosen["sheen"], layers.sheen_shape.sample(cosine), wo)
+    if "translucent" in chosen:
+        wo = dr.select(chosen["translucent"], vector(cosine.x, cosine.y, -cosine.z), wo)
+        below |= chosen["translucent"]
     if "transparent" in chosen:
         wo = dr.select(chosen["transparent"], -wi, wo)
     wo = dr.detach(wo)
@@ -150,5 +157,6 @@ def _through_glass(layers: Layers, h: Any, u1: Any) -> tuple[Any, Any]:
     """The direction refracted at the normal `h`, and whether the number `u1` in [0, 1) chooses it."""
     wi, n = layers.wi, layers.glass_ior
     c = dr.dot(wi, h)
-    cos_t = dr.safe_sqrt(1 - (1 - dr.square(c)) / dr.square(n))
-    return h * (c / n - cos_t) - wi / n, u1 >= reflect_probability(layers, c)
+    cos_t2 = 1 - (1 - dr.square(c)) / dr.square(n)
+    # in total reflection nothing passes, also where nothing is reflected
+    return h * (c / n - dr.safe_sqrt(cos_t2)) - wi / n, (u1 >= reflect_probability(layers, c)) & (cos_t2 > 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sockets of Blender's Principled node as properties of the plugin `blender_principled`."""
+"""Sockets of Blender's Principled node as properties of the plugin `blender_principled`, and mixes of them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 # Sockets without effect here: normals and tangents are the mesh's, subsurface is replaced by a diffuse lobe
 _IGNORED = {"Normal", "Coat Normal", "Tangent", "Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR"}
 _IGNORED |= {"Subsurface Anisotropy", "Thin Wall"}
+_EMISSION = {"Emission Color": [1.0, 1.0, 1.0], "Emission Strength": 0.0}
 # but for those that nodes give as the camera sees them
 DIRECTIONS = {"Normal": "normal", "Coat Normal": "coat_normal", "Tangent": "tangent"}
 
@@ -24,6 +25,7 @@ def blender_principled_dict(
     version: Sequence[int] = (5, 0),
     free: Collection[str] = (),
     unreachable_refraction: bool = True,
+    shader: str = "principled",
 ) -> dict[str, Any]:
     """Properties for `mi.load_dict` from `{"Base Color": {"value": [r, g, b]}, ...}`, colours linear Rec.709.
 
@@ -42,6 +44,8 @@ def blender_principled_dict(
         "distribution": distribution,
         "blender_version": ".".join(str(part) for part in tuple(version)[:2]),
     }
+    if shader != "principled":
+        result["shader"] = shader
     if not unreachable_refraction:
         result["unreachable_refraction"] = False
     if free:
@@ -56,11 +60,8 @@ def blender_principled_dict(
                 f"Unknown socket {socket!r} of the Principled BSDF: known are {', '.join(PARAMETER_OF_SOCKET)}."
             )
         item = BLENDER_PRINCIPLED[PARAMETER_OF_SOCKET[socket]]
-        if content.get("graph"):
-            result[item.name] = projective(content, content.get("value"))
-            continue
-        if content.get("texture"):
-            result[item.name] = {"type": "bitmap", "filename": str(content["texture"]), "raw": True}
+        if content.get("graph") or content.get("texture"):
+            result[item.name] = picture(content)
             continue
         value = socket_value(socket, content.get("value"))
         components = value if isinstance(value, tuple) else (value,)
@@ -68,6 +69,77 @@ def blender_principled_dict(
         if components != default or item.name in free:
             result[item.name] = {"type": "rgb", "value": list(components)} if item.size == 3 else components[0]
     return result
+
+
+def closure_tree_dict(
+    material: Mapping[str, Any], fitted: Mapping[str, Any], *, version: Sequence[int], unreachable_refraction: bool
+) -> dict[str, Any]:
+    """Properties of the plugin `closure_tree` for a material of request.json whose fitted leaf has those of `fitted`.
+
+    Raises
+    ------
+    BadInputError
+        As `blender_principled_dict`.
+    """
+    result: dict[str, Any] = {"type": "closure_tree", "fitted": dict(fitted), "weight": _amount(material["weight"])}
+    held = [leaf for leaf in material["leaves"] if leaf["shader"] not in ("transparent", "emission")]
+    for k, leaf in enumerate(held):
+        result[f"leaf_{k}"] = blender_principled_dict(
+            leaf["sockets"],
+            distribution=leaf.get("distribution", "MULTI_GGX"),
+            version=version,
+            unreachable_refraction=unreachable_refraction,
+            shader=leaf["shader"],
+        )
+        result[f"weight_{k}"] = _amount(leaf["weight"])
+    clear = [leaf for leaf in material["leaves"] if leaf["shader"] == "transparent"]
+    for k, leaf in enumerate(clear):
+        result[f"clear_{k}"] = _amount(leaf["sockets"].get("Base Color", {"value": [1.0, 1.0, 1.0]}))
+        result[f"clear_weight_{k}"] = _amount(leaf["weight"])
+    return result
+
+
+def is_mixed(material: Mapping[str, Any]) -> bool:
+    """Whether a material of request.json is more, or less, than its fitted leaf."""
+    weight = material.get("weight", {"value": 1.0})
+    return bool(material.get("leaves") or weight.get("graph") or weight.get("texture") or weight.get("value") != 1.0)
+
+
+def leaf_radiance_dict(material: Mapping[str, Any], scale: float) -> dict[str, Any] | None:
+    """Properties of the texture `leaf_radiance` of a material of request.json.
+
+    None where nothing but the plain values of a single leaf emits: an emitter of one colour is enough then.
+    """
+    emitting = [leaf for leaf in (material, *material.get("leaves", ())) if _emits(leaf["sockets"])]
+    asked = [leaf["sockets"].get(name, {}) for leaf in emitting for name in _EMISSION]
+    if not emitting or not (is_mixed(material) or any(socket.get("graph") for socket in asked)):
+        return None
+    result: dict[str, Any] = {"type": "leaf_radiance", "scale": scale}
+    for k, leaf in enumerate(emitting):
+        color, strength = (leaf["sockets"].get(name, {"value": default}) for name, default in _EMISSION.items())
+        result |= {f"color_{k}": _amount(color), f"strength_{k}": _amount(strength)}
+        result[f"weight_{k}"] = _amount(leaf.get("weight", {"value": 1.0}))
+    return result
+
+
+def _emits(sockets: Mapping[str, Mapping[str, Any]]) -> bool:
+    strength = sockets.get("Emission Strength", {"value": 0.0})
+    return bool(strength.get("graph") or strength.get("texture") or strength.get("value"))
+
+
+def _amount(content: Mapping[str, Any]) -> Any:
+    """A value, or the texture of its picture."""
+    if content.get("graph") or content.get("texture"):
+        return picture(content)
+    value = content["value"]
+    return {"type": "rgb", "value": [float(v) for v in value[:3]]} if isinstance(value, (list, tuple)) else float(value)
+
+
+def picture(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The texture of a socket that has a `graph` or a `texture`."""
+    if content.get("graph"):
+        return projective(content, content.get("value"))
+    return {"type": "bitmap", "filename": str(content["texture"]), "raw": True}
 
 
 def projective(content: Mapping[str, Any], outside: Any) -> dict[str, Any]:

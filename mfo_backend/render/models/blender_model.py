@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.principled.blender_selection import select_blender_parameters
-from ...material.principled.principled_dict import blender_principled_dict, socket_value
+from ...material.principled.principled_dict import (
+    blender_principled_dict,
+    closure_tree_dict,
+    is_mixed,
+    leaf_radiance_dict,
+    socket_value,
+)
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...scene.scene_xml import Element, Target
 from ...types.errors import BadInputError, UnrecordableError
@@ -61,14 +67,26 @@ def prepare_blender_principled(
             continue
         free = [name for name in table.names if name != EMISSION] if bsdf_id == target.bsdf_id else ()
         described = dict(materials[bsdf_id]["sockets"]) | (opened if free else {})
+        material, version = materials[bsdf_id], materials[bsdf_id].get("blender_version", _VERSION)
         properties = blender_principled_dict(
             described,
-            distribution=materials[bsdf_id].get("distribution", "MULTI_GGX"),
-            version=materials[bsdf_id].get("blender_version", _VERSION),
+            distribution=material.get("distribution", "MULTI_GGX"),
+            version=version,
             free=free,
             unreachable_refraction=not uniform,
+            shader=material.get("shader", "principled"),
         )
-        _rewrite(bsdf, bsdf_id, properties, textures)
+        if is_mixed(material):
+            properties = closure_tree_dict(material, properties, version=version, unreachable_refraction=not uniform)
+        _rewrite(bsdf, properties, textures)
+        bsdf.set("id", bsdf_id)
+        radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))
+        if radiance is not None and free and EMISSION in table.names:
+            raise BadInputError(
+                "The emission of a mix, and one that nodes give, is held: leave emission_color out of the parameters."
+            )
+        if radiance is not None:
+            _replace_radiance(scene, bsdf_id, radiance, textures)
     outer = target.outer
     key_ends, factors = {name: name for name in table.names}, {}
     if EMISSION in table.names:
@@ -93,6 +111,21 @@ def _open_emission(scene: Element, shape_id: str, radiance: NDArray[np.float64])
     ElementTree.SubElement(emitter, "rgb", name="radiance", value=", ".join(repr(float(v)) for v in radiance))
 
 
+def _replace_radiance(
+    scene: Element, bsdf_id: str, radiance: Mapping[str, Any], textures: Mapping[str, Element]
+) -> None:
+    """Let shapes of a material emit what varies over it, where they emit."""
+    for shape in scene.findall("shape"):
+        if not any(ref.get("id") == bsdf_id for ref in shape.findall("ref")):
+            continue
+        for emitter in shape.findall("emitter"):
+            for child in list(emitter):
+                if child.get("name") == "radiance":
+                    emitter.remove(child)
+            texture = ElementTree.SubElement(emitter, "texture", name="radiance")
+            _rewrite(texture, radiance, textures)
+
+
 def _constants(sockets: Mapping[str, Mapping[str, Any]]) -> dict[str, Value]:
     values: dict[str, Value] = {}
     for socket, content in sockets.items():
@@ -111,16 +144,20 @@ def _textures(scene: Element) -> dict[str, Element]:
     return found
 
 
-def _rewrite(bsdf: Element, bsdf_id: str, properties: Mapping[str, Any], textures: Mapping[str, Element]) -> None:
+def _rewrite(bsdf: Element, properties: Mapping[str, Any], textures: Mapping[str, Element]) -> None:
+    """Make an element one of these properties; of what it was its `name` stays."""
     for child in list(bsdf):
         bsdf.remove(child)
+    named = {"name": bsdf.get("name", "")} if bsdf.get("name") else {}
     bsdf.attrib.clear()
-    bsdf.attrib.update({"type": str(properties["type"]), "id": bsdf_id})
+    bsdf.attrib.update({"type": str(properties["type"]), **named})
     for name, value in properties.items():
         if name == "type":
             continue
         if isinstance(value, str):
             ElementTree.SubElement(bsdf, "string", name=name, value=value)
+        elif isinstance(value, Mapping) and value["type"] == "blender_principled":
+            _rewrite(ElementTree.SubElement(bsdf, "bsdf", name=name), value, textures)
         elif isinstance(value, Mapping) and value["type"] == "projective":
             bsdf.append(_projective(name, value))
         elif isinstance(value, Mapping) and value["type"] == "rgb":

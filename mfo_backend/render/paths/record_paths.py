@@ -27,6 +27,7 @@ from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..transport.smooth_facets import ShadowTerminator, seen_side
 from ..transport.traced_radiance import traced_radiance
 from .even_points import even_points
+from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .proposal import DefensiveProposal
 from .recorded_background import add_radiance, recorded_background
 from .recorded_paths import RecordedPaths
@@ -42,7 +43,8 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin tells them. `bumped` says that
-    nodes give it normals. With a `surface`, lanes keep their `subpixel` on it. With `light_paths` light over other
+    nodes give it normals, and `mixed` that it is a `closure_tree`. With a `surface`, lanes keep their `subpixel` on it.
+    With `light_paths` light over other
     surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the only ones looked at; where they
     hold all that see the target, nothing is missed. With `highlights` more rays start where lights of no extent are
     mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples of the same
@@ -60,6 +62,7 @@ class RecordSettings:
     held: tuple[str, ...] = ()
     bumped: bool = False
     surface: SeenSurface | None = None
+    mixed: bool = False
     light_paths: LightPaths | None = None
     pixels: NDArray[np.bool_] | None = None
     highlights: Highlights | None = None
@@ -71,30 +74,26 @@ class RecordSettings:
 
 
 @dataclass
-class _Lanes:
-    """One technique's lanes before they are merged; positions of sample s follow s times the pixels."""
-
-    wi: mi.Vector3f
-    wo: mi.Vector3f
-    weight: mi.Color3f
-    position: mi.UInt32
-    held: tuple[Any, ...]
-
-
-@dataclass
 class _Hits:
-    """First hits of the camera rays on the target, and the number of `pixels`."""
+    """First hits of the camera rays on the target, and the number of `pixels`.
+
+    Of a mix there is the `plugin`, and `own` are the hits in the frame of the mesh, which its held materials take.
+    """
 
     si: Any
     position: mi.UInt32
     share: mi.Float
     held: tuple[Any, ...]
     pixels: int
+    plugin: Any = None
+    own: Any = None
 
     def of_rays(self, ray: mi.UInt32) -> _Hits:
         """Those of some rays, which may repeat."""
         si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
-        return _Hits(si, position, share, tuple(dr.gather(type(a), a, ray) for a in self.held), self.pixels)
+        own = None if self.own is None else dr.gather(type(self.own), self.own, ray)
+        held = tuple(dr.gather(type(a), a, ray) for a in self.held)
+        return _Hits(si, position, share, held, self.pixels, self.plugin, own)
 
 
 def record_paths(
@@ -142,27 +141,28 @@ def record_paths(
             if settings.surface is not None:
                 values["subpixel"] = settings.surface.row_of(si.p)
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
+        own = mi.SurfaceInteraction3f(si) if settings.mixed else None
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
-        dr.eval(si if sampled else (), position, filter_weight, held)
+        dr.eval(si if sampled or settings.mixed else (), own, position, filter_weight, held)
         pixels = len(rays.pixel)
-        hits = _Hits(si, position, filter_weight, held, pixels)
+        hits = _Hits(si, position, filter_weight, held, pixels, shape.bsdf() if settings.mixed else None, own)
         exact = [part for part in _delta_lights(scene, hits, terminator) if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
             lanes += _sampled_lights(scene, hits, settings, lamps, terminator)
 
-        covered, coverage = _coverage(pixels, position, filter_weight)
+        covered, coverage = coverage_of(pixels, position, filter_weight)
         constant = recorded_background(
             scene, (height, width), rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
             depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
         )  # fmt: skip
         if glow is not None:
             add_radiance(constant, rays.pixel[np.array(position)], glow)
-        merged = _merge(lanes, settings, rays, covered, coverage, constant)
+        merged = merged_lanes(lanes, settings.samples, settings.held, rays, covered, coverage, constant)
         if glowing is not None:
             own = add_radiance(np.zeros_like(constant), rays.pixel[np.array(position)], mi.Color3f(glowing))
             merged = replace(merged, own_emission=own)
@@ -232,7 +232,7 @@ def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction
     return si
 
 
-def _delta_lights(scene: mi.Scene, hits: _Hits, terminator: ShadowTerminator) -> list[_Lanes]:
+def _delta_lights(scene: mi.Scene, hits: _Hits, terminator: ShadowTerminator) -> list[TechniqueLanes]:
     """One exact sample for each light of no extent."""
     si = hits.si
     started = []
@@ -249,7 +249,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits, terminator: ShadowTerminator) ->
 
 def _sampled_lights(
     scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps, terminator: ShadowTerminator
-) -> list[_Lanes]:
+) -> list[TechniqueLanes]:
     """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
     everywhere = list(scene.emitters())
     extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
@@ -339,59 +339,34 @@ def _over_others(
     return radiance / settings.proposal.density(si.wi, wo)
 
 
-def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], _Lanes]:
+def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], TechniqueLanes]:
     """Start to compute lanes; returns what waits for those to keep, while the next technique is traced in Python."""
     weight = mi.Color3f(weight)
     keep = keep & dr.all(dr.isfinite(weight))
     wi = hits.si.wi
     dr.eval(wi, wo, weight, keep)
 
-    def kept() -> _Lanes:
+    def kept() -> TechniqueLanes:
         index = dr.compress(keep)
-        return _Lanes(
+        lanes = TechniqueLanes(
             dr.gather(mi.Vector3f, wi, index),
             dr.gather(mi.Vector3f, wo, index),
             dr.gather(mi.Color3f, weight, index),
             dr.gather(mi.UInt32, hits.position, index),
             tuple(dr.gather(type(value), value, index) for value in hits.held),
         )
+        return lanes if hits.plugin is None or dr.width(index) == 0 else _parted(lanes, hits, index)
 
     return kept
 
 
-def _coverage(pixels: int, position: mi.UInt32, share: mi.Float) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    total = np.bincount(np.array(position), np.array(share), pixels)
-    covered = np.flatnonzero(total > 0.0)
-    return covered, total[covered].astype(np.float32)
-
-
-def _merge(
-    lanes: list[_Lanes],
-    settings: RecordSettings,
-    rays: PrimaryRays,
-    covered: NDArray[np.int64],
-    coverage: NDArray[np.float32],
-    constant: NDArray[np.float32],
-) -> RecordedPaths:
-    """One lane array, ordered by sample, tile and pixel."""
-    position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
-    rank = np.empty(len(position), np.uint32)
-    rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
-    wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
-    held = [dr.zeros(type(value), len(position)) for value in lanes[0].held] if lanes else []
-    begin = 0
-    for part in lanes:
-        end = begin + dr.width(part.position)
-        if end > begin:
-            target = own_memory(rank[begin:end], mi.UInt32)
-            pairs = ((wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True))
-            for merged, value in pairs:
-                dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
-        begin = end
-    dr.eval(wi, wo, weight, held)
-    samples, pixels = settings.samples, len(rays.pixel)
-    count = np.bincount(position, minlength=samples * pixels).reshape(samples, pixels)[:, covered]
-    first = np.concatenate([np.zeros((samples, 1), int), np.cumsum(count, axis=1)], axis=1)
-    first[1:] += np.cumsum(first[:-1, -1])[:, None]
-    values = dict(zip(settings.held, held, strict=False))
-    return RecordedPaths(wi, wo, weight, rays.pixel[covered], rays.tile[covered], first, coverage, constant, values)
+def _parted(lanes: TechniqueLanes, hits: _Hits, index: mi.UInt32) -> TechniqueLanes:
+    """Lanes of a mix: what its held materials show, and weights for the fitted one alone."""
+    own = dr.gather(mi.SurfaceInteraction3f, hits.own, index)
+    wo = lanes.wo
+    if hits.plugin.directions:
+        wo = own.to_local(dr.gather(mi.SurfaceInteraction3f, hits.si, index).to_world(wo))
+    others = hits.plugin.held_value(own, wo) * lanes.weight
+    weight = lanes.weight * hits.plugin.fitted.weight_at(own)
+    dr.eval(others, weight)
+    return replace(lanes, weight=weight, others=others)

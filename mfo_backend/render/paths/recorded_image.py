@@ -24,8 +24,11 @@ class TwoSamples:
     half_difference: Rows | None
 
     @staticmethod
-    def of(samples: Rows, constant: Rows) -> TwoSamples:
-        """That of one or two samples (s, g, 3, 1 + K) without the `constant` part of the image (g, 3)."""
+    def of(samples: Rows, constant: Rows, constant_difference: Rows | None = None) -> TwoSamples:
+        """That of one or two samples (s, g, 3, 1 + K) without the `constant` part of the image (g, 3).
+
+        `constant_difference` is half the difference of two samples of that part.
+        """
         difference = None
         if len(samples) == 2:
             first, second = samples
@@ -33,6 +36,8 @@ class TwoSamples:
         else:
             (mean,) = samples
         mean[:, :, 0] += constant
+        if difference is not None and constant_difference is not None:
+            difference[:, :, 0] += constant_difference
         return TwoSamples(mean, difference)
 
     def averaged(self, average: Callable[[Rows], Rows]) -> TwoSamples:

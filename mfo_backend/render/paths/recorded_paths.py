@@ -166,9 +166,12 @@ class RecordedPaths:
         Share of each covered pixel's filter weight that lies on the target.
     constant
         What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
-        seen in covered pixels, the target's own emission unless that is free; 0 elsewhere.
+        seen in covered pixels, the target's own emission unless that is free, of a mix what its held materials show; 0
+        elsewhere.
     own_emission
         The picture of the target's own emission of radiance 1, (height, width, 3), where that is free.
+    constant_difference
+        Half the difference of two samples of `constant`; None where it has no noise of the light.
     held
         Values that a texture gives the material, by name: one number or colour for each lane.
     """
@@ -183,6 +186,7 @@ class RecordedPaths:
     constant: Pixels
     held: Mapping[str, Any] = field(default_factory=dict)
     own_emission: Pixels | None = None
+    constant_difference: Pixels | None = None
 
     @property
     def lanes(self) -> int:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...material.recorded_models import RecordedModel, recorded_model
 from ...types.errors import UnrecordableError
+from ...types.image import Pixels
 from ...types.parameter import Value
 from ..camera.highlight_cells import Highlights
 from ..camera.primary_rays import tile_order
@@ -88,6 +89,9 @@ class RecordedScene:
         self._varying = None if graph is None else VaryingValues(graph, renderer.table, self.model.table)
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._varying)
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
+        self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
+        if self._mixed and not renderer.shape.bsdf().is_opaque:
+            raise UnrecordableError("The material is mixed with one that lets light through.")
 
     @property
     def varies(self) -> bool:
@@ -167,6 +171,7 @@ class RecordedScene:
             held=held,
             bumped=self._bumped,
             surface=None if self._varying is None else self._varying.surface(vector),
+            mixed=self._mixed,
             light_paths=light_paths,
             pixels=pixels,
             highlights=highlights,
@@ -255,11 +260,12 @@ class RecordedScene:
         It remembers two: solutions are compared in pairs.
         """
         constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
+        difference = _averaged(groups, paths.constant_difference)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.counter.add(cost)
-            return glow(vector, TwoSamples.of(self._image(vector, lanes, groups), constant))
+            return glow(vector, TwoSamples.of(self._image(vector, lanes, groups), constant, difference))
 
         return RecordedImage(at, 2)
 
@@ -285,13 +291,14 @@ class RecordedScene:
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """The function from a vector to image and Jacobian of the groups, background included."""
         constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
+        difference = _averaged(groups, paths.constant_difference)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         cost = with_derivatives(self._share(groups), self.renderer.table.length)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             samples = self.jacobian(vector, lanes(), groups)
             self.renderer.counter.add(cost)
-            return glow(vector, TwoSamples.of(samples, constant))
+            return glow(vector, TwoSamples.of(samples, constant, difference))
 
         return RecordedImage(at, recalled)
 
@@ -323,6 +330,10 @@ class RecordedScene:
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
+
+
+def _averaged(groups: LaneGroups, image: Pixels | None) -> NDArray[np.float32] | None:
+    return None if image is None else groups.average(image)
 
 
 def _rays(squares: NDArray[np.int64], stride: int) -> int:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
+from ...material.plugins.closure_tree import ClosureTree
 from ...material.plugins.principled_plugin import BlenderPrincipled
 from ...material.principled.blender_principled import evaluate
 from ...material.principled.layers import layer_stack
@@ -34,6 +35,7 @@ from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
+from ..transport.path_random import PathRandom
 from ..transport.smooth_facets import ShadowTerminator, sample_light, seen_side
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
@@ -95,7 +97,9 @@ class TracedPaths:
 
     def __init__(self, renderer: MitsubaRenderer) -> None:
         bsdf = renderer.shape.bsdf()
-        if not isinstance(bsdf, BlenderPrincipled):
+        self._tree = bsdf if isinstance(bsdf, ClosureTree) else None
+        self._plugin = bsdf if self._tree is None else self._tree.fitted.material
+        if not isinstance(self._plugin, BlenderPrincipled):
             raise UnrecordableError(f"Model {renderer.model!r} has no traced version for transmissive materials.")
         self.renderer, self.table = renderer, renderer.table
         self._bsdf = bsdf
@@ -116,7 +120,7 @@ class TracedPaths:
         """Roughness of the material `vector`; 1 where a texture gives it."""
         if "roughness" in self.table.names:
             return float(vector[self.table.slice_of("roughness").start])
-        value = self._bsdf.fixed["roughness"]
+        value = self._plugin.fixed["roughness"]
         return 1.0 if value is None else float(np.mean(value))
 
     def images(
@@ -318,7 +322,7 @@ class TracedPaths:
 
     def _at_target(self, si, wo, u1, u2, on, theta, offset, directions):
         """Value and derivatives of the BSDF towards `wo` and towards a direction drawn from it, with densities."""
-        plugin = self._bsdf
+        plugin = self._plugin
         entries = [dr.gather(mi.Float, theta, offset + k, on) for k in range(self.table.length)]
         if directions:
             dr.enable_grad(*entries)
@@ -331,7 +335,11 @@ class TracedPaths:
             layers = layers.blurred(si.duv_dx.x)
         choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha, least_diffuse=LEAST_DIFFUSE)
         only = plugin.reachable_only
-        drawn, lobe, valid = sample(layers, choice, u1, u2)
+        mixture = None if self._tree is None else self._tree.mixture(si, u1, u2, on)
+        drawn, lobe, valid = sample(layers, choice, u1 if mixture is None else mixture.u1, u2)
+        if mixture is not None:
+            drawn = dr.select(mixture.is_held, layers.to_frame(mixture.drawn.wo), drawn)
+            valid = dr.select(mixture.is_held, mixture.drawn.pdf > 0.0, valid)
         towards = dr.detach(layers.to_frame(wo))
         f_light = mi.Color3f(evaluate(layers, towards, reachable_only=only))
         pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
@@ -341,11 +349,28 @@ class TracedPaths:
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
         kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
+        kind = dr.select(lobe == NAMES.index("translucent"), mi.UInt32(+mi.BSDFFlags.DiffuseTransmission), kind)
+        null, passes, chance = mi.Bool(False), mi.Color3f(0.0), mi.Float(0.0)
         if choice["transparent"] is not None:
             null = lobe == NAMES.index("transparent")
-            f_next = dr.select(null, mi.Color3f(layers.transparency), f_next)
-            pdf_next = dr.select(null, dr.detach(choice["transparent"]), pdf_next)
+            passes, chance = mi.Color3f(layers.transparency), dr.detach(choice["transparent"])
+        if mixture is not None:
+            value, density = mixture.held(wo)
+            f_light = mixture.weight * f_light + value
+            pdf_light = mixture.chance * pdf_light + density
+            value, density = mixture.held(dr.detach(layers.from_frame(drawn)))
+            f_next = mixture.weight * f_next + value
+            pdf_next = mixture.chance * pdf_next + density
+            kind = dr.select(mixture.is_held, mixture.drawn.sampled_type, kind)
+            null = dr.select(mixture.is_held, mixture.straight, null)
+            passes = mixture.weight * passes + mixture.passes
+            chance = mixture.chance * chance + mixture.passing_chance
+            valid |= mixture.is_held & mixture.straight
+        if mixture is not None or choice["transparent"] is not None:
+            f_next = dr.select(null, passes, f_next)
+            pdf_next = dr.select(null, chance, pdf_next)
             kind = dr.select(null, mi.UInt32(+mi.BSDFFlags.Null), kind)
+            drawn = dr.select(null, -layers.wi, drawn)
         pdf_next = dr.select(valid & on, pdf_next, 0.0)
         light, following = [dr.detach(f_light)], [dr.detach(f_next)]
         for entry in self._tangents.entries[:directions]:
@@ -360,21 +385,3 @@ class TracedPaths:
         light = [dr.select(on, c, 0.0) for c in light]
         following = [dr.select(on, c, 0.0) for c in following]
         return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), kind
-
-
-@dataclass(frozen=True)
-class PathRandom:
-    """Random numbers by path and place, without a state: a path keeps its numbers whatever the material does."""
-
-    a: mi.UInt32
-    b: mi.UInt32
-
-    @staticmethod
-    def of(path: mi.UInt32, seed: mi.UInt32) -> PathRandom:
-        """Those of a path number and a seed."""
-        return PathRandom(*mi.sample_tea_32(path, seed, 6))
-
-    def pair(self, place: Any) -> mi.Point2f:
-        """Two numbers in [0, 1) (D. Wheeler and R. Needham, TEA, 1994, as a hash)."""
-        x, y = mi.sample_tea_32(self.a, self.b + mi.UInt32(place) * 0x9E3779B9, 5)
-        return mi.Point2f(mi.Float(x >> 8), mi.Float(y >> 8)) * 2.0**-24

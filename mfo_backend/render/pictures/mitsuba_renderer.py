@@ -257,12 +257,14 @@ def load_mitsuba_renderer(
     _forget_scenes_before()
     import mitsuba as mi
 
-    from ...material.plugins import principled_plugin, projective_texture
+    from ...material.plugins import closure_tree, leaf_radiance, principled_plugin, projective_texture
     from ..lamps import lamp_plugins
     from ..transport import cycles_path
 
     principled_plugin.register()
+    closure_tree.register()
     projective_texture.register()
+    leaf_radiance.register()
     cycles_path.register()
     lamp_plugins.register()
     has_lamps = any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter"))

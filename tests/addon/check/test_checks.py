@@ -86,8 +86,8 @@ def diffuse(scene: SimpleNamespace) -> None:
     tree(scene).links.new(shader.outputs[0], output.inputs["Surface"])
 
 
-def glossy(scene: SimpleNamespace) -> None:
-    shader = tree(scene).nodes.new("ShaderNodeBsdfGlossy")
+def toon(scene: SimpleNamespace) -> None:
+    shader = tree(scene).nodes.new("ShaderNodeBsdfToon")
     output = next(n for n in tree(scene).nodes if n.type == "OUTPUT_MATERIAL")
     tree(scene).links.new(shader.outputs[0], output.inputs["Surface"])
 
@@ -116,7 +116,7 @@ SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
     (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (render_region, "whole_frame"),
     (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
     (another_size, "resolution"), (another_size, "scale"), (another_display, "reference_view"),
-    (no_material, "new_material"), (glossy, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
+    (no_material, "new_material"), (toon, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
     (the_light_is_active, "select"), (nothing_chosen, "all_parameters"),
 ]  # fmt: skip
 

@@ -138,9 +138,8 @@ def test_the_recorded_picture_is_cycles(
     assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < most
 
 
-def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
-    """Pixels inside the target, by the recorded paths of the exported job and by Cycles."""
-    from mfo_backend.render.paths.recorded_scene import RecordedScene
+def renderer_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
+    """The renderer of the exported job, and the picture by Cycles."""
     from mfo_backend.render.pictures.renderer import load_renderer
 
     wanted = render_cycles()
@@ -156,6 +155,14 @@ def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[A
         folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=parameters,
         materials=request_materials(folder, request), light_paths=request.light_paths,
     )  # fmt: skip
+    return renderer, wanted
+
+
+def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
+    """Pixels inside the target, by the recorded paths of the exported job and by Cycles."""
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    renderer, wanted = renderer_and_cycles(export, render_cycles, target)
     recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
     paths = recorded.record(renderer.start, grid=4, seed=0, near=True)
     groups = paths.pixel_groups(paths.interior)

@@ -29,11 +29,11 @@ class Leaf:
 
 
 class ClosureTree:
-    """The leaves of a tree that nobody else uses; groups become its own."""
+    """The leaves of a tree that nobody else uses; groups become its own, unless they are."""
 
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
+    def __init__(self, tree: bpy.types.NodeTree, *, own_groups: bool = True) -> None:
         self._tree = tree
-        self.groups = _own_groups(tree, 0)
+        self.groups = _own_groups(tree, 0) if own_groups else []
         output = active_output(tree)
         self.leaves: list[Leaf] = []
         if output is not None:

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shader nodes as the Principled BSDF that they are: what their sockets are called there, and what of it is held.
+
+Each is exact to Cycles' single precision where its lobes are (`mfo_backend/material/cycles_model.py`); what is only the
+nearest has a sentence that says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+
+from ...versions import DIFFUSE, PRINCIPLED
+
+# what of a Principled BSDF keeps it opaque, and what takes away its specular reflection
+_OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}
+WITHOUT_SPECULAR = {"Metallic": 0.0, "Roughness": 1.0, "IOR": 1.5, "Specular IOR Level": 0.0, **_OPAQUE}
+_GLASS = {"Metallic": 0.0, "Alpha": 1.0, "Transmission Weight": 1.0}
+_CLEAR = {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"}
+_FILM = {"Thin Film Thickness": "Thin Film Thickness", "Thin Film IOR": "Thin Film IOR"}
+_MATTE = {"Base Color": "Color"}
+_METAL = {"Metallic": 1.0, "IOR": 1.5, "Specular IOR Level": 0.5, **_OPAQUE}
+
+
+@dataclass(frozen=True)
+class LeafKind:
+    """How a node is fitted, or held.
+
+    Attributes
+    ----------
+    names
+        What the node calls values of a Principled BSDF, those that may be linked; None where it is one.
+    held
+        Values of the Principled BSDF that make it this node.
+    shader
+        The backend's word for its lobes.
+    settings
+        Settings of the node that the model holds, by their name; others are shown as the first.
+    nearest
+        Whether the model is only the nearest, whatever the settings.
+    distributions
+        Microfacet distributions that the model holds, of nodes that have them; others are shown as GGX.
+    """
+
+    names: Mapping[str, str] | None = None
+    held: Mapping[str, Any] = field(default_factory=dict)
+    shader: str = "principled"
+    settings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    nearest: bool = False
+    distributions: tuple[str, ...] = ()
+
+
+_GGX = ("GGX", "MULTI_GGX")
+KINDS: dict[str, LeafKind] = {
+    PRINCIPLED: LeafKind(),
+    DIFFUSE: LeafKind({"Base Color": "Color", "Diffuse Roughness": "Roughness"}, WITHOUT_SPECULAR),
+    "ShaderNodeBsdfAnisotropic": LeafKind(
+        {"Base Color": "Color", "Roughness": "Roughness"}, _METAL, "glossy", distributions=_GGX
+    ),
+    "ShaderNodeBsdfMetallic": LeafKind(
+        {
+            "Base Color": "Base Color",
+            "Roughness": "Roughness",
+            "Specular Tint": "Edge Tint",
+            "Anisotropic": "Anisotropy",
+            "Anisotropic Rotation": "Rotation",
+            **_FILM,
+        },
+        _METAL,
+        settings={"fresnel_type": ("F82",)},
+        distributions=_GGX,
+    ),
+    "ShaderNodeBsdfSheen": LeafKind(
+        {"Sheen Tint": "Color", "Sheen Roughness": "Roughness"},
+        {"Base Color": [0.0, 0.0, 0.0], "Sheen Weight": 1.0, **WITHOUT_SPECULAR},
+        settings={"distribution": ("MICROFIBER",)},
+    ),
+    "ShaderNodeBsdfGlass": LeafKind({**_CLEAR, **_FILM}, _GLASS, "glass", distributions=_GGX),
+    "ShaderNodeBsdfRefraction": LeafKind(_CLEAR, _GLASS, "refraction", distributions=("GGX",)),
+    "ShaderNodeBsdfTranslucent": LeafKind(_MATTE, {"Metallic": 0.0, "Alpha": 1.0}, "translucent"),
+    "ShaderNodeSubsurfaceScattering": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
+    "ShaderNodeBsdfToon": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
+    "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
+    "ShaderNodeBsdfHairPrincipled": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
+}
+EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
+# values of `all` that join only where the node has some of them already
+_WHERE_PRESENT = {
+    "Anisotropic": "Anisotropic",
+    "Anisotropic Rotation": "Anisotropic",
+    "Thin Film Thickness": "Thin Film Thickness",
+    "Thin Film IOR": "Thin Film Thickness",
+}
+
+
+def is_fitted(node: bpy.types.Node) -> bool:
+    """Whether the values of a node can be fitted: its model is exact, or it scatters below its surface."""
+    return node.bl_idname in KINDS and why_not_fitted(node) is None
+
+
+def why_not_fitted(node: bpy.types.Node) -> str | None:
+    """What keeps a shader node of a known kind from being fitted, as the end of a sentence; None if nothing does."""
+    kind = KINDS[node.bl_idname]
+    if kind.nearest and node.bl_idname != "ShaderNodeSubsurfaceScattering":
+        return "has lobes that the fit does not have"
+    wrong = _unknown_setting(node, kind)
+    if wrong is None:
+        return None
+    name, allowed = wrong
+    choices = " or ".join(_label(node, name, value) for value in allowed)
+    return f"is set to {_label(node, name, getattr(node, name))}, which the fit does not have: choose {choices}"
+
+
+def only_nearest(node: bpy.types.Node) -> bool:
+    """Whether a node of a known kind is held as a model that is only the nearest."""
+    kind = KINDS[node.bl_idname]
+    other = kind.distributions and node.distribution not in kind.distributions
+    return kind.nearest or bool(other) or _unknown_setting(node, kind) is not None
+
+
+def inputs_of(node: bpy.types.Node) -> dict[str, bpy.types.NodeSocket]:
+    """The sockets of a node of a known kind by what the Principled BSDF calls their values."""
+    own = {socket.name: socket for socket in node.inputs}  # those that are switched off are not found by name
+    names = KINDS[node.bl_idname].names
+    return own if names is None else {ours: own[theirs] for ours, theirs in names.items() if theirs in own}
+
+
+def default_names(values: Mapping[str, Any]) -> list[str]:
+    """Of the values that a node may have fitted those that `all` stands for; `values` by the names of `inputs_of`."""
+
+    def is_present(name: str) -> bool:
+        amount = _WHERE_PRESENT.get(name)
+        return amount is None or bool(values.get(amount, 0.0))
+
+    return [name for name in values if is_present(name)]
+
+
+def _unknown_setting(node: bpy.types.Node, kind: LeafKind) -> tuple[str, tuple[str, ...]] | None:
+    for name, allowed in kind.settings.items():
+        if getattr(node, name, allowed[0]) not in allowed:
+            return name, allowed
+    return None
+
+
+def _label(node: bpy.types.Node, name: str, value: str) -> str:
+    items = node.bl_rna.properties[name].enum_items
+    return items[value].name if value in items else value

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Mitsuba plugin `closure_tree`: a fitted material among held ones, each with a weight that may vary.
+
+Choose the variant before importing this. Properties are `fitted`, a nested `blender_principled`, and its `weight`;
+further `leaf_0`, `weight_0`, `leaf_1`, ... of the same plugin, which are held, and `clear_0`, `clear_weight_0`, ... ,
+colours of what passes straight through. Weights and colours are numbers, colours or textures. The surface is the sum of
+all, as Mix and Add Shader of Blender have it. Only the fitted material's values are shown by `mi.traverse`.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ..arrays.clamp import mean
+from .principled_plugin import BlenderPrincipled
+
+PLUGIN_NAME = "closure_tree"
+LEAST = 1e-3  # of the weights that choose a leaf: none has no chance where all are black
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A material and its weight, a number or a texture."""
+
+    material: BlenderPrincipled
+    weight: Any
+
+    def weight_at(self, si: Any, active: Any = True) -> Any:
+        """The weight at a surface point."""
+        return _at(self.weight, si, active)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """What is drawn of a tree at a surface point.
+
+    Where `is_held` it is `drawn`, or goes `straight`; elsewhere the fitted material draws by the number `u1`. `weight`
+    and `chance` are the fitted material's, `passes` (RGB) and `passing_chance` those of what goes straight through all
+    else, and `held` gives value and density of the held materials for a direction.
+    """
+
+    weight: Any
+    chance: Any
+    u1: Any
+    is_held: Any
+    straight: Any
+    drawn: Any
+    passes: Any
+    passing_chance: Any
+    held: Callable[[Any], tuple[Any, Any]]
+
+
+class ClosureTree(mi.BSDF):
+    """A weighted sum of Blender's materials and of what passes straight through."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        mi.BSDF.__init__(self, props)
+        self.fitted = Leaf(props["fitted"], _number(props.get("weight", 1.0)))
+        self.held = tuple(
+            Leaf(props[f"leaf_{k}"], _number(props.get(f"weight_{k}", 1.0))) for k in _counted(props, "leaf_")
+        )
+        self.clear = tuple(
+            (_colour(props[f"clear_{k}"]), _number(props.get(f"clear_weight_{k}", 1.0)))
+            for k in _counted(props, "clear_")
+        )
+        for leaf in self.leaves:
+            if not isinstance(leaf.material, BlenderPrincipled):
+                raise RuntimeError("a leaf of closure_tree is no blender_principled")
+        both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        components = [leaf.material.flags() for leaf in self.leaves]
+        if self.clear:
+            components.append(mi.BSDFFlags.Null | both)
+        self.m_components = components
+        flags = components[0]
+        for flag in components[1:]:
+            flags |= flag
+        self.m_flags = flags
+
+    @property
+    def leaves(self) -> tuple[Leaf, ...]:
+        """The fitted material and the held ones."""
+        return (self.fitted, *self.held)
+
+    @property
+    def is_opaque(self) -> bool:
+        """Whether light only returns from the side that it comes from, but for what the fitted material lets through.
+
+        A held material lets light through if it is glass, cut out or translucent.
+        """
+        return not self.clear and not any(_passes(leaf.material) for leaf in self.held)
+
+    @property
+    def model(self) -> Any:
+        """The fitted material's switches."""
+        return self.fitted.material.model
+
+    @property
+    def directions(self) -> Any:
+        """Normals and tangents that nodes give the fitted material."""
+        return self.fitted.material.directions
+
+    def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Show the fitted material."""
+        callback.put("fitted", self.fitted.material, mi.ParamFlags.Differentiable)
+
+    def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
+        """The fitted material's values at a surface point."""
+        return self.fitted.material.values_at(si, active)
+
+    def bumped_frame(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
+        """The frame of the fitted material's microfacets."""
+        return self.fitted.material.bumped_frame(si, active)
+
+    def directions_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
+        """The fitted material's normals at a surface point."""
+        return self.fitted.material.directions_at(si, active)
+
+    def held_value(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """f_r |cos| of the held materials with their weights, RGB."""
+        context, value = mi.BSDFContext(), mi.Color3f(0)
+        for leaf in self.held:
+            value += leaf.weight_at(si, active) * leaf.material.eval(context, si, wo, active)
+        return value
+
+    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """f_r |cos|, RGB."""
+        own = self.fitted.weight_at(si, active) * self.fitted.material.eval(ctx, si, wo, active)
+        return own + self.held_value(si, wo, active)
+
+    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """Density of `sample` per solid angle."""
+        return self.eval_pdf(ctx, si, wo, active)[1]
+
+    def eval_pdf(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
+    ) -> tuple[Any, Any]:
+        """`eval` and `pdf`, the layers evaluated once."""
+        return self._eval_pdf(self.leaves, self._chances(si, active)[0], ctx, si, wo, active)
+
+    def mixture(self, si: mi.SurfaceInteraction3f, u1: Any, u2: mi.Point2f, active: Any) -> Mixture:
+        """What is drawn at a surface point, and all that does not depend on the fitted material's values."""
+        ctx = mi.BSDFContext()
+        (chance, *held), through = self._chances(si, active)
+        straight = active & (u1 < through)
+        own = (u1 >= through) & (u1 < through + chance)
+        drawn, start = dr.zeros(mi.BSDFSample3f), through + chance
+        passes, passing_chance = self._clear(si, active), through
+        for each, leaf in zip(held, self.held, strict=True):
+            chosen = active & (u1 >= start)  # the last of them stays
+            start += each
+            sampled, _ = leaf.material.sample(ctx, si, _within(u1, start - each, each), u2, chosen)
+            drawn = dr.select(chosen, sampled, drawn)
+            if leaf.material.lobes.alpha:
+                passes += leaf.weight_at(si, active) * leaf.material.eval_null_transmission(si, active)
+                passing_chance = passing_chance + each * leaf.material.passing_chance(ctx, si, active)
+        straight |= active & (drawn.pdf > 0) & mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Null)
+        return Mixture(
+            weight=self.fitted.weight_at(si, active),
+            chance=chance,
+            u1=_within(u1, through, chance),
+            is_held=active & ~own,
+            straight=straight,
+            drawn=drawn,
+            passes=passes,
+            passing_chance=passing_chance,
+            held=lambda wo: self._eval_pdf(self.held, held, ctx, si, wo, active),
+        )
+
+    def sample(
+        self,
+        ctx: mi.BSDFContext,
+        si: mi.SurfaceInteraction3f,
+        sample1: Any,
+        sample2: mi.Point2f,
+        active: Any = True,
+    ) -> tuple[mi.BSDFSample3f, Any]:
+        """A direction of any leaf and value over density."""
+        mix, fitted = self.mixture(si, sample1, sample2, active), self.fitted.material
+        own, _ = fitted.sample(ctx, si, mix.u1, sample2, active & ~mix.is_held)
+        bs = dr.select(mix.is_held, mix.drawn, own)
+        straight = mix.straight | (~mix.is_held & (bs.pdf > 0) & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null))
+        value, density = self.eval_pdf(ctx, si, bs.wo, active)
+        passes, chance = mix.passes, mix.passing_chance
+        if fitted.lobes.alpha:
+            passes += mix.weight * fitted.eval_null_transmission(si, active)
+            chance += mix.chance * fitted.passing_chance(ctx, si, active)
+        density, value = dr.select(straight, chance, density), dr.select(straight, passes, value)
+        valid = active & ((bs.pdf > 0) | straight) & (density > 0)
+        bs.wo = dr.select(straight, -si.wi, bs.wo)
+        bs.pdf = dr.select(valid, density, 0)
+        bs.eta = mi.Float(1)
+        bs.sampled_type = dr.select(straight, mi.UInt32(+mi.BSDFFlags.Null), bs.sampled_type)
+        bs.sampled_component = mi.UInt32(0)
+        return bs, dr.select(valid, value / dr.maximum(density, 1e-30), 0)
+
+    def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
+        """Share of light that passes unchanged."""
+        value = self._clear(si, active)
+        for leaf in self.leaves:
+            if leaf.material.lobes.alpha:
+                value += leaf.weight_at(si, active) * leaf.material.eval_null_transmission(si, active)
+        return dr.select(active, value, 0)
+
+    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
+        """Base colour of the fitted material."""
+        return self.fitted.material.eval_diffuse_reflectance(si, active)
+
+    def to_string(self) -> str:
+        """Short description."""
+        return f"ClosureTree[{self.fitted.material.to_string()}, {len(self.held)} held, {len(self.clear)} clear]"
+
+    def _chances(self, si: mi.SurfaceInteraction3f, active: Any) -> tuple[list[Any], Any]:
+        """The probability of each leaf by its weight, and that of a straight passage."""
+        weights = [dr.maximum(dr.detach(leaf.weight_at(si, active)), 0) + LEAST for leaf in self.leaves]
+        through = dr.maximum(mean(dr.detach(self._clear(si, active))), 0) if self.clear else mi.Float(0)
+        scale = dr.rcp(sum(weights) + through)
+        return [weight * scale for weight in weights], through * scale
+
+    @staticmethod
+    def _eval_pdf(leaves: Any, chances: Any, ctx: Any, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        value, density = mi.Color3f(0), mi.Float(0)
+        for chance, leaf in zip(chances, leaves, strict=True):
+            f, p = leaf.material.eval_pdf(ctx, si, wo, active)
+            value += leaf.weight_at(si, active) * f
+            density += chance * p
+        return value, density
+
+    def _clear(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
+        value = mi.Color3f(0)
+        for colour, weight in self.clear:
+            value += _at(weight, si, active) * mi.Color3f(
+                colour.eval(si, active) if isinstance(colour, mi.Texture) else colour
+            )
+        return value
+
+
+def _within(u1: Any, start: Any, length: Any) -> Any:
+    """A number of an interval as one of 0 to 1."""
+    return dr.clip((u1 - start) / dr.maximum(length, 1e-12), 0, dr.one_minus_epsilon(mi.Float))
+
+
+def _passes(material: BlenderPrincipled) -> bool:
+    return material.lobes.transmission or material.lobes.alpha or material.model.shader == "translucent"
+
+
+def _counted(props: mi.Properties, prefix: str) -> Iterator[int]:
+    count = 0
+    while f"{prefix}{count}" in props:
+        yield count
+        count += 1
+
+
+def _number(value: Any) -> Any:
+    return value if isinstance(value, mi.Texture) else dr.opaque(mi.Float, float(value))
+
+
+def _colour(value: Any) -> Any:
+    if isinstance(value, mi.Texture):
+        return value
+    colour = mi.Color3f(value)
+    dr.make_opaque(colour)
+    return colour
+
+
+def _at(value: Any, si: Any, active: Any) -> Any:
+    return value.eval_1(si, active) if isinstance(value, mi.Texture) else value
+
+
+def register() -> None:
+    """Make `closure_tree` known to Mitsuba in the current variant."""
+    mi.register_bsdf(PLUGIN_NAME, ClosureTree)

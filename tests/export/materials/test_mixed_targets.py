@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shaders other than the Principled BSDF, and mixes of several, as targets: our picture of the truth against Cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from ..scenes import add_camera, new_material  # noqa: E402
+from .test_node_graphs import ball, lit_scene, recorded_and_cycles, renderer_and_cycles  # noqa: E402
+
+Build = Callable[[Any], Any]  # a tree to the output socket of its surface
+
+
+def shader(kind: str, settings: dict[str, str] | None = None, **inputs: Any) -> Build:
+    """A shader node with values on its sockets, spaces as underscores."""
+
+    def build(tree: Any) -> Any:
+        node = tree.nodes.new(f"ShaderNode{kind}")
+        for name, value in (settings or {}).items():
+            setattr(node, name, value)
+        for name, value in inputs.items():
+            socket = node.inputs[name.replace("_", " ")]
+            socket.default_value = (*value, 1.0) if socket.type == "RGBA" else value
+        return node.outputs[0]
+
+    return build
+
+
+def fresnel(tree: Any) -> Any:
+    return tree.nodes.new("ShaderNodeFresnel").outputs[0]
+
+
+def noise(tree: Any) -> Any:
+    node, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+    node.inputs["Scale"].default_value = 3.0
+    low, high = ramp.color_ramp.elements
+    low.position, high.position = 0.45, 0.55
+    tree.links.new(node.outputs[0], ramp.inputs[0])
+    return ramp.outputs[0]
+
+
+def mix(factor: float | Callable[[Any], Any], first: Build | None, second: Build | None) -> Build:
+    def build(tree: Any) -> Any:
+        node = tree.nodes.new("ShaderNodeMixShader")
+        if callable(factor):
+            tree.links.new(factor(tree), node.inputs[0])
+        else:
+            node.inputs[0].default_value = factor
+        for number, side in ((1, first), (2, second)):
+            if side is not None:
+                tree.links.new(side(tree), node.inputs[number])
+        return node.outputs[0]
+
+    return build
+
+
+def add(first: Build, second: Build) -> Build:
+    def build(tree: Any) -> Any:
+        node = tree.nodes.new("ShaderNodeAddShader")
+        tree.links.new(first(tree), node.inputs[0])
+        tree.links.new(second(tree), node.inputs[1])
+        return node.outputs[0]
+
+    return build
+
+
+def material_of(build: Build) -> Any:
+    material = new_material("Target")
+    tree = material.node_tree
+    output = tree.get_output_node("CYCLES")
+    tree.nodes.remove(output.inputs["Surface"].links[0].from_node)
+    tree.links.new(build(tree), output.inputs["Surface"])
+    return material
+
+
+RED, BLUE, GOLD = (0.7, 0.1, 0.05), (0.05, 0.2, 0.6), (0.9, 0.6, 0.3)
+GLOSSY = shader("BsdfAnisotropic", Color=GOLD, Roughness=0.4)
+DIFFUSE = shader("BsdfDiffuse", Color=RED)
+PLASTIC = shader("BsdfPrincipled", Base_Color=BLUE, Roughness=0.45)
+METAL = shader("BsdfPrincipled", Base_Color=GOLD, Roughness=0.35, Metallic=1.0)
+SHEEN = shader("BsdfSheen", Color=RED, Roughness=0.4)
+GLOW = shader("Emission", Color=BLUE, Strength=0.3)
+CASES = {
+    "glossy": GLOSSY,
+    "single scattering": shader("BsdfAnisotropic", {"distribution": "GGX"}, Color=GOLD, Roughness=0.6),
+    "metallic": shader("BsdfMetallic", Base_Color=GOLD, Edge_Tint=RED, Roughness=0.35),
+    "sheen": SHEEN,
+    "diffuse under a fresnel": mix(fresnel, DIFFUSE, GLOSSY),
+    "two by a mask": mix(noise, PLASTIC, METAL),
+    "a constant mix": mix(0.3, PLASTIC, DIFFUSE),
+    "beyond the ends": mix(1.7, DIFFUSE, GLOSSY),
+    "half black": mix(0.4, DIFFUSE, None),
+    "added": add(DIFFUSE, shader("BsdfAnisotropic", Color=(0.2, 0.2, 0.2), Roughness=0.3)),
+    "three and a glow": add(mix(noise, DIFFUSE, mix(0.5, GLOSSY, SHEEN)), mix(noise, GLOW, None)),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str) -> None:
+    lit_scene(scene)
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material_of(CASES[name])))
+    level, rms = found.mean() / truth.mean() - 1.0, np.sqrt(np.mean((found - truth) ** 2)) / truth.mean()
+    assert abs(level) < 0.003
+    assert rms < 0.025  # of highlights, at 16 rays a pixel
+
+
+CLEAR = shader("BsdfTransparent", Color=(0.9, 0.9, 0.9))
+CASES_OF_PATHS = {
+    "glass": shader("BsdfGlass", Color=GOLD, Roughness=0.3),
+    "translucent": mix(0.5, DIFFUSE, shader("BsdfTranslucent", Color=GOLD)),
+}
+
+
+@pytest.mark.parametrize("name", CASES_OF_PATHS)
+def test_pictures_of_whole_paths_are_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str
+) -> None:
+    """Under a plain world, by the path tracer that judges results and by that of the fit."""
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.types.errors import UnrecordableError
+
+    from ..scenes import add_quad, diffuse_material
+
+    scene.render.resolution_x = scene.render.resolution_y = 24
+    add_camera("PERSP", location=(0.0, -4.0, 0.0), rotation=(1.5708, 0.0, 0.0))
+    scene.cycles.samples = 1024
+    for kind in ("max", "diffuse", "glossy", "transmission"):
+        setattr(scene.cycles, f"{kind}_bounces", 6)
+    scene.world = bpy.data.worlds.new("World")
+    if scene.world.node_tree is None:
+        scene.world.use_nodes = True
+    sky = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    sky.inputs["Color"].default_value = (0.6, 0.8, 1.0, 1.0)
+    add_quad("Floor", 6.0, -1.2, diffuse_material("Floor", (0.5, 0.2, 0.1)))
+    target = ball(material_of(CASES_OF_PATHS[name]))
+    found, truth = renderer_and_cycles(export, render_cycles, target)
+    mask = found.target_mask()
+    with pytest.raises(UnrecordableError):
+        RecordedScene(found, int(mask.sum())).record(found.start, grid=1, seed=0, near=True)
+    judged = found.image(found.start, seed=0, spp=512)[mask]
+    traced = TracedPaths(found).images(
+        np.asarray(found.start), np.flatnonzero(mask), seed=0, samples=512, jacobian=False
+    )[0, :, :, 0]
+    for shown in (judged, traced):
+        level = shown.mean() / truth[mask].mean() - 1.0
+        rms = np.sqrt(np.mean((shown - truth[mask]) ** 2)) / truth[mask].mean()
+        assert abs(level) < 0.01
+        assert rms < 0.05
