@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Collection, Iterator
+import functools
+from collections.abc import Collection
 from pathlib import Path
 
 import pytest
@@ -21,16 +22,19 @@ BACKEND_FILES = sorted((ROOT / "mfo_backend").rglob("*.py"))
 ADDON_FILES = [ROOT / "__init__.py", *sorted((ROOT / "blender_addon").rglob("*.py"))]
 
 
-def imports_of(path: Path, package_root: Path) -> Iterator[str]:
+@functools.cache
+def imports_of(path: Path, package_root: Path) -> tuple[str, ...]:
     """Absolute dotted names of everything `path` imports, relative imports resolved against `package_root`'s parent."""
     package = path.relative_to(package_root.parent).with_suffix("").parts
+    names: list[str] = []
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level] if node.level else ()
             module = ".".join([*base, *([node.module] if node.module else [])])
-            yield from (f"{module}.{alias.name}" for alias in node.names)
+            names += [f"{module}.{alias.name}" for alias in node.names]
+    return tuple(names)
 
 
 def short(path: Path) -> str:
