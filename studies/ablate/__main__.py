@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fit the same scenes with each rule switched off and say what changes.
 
-    python -m studies.ablate [--rules NAME ...] [--scenes base=20 noise=20 parameters=10 transparency_4spp=6 hard=24]
+    python -m studies.ablate [--rules NAME ...] [--scenes base=20 noise=20 parameters=10 transparency_4spp=6 cycles=6 hard=24]
         [--size 64] [--most 100000] [--rows ablations.jsonl] [--doc docs/notebook/ablations.md]
 
 The rules are those of `rules.py`, the scenes those of `mfo bench` and its hard cases: truths and starts are drawn at
@@ -24,7 +24,7 @@ from .page import page
 from .rules import RULES, switched_off
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = {"base": 20, "noise": 20, "parameters": 10, "transparency_4spp": 6, "hard": 24}
+SCENES = {"base": 20, "noise": 20, "parameters": 10, "transparency_4spp": 6, "cycles": 6, "hard": 24}
 ALL_ON = ""
 
 

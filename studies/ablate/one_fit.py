@@ -21,7 +21,9 @@ from mfo_backend.bench.scenes.assets import Assets
 from mfo_backend.bench.scenes.hard_cases import HARD_CASES
 from mfo_backend.bench.scenes.scenario import SCENARIOS
 from mfo_backend.bench.scenes.scene import TABLES
+from mfo_backend.cli.blender_host import BlenderHost, find_blender_host
 from mfo_backend.types.certainty import Level
+from mfo_backend.types.errors import SetupError
 
 METHOD = "balanced"
 
@@ -31,7 +33,7 @@ class OneFit:
 
     def __init__(self, folder: Path, size: int) -> None:
         self._folder, self._size = folder, size
-        self._runner = FitRunner(folder, size, Assets(None))
+        self._runner = FitRunner(folder, size, Assets(None), host=_blender())
         for name in ("picture", "difference_of", "reference_flip", "relit", "flip"):
             _remembered(name)
 
@@ -60,6 +62,14 @@ class OneFit:
             "seconds": None if row.processor_seconds is None else round(row.processor_seconds, 2),
             "raised": row.error,
         }
+
+
+def _blender() -> BlenderHost | None:
+    """A Blender for scenes of Cycles, or None where there is none."""
+    try:
+        return find_blender_host()
+    except SetupError:
+        return None
 
 
 def _wrong(row: Row) -> list[str]:

@@ -12,7 +12,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
-EXACT, SAMPLED, TRACED, HARD = ("base", "parameters"), ("noise",), ("transparency_4spp",), ("hard",)
+EXACT, SAMPLED, TRACED, HARD = ("base", "parameters"), ("noise", "cycles"), ("transparency_4spp",), ("hard",)
 
 
 @dataclass(frozen=True)
