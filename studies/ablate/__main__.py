@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fit the same scenes with each rule switched off and say what changes.
 
-    python -m studies.ablate [--rules NAME ...] [--scenes base=20 noise=20 parameters=10 transparency_4spp=6 cycles=6 hard=24]
-        [--size 64] [--most 100000] [--rows ablations.jsonl] [--doc docs/notebook/ablations.md]
+    python -m studies.ablate [--rules NAME ...]
+        [--scenes base=20 noise=20 parameters=10 transparency_4spp=6 cycles=6 hard=24] [--size 64] [--most 100000]
+        [--rows ablations.jsonl] [--doc docs/notebook/ablations.md]
 
 The rules are those of `rules.py`, the scenes those of `mfo bench` and its hard cases: truths and starts are drawn at
 random and do not depend on each other. The preset is `balanced`. Every fit is a line of the rows' file, so a run that
 was stopped goes on where it was. A scene is fitted once for nothing, so that all its kernels are there, then with
-every rule on, then with each one off. The page is written anew from the rows after each run.
+every rule on, then with each one off. The page's table is written anew from the rows after each run.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from .rules import RULES, switched_off
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = {"base": 20, "noise": 20, "parameters": 10, "transparency_4spp": 6, "cycles": 6, "hard": 24}
 ALL_ON = ""
+SAID = "\n## "  # what people have written below the table is kept
 
 
 def main() -> None:
@@ -59,7 +61,8 @@ def main() -> None:
                 with chosen.rows.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(row | {"size": chosen.size, "commit": commit.strip()}) + "\n")
                 written += 1
-    chosen.doc.write_text(page(rows_of(chosen.rows)), "utf-8")
+    _, heading, said = chosen.doc.read_text("utf-8").partition(SAID) if chosen.doc.exists() else ("", "", "")
+    chosen.doc.write_text(page(rows_of(chosen.rows)) + heading + said, "utf-8")
 
 
 def rows_of(path: Path) -> list[dict]:

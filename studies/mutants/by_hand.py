@@ -24,7 +24,11 @@ WRONG = [
     ),
     ("mfo_backend/fit/squares/recording_noise.py", "MOST_TAKEN * own_near) - own_near", "MOST_TAKEN * own_near)"),
     # a colour's alpha becomes 1 with Apply
-    ("blender_addon/result/write_back.py", "return (*map(float, color), held[3])", "return (*map(float, color), 1.0)"),
+    (
+        "blender_addon/graph_values/place.py",
+        "return (*map(float, color), *kept[3:])",
+        "return (*map(float, color), *(1.0 for _ in kept[3:]))",
+    ),
     # Revert leads to what an earlier fit applied
     ("blender_addon/result/write_back.py", "if name not in kept.originals:", "if True:"),
     # the end of a line that was too long counts as a line of its own
