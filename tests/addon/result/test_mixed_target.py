@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials that mix shaders: which leaf is fitted, where its values are written, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+JOB = Path("job")
+
+
+@pytest.fixture
+def mixed(scene: SimpleNamespace) -> SimpleNamespace:
+    """A Mix of the material's Principled BSDF (0.7) and a Glossy BSDF (0.3)."""
+    material = scene.bpy.data.materials["Glaze"]
+    tree, output = material.node_tree, material.node_tree.get_output_node("CYCLES")
+    mix, glossy = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfAnisotropic")
+    principled = output.inputs["Surface"].links[0].from_node
+    mix.inputs[0].default_value = 0.3
+    tree.links.new(principled.outputs[0], mix.inputs[1])
+    tree.links.new(glossy.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    return SimpleNamespace(
+        bpy=scene.bpy, material=material, tree=tree, mix=mix, glossy=glossy, principled=principled, output=output
+    )
+
+
+def shares(material) -> dict[str, float]:
+    from blender_addon.export.nodes.closure_leaves import closure_leaves
+
+    return {leaf.node.name: round(leaf.share, 3) for leaf in closure_leaves(material)}
+
+
+def test_leaves_and_shares(mixed: SimpleNamespace) -> None:
+    from blender_addon.export.nodes.target_shader import target_shader
+
+    tree, mix = mixed.tree, mixed.mix
+    assert shares(mixed.material) == {"Principled BSDF": 0.7, "Glossy BSDF": 0.3}
+    assert target_shader(mixed.material).node == mixed.principled  # of the larger share
+    mix.inputs[0].default_value = 1.7  # as Cycles clamps it
+    assert shares(mixed.material) == {"Glossy BSDF": 1.0}
+    mix.inputs[0].default_value = -0.5
+    assert shares(mixed.material) == {"Principled BSDF": 1.0}
+    mix.inputs[0].default_value = 0.25
+    tree.links.remove(mix.inputs[1].links[0])
+    assert shares(mixed.material) == {"Glossy BSDF": 0.25}  # the other side is black
+    add = tree.nodes.new("ShaderNodeAddShader")
+    for side in add.inputs:
+        tree.links.new(mix.outputs[0], side)
+    tree.links.new(add.outputs[0], mixed.output.inputs["Surface"])
+    assert shares(mixed.material) == {"Glossy BSDF": 0.5}  # reached in two ways
+    add.mute = True
+    assert shares(mixed.material) == {"Glossy BSDF": 0.25}
+
+
+@pytest.mark.parametrize(("shader", "names"), [("", ["Roughness"]), ("Glossy BSDF", ["Roughness"])])
+def test_the_chosen_leaf_is_exported(scene: SimpleNamespace, mixed: SimpleNamespace, shader: str, names: list) -> None:
+    mixed.bpy.ops.mfo.fit(
+        reference=scene.reference, job_folder=scene.job, parameters="Roughness", max_iterations=3, shader=shader
+    )
+    request = json.loads((Path(scene.job) / "request.json").read_text("utf-8"))
+    target, material = request["target"], request["materials"]["target_bsdf"]
+    assert target["node"] == [shader or "Principled BSDF"]
+    assert target["labels"] == ({"base_color": "Color"} if shader else {})
+    assert material.get("shader", "principled") == ("glossy" if shader else "principled")
+    assert material["weight"]["value"] == pytest.approx(0.3 if shader else 0.7)
+    (other,) = material["leaves"]
+    assert other["name"] == ("Principled BSDF" if shader else "Glossy BSDF")
+    assert request["fit"]["parameters"] in (["roughness"], ["Roughness"])
+
+
+def test_values_go_to_the_leaf_and_back(mixed: SimpleNamespace) -> None:
+    from blender_addon.result.write_back import apply_values, revert_values, toggle_values
+
+    glossy, principled = mixed.glossy.inputs, mixed.principled.inputs
+    before = (tuple(glossy["Color"].default_value), glossy["Roughness"].default_value)
+    own = principled["Roughness"].default_value
+    values = {"Base Color": (0.5, 0.25, 0.125), "Roughness": 0.625}
+    assert apply_values(mixed.material, values, JOB, leaf="Glossy BSDF") == []
+    assert tuple(glossy["Color"].default_value)[:3] == pytest.approx((0.5, 0.25, 0.125), abs=1e-6)
+    assert (glossy["Roughness"].default_value, principled["Roughness"].default_value) == (0.625, own)
+    assert apply_values(mixed.material, {"Roughness": 0.125}, JOB, leaf="Principled BSDF") == []
+    assert (glossy["Roughness"].default_value, principled["Roughness"].default_value) == (0.625, 0.125)
+    toggle_values(mixed.material)
+    assert (glossy["Roughness"].default_value, principled["Roughness"].default_value) == (before[1], own)
+    toggle_values(mixed.material)
+    assert revert_values(mixed.material) == []
+    assert (tuple(glossy["Color"].default_value), glossy["Roughness"].default_value) == before
+    assert principled["Roughness"].default_value == own
+
+
+def test_a_wrong_leaf_is_one_sentence(mixed: SimpleNamespace) -> None:
+    ops = mixed.bpy.ops.mfo
+    with pytest.raises(
+        RuntimeError, match="has no shader 'Velvet' that can be fitted: give one of 'Principled BSDF', 'G"
+    ):
+        ops.choose_shader(shader="Velvet")
+    assert ops.choose_shader(shader="Glossy BSDF") == {"FINISHED"}
+    assert mixed.material.mfo.leaf == "Glossy BSDF"
+
+
+def test_a_circle_is_one_sentence(mixed: SimpleNamespace) -> None:
+    from blender_addon.export.nodes.target_shader import target_shader, why_no_target
+
+    mixed.tree.links.new(mixed.mix.outputs[0], mixed.mix.inputs[2])
+    assert target_shader(mixed.material) is None
+    assert "in a circle" in why_no_target(mixed.material)
+
+
+def test_a_group_without_output_is_one_sentence(mixed: SimpleNamespace) -> None:
+    from blender_addon.export.nodes.target_shader import target_shader, why_no_target
+
+    group = mixed.tree.nodes.new("ShaderNodeGroup")
+    inner = mixed.bpy.data.node_groups.new("Empty", "ShaderNodeTree")
+    inner.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+    group.node_tree = inner
+    mixed.tree.links.new(group.outputs[0], mixed.output.inputs["Surface"])
+    assert target_shader(mixed.material) is None
+    assert "has no Principled BSDF" in why_no_target(mixed.material)
+
+
+def test_what_has_no_model_is_named(mixed: SimpleNamespace) -> None:
+    from blender_addon.export.nodes.target_shader import why_no_target
+
+    for kind, said in (
+        ("ShaderNodeBsdfToon", "has lobes that the fit does not have"),
+        ("ShaderNodeHoldout", "Holdout"),
+    ):
+        node = mixed.tree.nodes.new(kind)
+        mixed.tree.links.new(node.outputs[0], mixed.output.inputs["Surface"])
+        assert said in why_no_target(mixed.material)
+    velvet = mixed.tree.nodes.new("ShaderNodeBsdfSheen")
+    velvet.distribution = "ASHIKHMIN"
+    mixed.tree.links.new(velvet.outputs[0], mixed.output.inputs["Surface"])
+    assert "choose Microfiber" in why_no_target(mixed.material)

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shader nodes other than the Principled BSDF as lobes of its model, case by case against the Cycles of `bpy`."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mfo_backend.material.cycles_model import cycles_model
+from mfo_backend.material.principled.blender_principled import blender_principled
+
+from .. import parity
+
+pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="the bpy module is not installed")
+MATERIALS = 60
+COLOUR = {"base_color": "Color", "roughness": "Roughness"}
+CLEAR = {**COLOUR, "ior": "IOR"}
+GLASS = ({**parity.BASE, "ior": (1.05, 2.5)}, {"transmission_weight": 1.0})
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node, what it calls our values, and what our model has to be told."""
+
+    kind: str
+    names: dict[str, str]
+    group: parity.Group
+    distribution: str = "MULTI_GGX"
+    shader: str = "principled"
+
+
+METAL = {**parity.BASE, "specular_tint": (0.0, 1.0), **parity.TURN}
+NODES = (
+    Node("BsdfAnisotropic", COLOUR, parity.Group("glossy", parity.BASE, {"metallic": 1.0}), shader="glossy"),
+    Node("BsdfAnisotropic", COLOUR, parity.Group("glossy, GGX", parity.BASE, {"metallic": 1.0}), "GGX", "glossy"),
+    Node(
+        "BsdfMetallic",
+        {
+            "base_color": "Base Color", "specular_tint": "Edge Tint", "roughness": "Roughness",
+            "anisotropic": "Anisotropy", "anisotropic_rotation": "Rotation",
+        },
+        parity.Group("metallic", METAL, {"metallic": 1.0}),
+    ),
+    Node(
+        "BsdfSheen",
+        {"sheen_tint": "Color", "sheen_roughness": "Roughness"},
+        parity.Group(
+            "sheen",
+            {"sheen_roughness": (0.1, 1.0), "sheen_tint": (0.0, 1.0)},
+            {"sheen_weight": 1.0, "base_color": 0.0, "specular_ior_level": 0.0},
+        ),
+        "MICROFIBER",
+    ),
+    Node("BsdfGlass", CLEAR, parity.Group("glass", *GLASS), shader="glass"),
+    Node("BsdfGlass", CLEAR, parity.Group("glass, through", *GLASS, refracted=True), "GGX", "glass"),
+    Node("BsdfRefraction", CLEAR, parity.Group("refraction", *GLASS, refracted=True), "GGX", "refraction"),
+    Node("BsdfRefraction", CLEAR, parity.Group("refraction, above", *GLASS), "GGX", "refraction"),
+    Node(
+        "BsdfTranslucent",
+        {"base_color": "Color"},
+        parity.Group("translucent", {"base_color": (0.0, 1.0)}, {}, refracted=True),
+        shader="translucent",
+    ),
+)  # fmt: skip
+
+
+@cache
+def answers() -> dict[str, tuple[parity.Cases, Any]]:
+    cases = [parity.random_cases(node.group, MATERIALS, seed) for seed, node in enumerate(NODES)]
+    batches = []
+    for node, drawn in zip(NODES, cases, strict=True):
+        sockets = {node.names[name]: value for name, value in drawn.values.items() if name in node.names}
+        asked = {"view": drawn.view, "light": drawn.light, "sockets": sockets}
+        batches.append({**asked, "node": f"ShaderNode{node.kind}", "distribution": node.distribution})
+    found = parity.ask_cycles(batches)
+    return {node.group.name: (c, a) for node, c, a in zip(NODES, cases, found, strict=True)}
+
+
+@pytest.mark.parametrize("node", NODES, ids=lambda node: node.group.name)
+def test_value_is_that_of_cycles(node: Node) -> None:
+    import drjit as dr
+
+    cases, theirs = answers()[node.group.name]
+    vector, number = dr.llvm.ad.Array3f, dr.llvm.ad.Float
+    parameters = {
+        name: vector(*(number(value[:, k]) for k in range(3))) if value.ndim == 2 else number(value)
+        for name, value in cases.values.items()
+    }
+    view, light = (vector(*(number(d[:, k]) for k in range(3))) for d in (cases.view, cases.light))
+    distribution = node.distribution if "GGX" in node.distribution else "MULTI_GGX"
+    model = cycles_model((5, 0), distribution, node.shader)
+    ours = np.array(blender_principled(parameters, view, light, model=model), float).T
+    error = parity.relative_difference(ours, theirs)
+    assert np.quantile(error, 0.99) < 3e-5, np.sort(error)[-20:]
+    assert error.max() < 3e-4
+    assert (theirs.max() > 0.0) == (node.group.name != "refraction, above")
