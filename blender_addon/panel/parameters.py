@@ -113,6 +113,7 @@ def _draw_node_value(
     text, icon = value.name.rpartition("/")[2], "CHECKBOX_HLT" if is_chosen else "LOCKED"
     split.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen).name = value.name
     if not is_there(tree, value.place):
+        split.label(text="new node")
         return
     owner, attribute = holder_of(tree, value.place)
     split.row(align=True).prop(owner, attribute, text="", index=max(value.place.component, -1))

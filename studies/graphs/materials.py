@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 Build = Callable[[Any, Any], None]  # node tree, Principled node
 
 
@@ -131,10 +133,26 @@ def mixed(tree: Any, node: Any) -> None:
     tree.links.new(mix.outputs[2], node.inputs["Base Color"])
 
 
+def picture(tree: Any, node: Any) -> None:
+    """A picture of coloured blocks over generated coordinates, as colour and as roughness."""
+    import bpy
+
+    blocks = np.random.default_rng(5).uniform(0.1, 0.7, (16, 16, 3)).repeat(4, axis=0).repeat(4, axis=1)
+    image = bpy.data.images.new("Blocks", 64, 64, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(np.concatenate([blocks, np.ones((64, 64, 1))], axis=2).astype(np.float32).ravel())
+    image.pack()
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], texture.inputs["Vector"])
+    for name in ("Base Color", "Roughness"):
+        tree.links.new(texture.outputs["Color"], node.inputs[name])
+
+
 GRAPHS: dict[str, Build] = {
     build.__name__: build
     for build in (
         ramp, roughness, metallic, low_bump, bump, coat_bump, wave_bump, hue, facing, brushed, gradient, checker,
-        scale, mixed,
+        scale, mixed, picture,
     )
 }  # fmt: skip

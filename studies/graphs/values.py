@@ -25,9 +25,11 @@ FITTED: dict[str, tuple[str, ...]] = {
     "gradient": ("Map Range/To Min", "Map Range/To Max", "Base Color"),
     "checker": ("Checker Texture/Color1", "Checker Texture/Color2", "Roughness"),
     "scale": ("Noise Texture/Scale", "Color Ramp/Stop 0", "Color Ramp/Stop 1"),
+    "picture": ("Base Color/Gain", "Base Color/Offset", "Roughness/Gain", "Roughness/Offset"),
     "mixed": ("Mix/Factor", "Mix/B", "Brightness Contrast/Contrast", "Roughness"),
 }
 SOCKETS = {"Base Color": (0.05, 0.9), "Metallic": (0.0, 1.0), "Roughness": (0.15, 0.8)}
+TINTS = {"Gain": (0.5, 1.5), "Offset": (-0.05, 0.1)}  # of pictures; their own ranges are far wider
 WITHIN = (0.1, 0.9)  # of a value's range, the truth and the start are drawn from
 
 
@@ -83,6 +85,8 @@ class Drawn:
     def _limits(self, name: str) -> tuple[float, float]:
         if name not in self._inside:
             return SOCKETS[name]
+        if name.rpartition("/")[2] in TINTS:
+            return TINTS[name.rpartition("/")[2]]
         return self._inside[name].range.lower, self._inside[name].range.upper
 
     def _one(self, name: str, seed: random.Random, near: Any) -> Any:
