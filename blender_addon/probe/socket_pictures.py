@@ -25,6 +25,11 @@ from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
 DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
+# Cycles says the second on its stderr alone, and shows nothing
+NOT_SEEN = (
+    "The camera does not see '{obj}', or the nodes of '{material}' are too many for Cycles to evaluate at once: move it "
+    "into the picture, or leave nodes out."
+)
 SEEN = 0.05  # share of a subpixel's samples on the target from which on it has a value
 
 
@@ -68,7 +73,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     mask = found[MASK]
     seen = mask[..., 0] > SEEN
     if not seen.any():
-        raise ProbeRequestError(f"The camera does not see '{obj.name}': move it into the picture.")
+        raise ProbeRequestError(NOT_SEEN.format(obj=obj.name, material=material.name))
     folder = Path(request["folder"])
     leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
     for number, each in enumerate(outputs):

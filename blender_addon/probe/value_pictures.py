@@ -19,7 +19,7 @@ from ..graph_values.place import Place, write
 from .aov_render import Frame, frame_of, world_to_frame
 from .graph_copy import own_copy, remove_copy, variant_of
 from .server import ProbeRequestError
-from .socket_pictures import MASK, POSITION, SEEN, Target, cleaned, make_opaque, widen_bumps, write_outputs
+from .socket_pictures import MASK, NOT_SEEN, POSITION, SEEN, Target, cleaned, make_opaque, widen_bumps, write_outputs
 
 # of the nodes in one render: more overflow the memory that Cycles has for a material's nodes, at 128 noises all of it
 MOST_VARIANTS = 32
@@ -76,7 +76,7 @@ def _all(
         if not seen.any():  # Cycles shows nothing of a material that is too large for it
             if most > 1:
                 raise _TooManyError
-            raise ProbeRequestError(f"The camera does not see '{target.obj.name}': move it into the picture.")
+            raise ProbeRequestError(NOT_SEEN.format(obj=target.obj.name, material=target.material.name))
         kinds = _kinds(target.material, request["node"])
         for k, (_, names) in enumerate(some):
             files.append({})

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...metrics.display.tone_mapping import View
 from ...render.models.graph_pictures import GraphPictures
 from ...render.sheet.contact_sheet import ContactSheet
-from ...types.errors import UnrecordableError
+from ...types.errors import BadInputError, UnrecordableError
 from ...types.event import Event, Listener, Preview
 from ...types.image import Image, Pixels
 from ...types.parameter_bounds import narrowed
@@ -223,6 +223,11 @@ def _fit_scene(
         fitted = fit(InterruptibleRenderer(renderer_of(renderers, together), thread), together)
     else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
         renderers = load(lambda material: material, fit_of.parameters)
+        if graph is not None and (refused := graph.refusal()) is not None:
+            if not fit_of.parameters:
+                raise BadInputError(refused)
+            notes = (*notes, f"Values inside nodes stayed as they were. {refused}")
+            renderers = load(lambda material: material, fit_of.parameters, None)
         together = task_of(renderers)
         fitted = fit(renderer_of(renderers, together), together)
         table = renderers[0].table

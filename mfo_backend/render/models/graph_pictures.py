@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...material.principled.principled_dict import DIRECTIONS
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
+from ...types.errors import BadInputError
 from ...types.node_value import NodeValue, table_of
 from ...types.parameter import Value, Vector
 
@@ -136,6 +137,14 @@ class GraphPictures:
         found = self._evaluate(variants, scale=self._scale, samples=1)
         seen = np.isfinite(found.positions).all(axis=2).ravel()
         return [{name_of(s): _flat(picture, seen) for s, picture in pictures.items()} for pictures in found.pictures]
+
+    def refusal(self) -> str | None:
+        """Why the nodes cannot be evaluated, as a sentence; None where they can."""
+        try:
+            self.settle(self.table.pack({}))
+        except BadInputError as error:
+            return str(error)
+        return None
 
     def settle(self, vector: Vector) -> None:
         """Evaluate the nodes at this vector, from where nearby states are extrapolated from now on."""

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mfo_backend.render.models.graph_pictures import Evaluated, GraphPictures, Variant
+from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.node_value import NodeValue
 
 NOISE = np.random.default_rng(0).uniform(0.0, 1.0, (6, 8, 1)).astype(np.float32)
@@ -96,3 +97,12 @@ def test_finer_pictures_are_kept() -> None:
     assert nodes.variants == []
     np.testing.assert_allclose(pictures.fine(at + 0.25)["roughness"], NOISE**1.25, rtol=1e-6)
     assert nodes.variants == [1]
+
+
+def test_nodes_that_cannot_be_evaluated_are_known_before_the_fit() -> None:
+    def refuses(variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+        raise BadInputError("Too many nodes.")
+
+    pictures = GraphPictures((value("Mix/A", 0.5, ("Base Color",)),), refuses, ("Base Color",))
+    assert pictures.refusal() == "Too many nodes."
+    assert graph(Nodes()).refusal() is None
