@@ -27,8 +27,8 @@ MASK, POSITION = "mfo mask", "mfo position"
 DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
 # Cycles says the second on its stderr alone, and shows nothing
 NOT_SEEN = (
-    "The camera does not see '{obj}', or the nodes of '{material}' are too many for Cycles to evaluate at once: move it "
-    "into the picture, or leave nodes out."
+    "The camera does not see '{obj}', or the nodes of '{material}' are too many for Cycles to evaluate at once: move "
+    "it into the picture, or leave nodes out."
 )
 SEEN = 0.05  # share of a subpixel's samples on the target from which on it has a value
 
