@@ -22,6 +22,7 @@ _CAPTIONS = {
     "difference": ("Difference", "FLIP of reference and result"),
 }
 _ERROR_NAMES = {"flip": "FLIP", "hdr_flip": "HDR-FLIP", "mse": "MSE"}
+_SPLIT_BYTES = 2_000_000  # of two pictures that are in the file a second time
 _TONES = {Status.FAILED: "bad", Status.CANCELLED: "warn"}
 _VERDICT_TONES = {Verdict.SAME: "good", Verdict.CLOSE: "warn", Verdict.DIFFERENT: "bad"}
 
@@ -125,7 +126,7 @@ def _all_pictures(content: ReportContent) -> str:
 
 
 def _pictures(pictures: Mapping[str, bytes]) -> str:
-    shown = []
+    shown = [_split(pictures)]
     for name, (title, words) in _CAPTIONS.items():
         if name in pictures:
             data = base64.b64encode(pictures[name]).decode("ascii")
@@ -137,6 +138,22 @@ def _pictures(pictures: Mapping[str, bytes]) -> str:
     return "".join(shown)
 
 
+def _split(pictures: Mapping[str, bytes]) -> str:
+    """Reference and result over each other with an edge to drag, by CSS alone; not of files that would grow large."""
+    pair = [pictures[name] for name in ("reference", "result") if name in pictures]
+    if len(pair) < 2 or sum(map(len, pair)) > _SPLIT_BYTES:
+        return ""
+    below, above = (
+        f'<img src="data:image/png;base64,{base64.b64encode(data).decode("ascii")}" alt="{title}">'
+        for data, title in ((pair[1], "Result"), (pair[0], "Reference"))
+    )
+    words = "<b>Reference</b> left, <b>Result</b> right: drag the corner of the line"
+    return (
+        f'<figure class="split"><div class="pair">{below}<div class="over">{above}</div></div>'
+        f"<figcaption>{words}</figcaption></figure>"
+    )
+
+
 def _value_table(result: FitResult) -> str:
     heads = [result.shader or "Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"]
     if result.certainty:
@@ -144,7 +161,7 @@ def _value_table(result: FitResult) -> str:
     table = _table(heads, value_rows(result))
     weak = "".join(f"<li>{escape(weak.sentence)}</li>" for weak in result.weak_combinations)
     weak = f"<ul>{weak}</ul>" if weak else ""
-    return f'{table}<p class="soft">Colours are linear Rec.709.</p>{weak}' if table else ""
+    return f'{table}<p class="soft">Colours: the hex code on a display, then linear Rec.709.</p>{weak}' if table else ""
 
 
 def _plot(result: FitResult) -> str:

@@ -20,6 +20,11 @@ def value_rows(result: FitResult) -> str:
     return "".join(_row(name, result) for name in result.recovered)
 
 
+def socket_name(parameter: str) -> str:
+    """What Blender calls the parameter: ``specular_ior_level`` is Specular IOR Level."""
+    return " ".join(word.upper() if word == "ior" else word.title() for word in parameter.split("_"))
+
+
 def value_text(value: Value) -> str:
     """A value with four significant digits, components separated by spaces."""
     return " ".join(f"{component:.4g}" for component in _components(value))
@@ -34,8 +39,7 @@ def swatch_colour(value: Value) -> str:
 
 def _row(name: str, result: FitResult) -> str:
     recovered, initial, bounds = result.recovered[name], result.initial.get(name), result.bounds.get(name)
-    label = result.labels.get(name, name.replace("_", " "))
-    cells = [f'<th scope="row">{escape(label)}</th>']
+    cells = [f'<th scope="row">{escape(result.labels.get(name) or socket_name(name))}</th>']
     cells += [f"<td>{_shown(value)}</td>" for value in (initial, recovered)]
     cells.append(f'<td class="bounds">{bounds[0]:.4g} to {bounds[1]:.4g}</td>' if bounds else "<td></td>")
     cells.append(f'<td class="where">{_track(initial, recovered, bounds)}</td>')
@@ -56,7 +60,8 @@ def _shown(value: Value | None) -> str:
     if value is None:
         return ""
     if len(_components(value)) == 3:
-        return f'<span class="swatch" style="background:{swatch_colour(value)}"></span>{value_text(value)}'
+        code = swatch_colour(value)
+        return f'<span class="swatch" style="background:{code}"></span><code>{code}</code> {value_text(value)}'
     return value_text(value)
 
 

@@ -16,7 +16,7 @@ from PIL import Image as Pillow
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.report.html_report import ReportContent, report_html
 from mfo_backend.report.picture import displayed, displayed_linear, png_bytes
-from mfo_backend.report.value_table import swatch_colour, value_text
+from mfo_backend.report.value_table import socket_name, swatch_colour, value_text
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.model_gap import ModelGap
 from mfo_backend.types.result import CurvePoint, FitResult, StageReport
@@ -107,7 +107,7 @@ def parsed(content: ReportContent) -> WellFormed:
         "0.300 → 0.050",
         "21.0 s",
         "22 iterations",
-        "base color",
+        "Base Color",
         "0.8 0.8 0.8",
         "0.25 0.5 1",
         "0.3123",
@@ -125,11 +125,23 @@ def test_the_report_says(content: ReportContent, words: str) -> None:
 
 def test_the_pictures_are_in_the_file(content: ReportContent) -> None:
     sources = [value for tag, key, value in parsed(content).attributes if (tag, key) == ("img", "src")]
-    assert len(sources) == 4
+    assert len(sources) == 6  # reference and result once more, over each other
     for source in sources:
         picture = Pillow.open(io.BytesIO(base64.b64decode(source.removeprefix("data:image/png;base64,"))))
         assert picture.size == (6, 4)
         assert picture.getpixel((0, 0)) == (128, 128, 128)
+
+
+def test_large_pictures_are_in_the_file_once(content: ReportContent, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert 'class="split"' in report_html(content)
+    monkeypatch.setattr("mfo_backend.report.html_report._SPLIT_BYTES", 10)
+    assert 'class="split"' not in report_html(content)
+    assert len([value for tag, key, value in parsed(content).attributes if (tag, key) == ("img", "src")]) == 4
+
+
+def test_values_have_the_names_of_blenders_sockets() -> None:
+    names = ("base_color", "specular_ior_level", "ior")
+    assert [socket_name(name) for name in names] == ["Base Color", "Specular IOR Level", "IOR"]
 
 
 def test_nothing_is_loaded_from_elsewhere(content: ReportContent) -> None:
@@ -158,7 +170,7 @@ def test_text_cannot_break_out(content: ReportContent, result: FitResult) -> Non
     )
     assert "<script" not in report_html(wicked)
     # head and heading, subtitle, sentence, value, plot, stage, error, note, and twice a version
-    assert parsed(wicked).text.count("alert('x')") == 11
+    assert parsed(wicked).text.lower().count("alert('x')") == 11
 
 
 def test_a_cancelled_fit_without_stages_has_a_report(content: ReportContent, result: FitResult) -> None:
