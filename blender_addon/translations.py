@@ -36,6 +36,7 @@ _GERMAN = {
     "Use as Reference of Material Fit": "Als Referenz von Material Fit nehmen",
     "Allow Online Access": "Online-Zugriff erlauben",
     "Install downloads packages, for which Blender needs your leave.": "Installieren lädt Pakete herunter, wofür Blender deine Erlaubnis braucht.",
+    "Cycles prepares the scene": "Cycles bereitet die Szene vor",
     "A picture on disk": "Ein Bild auf der Festplatte",
     "Adam on the mean squared error until it stops improving, then a new optimisation on FLIP": "Adam auf dem mittleren quadratischen Fehler, bis er nicht mehr sinkt, dann eine neue Optimierung auf FLIP",
     "Advanced": "Erweitert",

@@ -72,6 +72,10 @@ class Baker:
             raise found
         return found, self._probe.folder / f"bake_{number}"
 
+    def is_ready(self) -> bool:
+        """Whether nothing that was asked would have to be waited for."""
+        return self._probe is None or self._probe.is_answered(self._asked - len(self._answers))
+
     def close(self) -> None:
         """End the other Blender and remove its files."""
         if self._probe is not None:

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import bpy
 import tomllib
@@ -19,7 +20,7 @@ from ..versions import PRINCIPLED
 from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .material_model import Material, Socket
-from .materials.chosen_values import by_graph, chosen_graph_values, request_of, write_copy
+from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
@@ -27,7 +28,7 @@ from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, shown
 from .reference.reference import Reference, read_reference
 from .reference.reference_view import SCENE, output_view
-from .scene.read_scene import read_scene
+from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
 from .scene.scene_file import SceneFiles, scene_files
@@ -38,7 +39,12 @@ MOVING_VALUES = (
 )
 MOST_UNKNOWN = 0.5  # share of a mix that a shader without an exact model may have
 
-__all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job"]
+_LOOK_SECONDS = 0.01  # between two looks at a second Blender that is waited for
+
+Found = TypeVar("Found")
+Steps: TypeAlias = Generator[None, None, Found]  # yields while it would have to wait
+
+__all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job", "export_steps"]
 
 
 @dataclass(frozen=True)
@@ -74,10 +80,7 @@ def export_job(
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
     if not isinstance(reference, Sequence):
-        with new_job_folder(Path(folder)) as partial:
-            part = partial_export(context, obj, partial, reference, fit, reference_view, upright, tell)
-            part.write_request(partial)
-        return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
+        return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell))
     check_setups(reference)
     first: PartialExport | None = None
     notes: list[str] = []
@@ -89,7 +92,9 @@ def export_job(
             try:
                 with shown(context, setup, obj, own_size=len(reference) > 1) as there:
                     alone = len(reference) == 1
-                    part = partial_export(there, obj, here, setup.reference, fit, reference_view, upright, alone=alone)
+                    part = drained(
+                        partial_export(there, obj, here, setup.reference, fit, reference_view, upright, alone=alone)
+                    )
                     part.request["picture"] = setup.request(there)
             except ExportError as error:
                 if len(reference) == 1:
@@ -109,6 +114,36 @@ def export_job(
         assert first is not None
         first.write_request(partial)
     return ExportReport(Path(folder), first.request, tuple(notes))
+
+
+def export_steps(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    folder: Path,
+    reference: Path | bpy.types.Image | None,
+    fit: dict[str, Any],
+    reference_view: str,
+    upright: bool,
+    tell: Callable[[float], None] = lambda _share: None,
+) -> Steps[ExportReport]:
+    """`export_job` of one picture in steps: it yields while a second Blender works, and needs the same context then.
+
+    The scene has been read when it yields first. Closing it ends the second Blender and leaves `folder` as it was.
+    """
+    with new_job_folder(Path(folder)) as partial:
+        part = yield from partial_export(context, obj, partial, reference, fit, reference_view, upright, tell)
+        part.write_request(partial)
+    return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
+
+
+def drained(steps: Steps[Found]) -> Found:
+    """What steps return in the end, waited for."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+        time.sleep(_LOOK_SECONDS)
 
 
 @dataclass(frozen=True)
@@ -141,7 +176,7 @@ def partial_export(
     tell: Callable[[float], None] = lambda _share: None,
     *,
     alone: bool = True,
-) -> PartialExport:
+) -> Steps[PartialExport]:
     """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
 
     `alone` says that it is the only one.
@@ -154,36 +189,44 @@ def partial_export(
         leaf = largest_leaf(probe, context, obj) if probe is not None and by_share else None
         with SceneBakes(context) as bakes:
             data = read_scene(context, obj, findings, bakes, leaf)
+            findings.raise_first()
+            assert data is not None
+            if unwritable(obj.active_material):
+                said = f"The values cannot be applied as it is. {unwritable(obj.active_material)}"
+                findings.note(said, explains=False)
+            target = target_shader(obj.active_material, leaf)
+            assert target is not None
+            data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
+            findings.raise_first()
+            fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not values)
+            unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
+            named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
+            tree = obj.active_material.node_tree
+            named |= {v.name: holder_of(tree, v.place) for v in values if is_there(tree, v.place)}
+            for said in animation_notes(named, context.scene.frame_current):
+                findings.note(said, explains=False)
+            tell(0.4)
+            size = (data.camera.width, data.camera.height)
+            picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
+            for said in picture.notes if picture is not None else ():
+                findings.note(said, explains=False)  # a wrong view shows around the target, too
+            more = request_of(context, obj, target, values) if values else {}
+            if values:
+                write_copy(folder)  # as it was read
+            while not bakes.is_ready():
+                yield
+            finish_scene(data, findings, bakes)
         findings.raise_first()
-        assert data is not None
-        if unwritable(obj.active_material):
-            said = f"The values cannot be applied as it is. {unwritable(obj.active_material)}"
-            findings.note(said, explains=False)
-        target = target_shader(obj.active_material, leaf)
-        assert target is not None
-        data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
-        findings.raise_first()
-        fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not values)
-        tree = obj.active_material.node_tree
-        unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
-        named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
-        named |= {v.name: holder_of(tree, v.place) for v in values if is_there(tree, v.place)}
-        for said in animation_notes(named, context.scene.frame_current):
-            findings.note(said, explains=False)
-        tell(0.4)
-        size = (data.camera.width, data.camera.height)
-        picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
-        for said in picture.notes if picture is not None else ():
-            findings.note(said, explains=False)  # a wrong view shows around the target, too
         graph = None
         if probe is not None:
-            data.materials[TARGET_BSDF], graph = evaluate_graph(probe, context, obj, data.materials[TARGET_BSDF])
+            described = data.materials[TARGET_BSDF]
+            data.materials[TARGET_BSDF], graph = yield from evaluate_graph(probe, context, obj, described)
         _name_shares(data.materials[TARGET_BSDF], findings)
         files = scene_files(data, findings)
         tell(0.5)
         request = _request(context, obj, data, files, picture, fit, findings)
         if graph is not None:
-            request["graph"] = graph.request() | (request_of(context, obj, target, values) if values else {})
+            request["graph"] = graph.request() | more
         files.write(folder)
         tell(0.9)
         if picture is not None:
@@ -191,7 +234,7 @@ def partial_export(
         if graph is not None:
             graph.write(folder)
         if values:
-            write_copy(folder / GRAPH_FOLDER)
+            (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
     return PartialExport(request, findings)
 
 
@@ -206,6 +249,7 @@ def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findin
     findings = Findings()
     data = read_scene(context, obj, findings)
     if data is not None:
+        finish_scene(data, findings)
         scene_files(data, findings)
     return findings
 

@@ -12,9 +12,17 @@ from ..backend.preferences import idle_seconds
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..result import shown_result
-from ..running import fit_queue, running_job
+from ..running import fit_queue, running_export, running_job
 from .check import thorough_check
-from .fit_options import FitError, FitOptions, choose_shader, python_of, selected_targets, target_of
+from .fit_options import (
+    FitError,
+    FitOptions,
+    choose_shader,
+    python_of,
+    selected_targets,
+    start_or_queue,
+    target_of,
+)
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -36,6 +44,9 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         if running_job.current is not None and bpy.app.background:
             cls.poll_message_set("A fit is running; cancel it first")
             return False
+        if running_export.current is not None:
+            cls.poll_message_set("The scene is being exported for a fit")
+            return False
         if not bpy.app.background and needs_setup():
             cls.poll_message_set("The backend is not installed yet: press Install below")
             return False
@@ -52,6 +63,10 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         try:
             if not bpy.app.background:  # it loads while the job is exported
                 waiting_backend.prepare(python_of(context), idle_seconds(context), own_blender(SERVER, []))
+                steps = self.steps(context, target_of(context, self.object), self.job_folder)
+                if not self.blocks():
+                    running_export.start(context, steps, start_or_queue)
+                    return {"FINISHED"}
             fit = self.prepare(context, target_of(context, self.object), self.job_folder)
             if running_job.current is not None:
                 fit_queue.add(fit)
@@ -144,7 +159,9 @@ class MFO_OT_cancel(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Only while a fit runs and was not cancelled yet."""
+        """Only while a fit runs or is exported, and was not cancelled yet."""
+        if running_export.current is not None:
+            return True
         if running_job.current is None:
             cls.poll_message_set("No fit is running")
             return False
@@ -154,8 +171,12 @@ class MFO_OT_cancel(bpy.types.Operator):
         return True
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        """Ask the backend to stop; the timer sees it end."""
-        running_job.cancel()
+        """Ask the backend to stop; the timer sees it end. An export ends at once."""
+        if running_export.current is not None:
+            running_export.close()
+        else:
+            running_job.cancel()
+        running_job.redraw()
         return {"FINISHED"}
 
 

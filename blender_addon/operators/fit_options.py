@@ -12,7 +12,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.preferences import chosen_python, new_job_folder
-from ..export.job import ExportError, export_job
+from ..export.job import ExportError, Steps, drained, export_steps
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.picture_setup import PictureSetup
@@ -68,18 +68,14 @@ class FitOptions:
 
     def start(self, fit: PreparedFit) -> None:
         """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
-        fit_queue.begin()
-        try:
-            running_job.start(fit, timer=not self.blocks() and not bpy.app.background)
-        except OSError as error:
-            if fit.is_new:
-                shutil.rmtree(fit.folder, ignore_errors=True)
-            raise FitError(
-                f"The backend could not be started with {fit.python} in {fit.folder} ({error.strerror or error})."
-            ) from error
+        start_fit(fit, timer=not self.blocks() and not bpy.app.background)
 
     def prepare(self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str) -> PreparedFit:
         """Export the job folder of the object's active material; raises `FitError` where it cannot be."""
+        return drained(self.steps(context, obj, job_folder))
+
+    def steps(self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str) -> Steps[PreparedFit]:
+        """`prepare` in steps, which yields while a second Blender works; the operator is not needed any more then."""
         settings = context.scene.mfo
         material = _active_material(obj)
         if unwritable(material):  # before the fit, since its values could not be applied
@@ -96,24 +92,13 @@ class FitOptions:
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
-        windows, chosen = context.window_manager, self._fit(settings, obj)
-        windows.progress_begin(0.0, 100.0)  # a number beside the pointer, while nothing else can be drawn
+        name, uid, chosen = material.name, material.session_uid, self._fit(settings, obj)
         try:
-            report = export_job(
-                context,
-                obj,
-                folder,
-                reference=reference,
-                fit=chosen,
-                reference_view=made,
-                tell=lambda share: windows.progress_update(100.0 * share),
-            )
+            report = yield from export_steps(context, obj, folder, reference, chosen, made, upright=False)
         except ExportError as error:
             raise FitError(str(error)) from error
-        finally:
-            windows.progress_end()
         picture = folder / report.request["reference"]["path"]
-        return PreparedFit(python, folder, material.name, material.session_uid, picture, report.notes, is_new)
+        return PreparedFit(python, folder, name, uid, picture, report.notes, is_new)
 
     def _fit(self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> dict[str, Any]:
         model = self.model or settings.model
@@ -142,6 +127,28 @@ class FitOptions:
         if compared not in ("auto", "hdr", "ldr"):
             raise FitError(f"range is {compared!r}: give 'hdr', 'ldr' or 'auto'.")
         return fit if compared == "auto" else fit | {"range": compared}
+
+
+def start_fit(fit: PreparedFit, *, timer: bool) -> None:
+    """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
+    fit_queue.begin()
+    try:
+        running_job.start(fit, timer=timer)
+    except OSError as error:
+        if fit.is_new:
+            shutil.rmtree(fit.folder, ignore_errors=True)
+        raise FitError(
+            f"The backend could not be started with {fit.python} in {fit.folder} ({error.strerror or error})."
+        ) from error
+
+
+def start_or_queue(fit: PreparedFit) -> None:
+    """Start a fit, or let it wait for the one that runs; errors are those of `start_fit`."""
+    if running_job.current is None:
+        start_fit(fit, timer=True)
+    else:
+        fit_queue.add(fit)
+    running_job.redraw()
 
 
 def python_of(context: bpy.types.Context) -> Path:

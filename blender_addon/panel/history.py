@@ -9,7 +9,7 @@ from ..result.shown_result import VERDICT_ICONS
 
 
 class MFO_UL_history(bpy.types.UIList):
-    """One line for each result: when, how, and the FLIP it reached."""
+    """One line for each result: when, its verdict, and the FLIP it reached."""
 
     bl_idname = "MFO_UL_history"
 
@@ -25,13 +25,10 @@ class MFO_UL_history(bpy.types.UIList):
     ) -> None:
         """Draw one result; the one on the material has a full dot, one that looks the same a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
-        split = layout.split(factor=0.45)  # a day and a time, the longest preset, a number
+        split = layout.split(factor=0.62)  # a day and a time, a verdict and its number
         split.label(text=item.name[5:16], icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
-        right = split.split(factor=0.71)
-        right.label(
-            text="partial" if item.partial else item.preset.title(), icon=VERDICT_ICONS.get(item.verdict, "BLANK1")
-        )
-        right.label(text=f"{item.flip:.3f}" if item.flip >= 0.0 else "")
+        reached = f"{item.flip:.3f}" if item.flip >= 0.0 else ""
+        split.label(text="partial" if item.partial else reached, icon=VERDICT_ICONS.get(item.verdict, "BLANK1"))
 
 
 class History:

@@ -42,7 +42,7 @@ class Result:
         row.operator("mfo.apply", text="Apply Anyway" if asked else "Apply", icon="PASTEDOWN")
         applied = material is not None and bool(material.mfo.originals)
         shows_own = material is not None and applied and material.mfo.shows_original
-        text = ("A: own values" if shows_own else "B: recovered values") if applied else "A/B"
+        text = ("A: Own" if shows_own else "B: Recovered") if applied else "A/B"
         row = column.row(align=True)
         row.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")

@@ -9,8 +9,10 @@ from ..backend.backend_section import draw_setup, has_trouble
 from ..operators.fit_options import selected_targets
 from ..result import previews, shown_result
 from ..result.job_result import must_ask
-from ..running import fit_queue, running_job
+from ..running import fit_queue, running_export, running_job
 from .layout import draw_pictures, draw_sentence, letters
+
+_USUAL_SECONDS = 3.0  # of an export that asks Cycles something
 
 
 class Run:
@@ -23,6 +25,8 @@ class Run:
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
         if running_job.current is not None:
             _draw_progress(layout, context)
+        elif running_export.current is not None:
+            _draw_export(layout)
         _draw_buttons(layout, context)
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
@@ -62,6 +66,17 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     row.operator("mfo.fit", text="Add to Queue" if running else "Fit Material", icon="ADD" if running else "PLAY")
     if len(selected_targets(context, most=2)) > 1:
         column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
+
+
+def _draw_export(layout: bpy.types.UILayout) -> None:
+    """What is waited for, how long already, and the way out."""
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    seconds = running_export.seconds()
+    share = seconds / (seconds + _USUAL_SECONDS)  # how long it takes is not known
+    text = bpy.app.translations.pgettext_iface("Cycles prepares the scene")
+    row.progress(factor=share, type="BAR", text=f"{text} · {seconds:.0f} s")
+    row.operator("mfo.cancel", text="", icon="X")
 
 
 def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -49,8 +49,10 @@ class Probe:
         _remove_abandoned()
         self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}_"))
         self._log = self.folder / "probe.log"
-        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()  # None: the process has ended
+        # from the first, which says that the file is open; None: the process has ended
+        self._answers: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
         self._ready = False
+        self._asked_at = time.monotonic()
         try:
             copy = self.folder / "scene.blend"
             save_copy(copy)
@@ -90,6 +92,7 @@ class Probe:
     def send(self, command: str, **words: Any) -> None:
         """Send a request without waiting; answers come in the order of the requests."""
         assert self._process.stdin is not None
+        self._asked_at = time.monotonic()
         with contextlib.suppress(OSError):  # a process that is gone is told by what it does not answer
             self._process.stdin.write(json.dumps({"command": command, **words}) + "\n")
             self._process.stdin.flush()
@@ -103,6 +106,11 @@ class Probe:
             self._checked(self._next(ANSWER_SECONDS))
             self._ready = True
         return self._checked(self._next(ANSWER_SECONDS + MORE_SECONDS * (things - 1)))
+
+    def is_answered(self, count: int = 1) -> bool:
+        """Whether so many calls of `receive` would return at once, or the time for the answers is over."""
+        is_late = time.monotonic() - self._asked_at > ANSWER_SECONDS
+        return is_late or not self._reader.is_alive() or self._answers.qsize() >= count + (not self._ready)
 
     def close(self) -> None:
         """End the second Blender and remove its files."""
@@ -129,9 +137,12 @@ class Probe:
     def _read(self) -> None:
         assert self._process.stdout is not None
         with contextlib.suppress(OSError, ValueError):
-            for line in self._process.stdout:
-                self._lines.put(line)
-        self._lines.put(None)
+            for line in self._process.stdout:  # other lines are Blender's
+                with contextlib.suppress(ValueError):
+                    answer = json.loads(line)
+                    if isinstance(answer, dict) and "status" in answer:
+                        self._answers.put(answer)
+        self._answers.put(None)
 
     @staticmethod
     def _checked(answer: dict[str, Any]) -> dict[str, Any]:
@@ -140,27 +151,20 @@ class Probe:
         return answer
 
     def _next(self, seconds: float) -> dict[str, Any]:
-        """The next answer; other lines are Blender's."""
-        end = time.monotonic() + seconds
-        while (line := self._line_until(end, seconds)) is not None:
-            with contextlib.suppress(ValueError):
-                answer = json.loads(line)
-                if isinstance(answer, dict) and "status" in answer:
-                    return answer
-        self._lines.put(None)
-        last = next((text for text in reversed(log_tail(self._log).splitlines()) if text.strip()), "its log is empty")
-        raise ProbeError(f"The second Blender, which evaluates nodes, has ended: {last.strip()}")
-
-    def _line_until(self, end: float, seconds: float) -> str | None:
-        """The next line of the process; it is ended where none comes until `end`, after `seconds`."""
+        """The next answer; the process is ended where none comes within so many seconds after it was asked."""
         try:
-            return self._lines.get(timeout=max(end - time.monotonic(), 0.0))
+            answer = self._answers.get(timeout=max(self._asked_at + seconds - time.monotonic(), 0.0))
         except queue.Empty:
             signal_group(self._process.pid, KILL)
             raise ProbeError(
                 f"The second Blender, which evaluates nodes, has not answered for {seconds / 60.0:.0f} minutes and was "
                 "ended: try again, and if it stays so, give the material or the world fewer nodes or smaller images."
             ) from None
+        if answer is not None:
+            return answer
+        self._answers.put(None)
+        last = next((text for text in reversed(log_tail(self._log).splitlines()) if text.strip()), "its log is empty")
+        raise ProbeError(f"The second Blender, which evaluates nodes, has ended: {last.strip()}")
 
 
 def _remove_abandoned() -> None:

@@ -8,11 +8,12 @@ from bpy.app.handlers import persistent
 
 from ..check import preflight
 from ..result import comparison
-from . import cycles_check, running_job
+from . import cycles_check, running_export, running_job
 
 
 @persistent
 def _before_load(*_args: object) -> None:
+    running_export.close()
     running_job.close()  # the objects and materials it works on go away
     cycles_check.close()
     preflight.reset()
@@ -25,6 +26,11 @@ def _after_load(*_args: object) -> None:
 
 
 @persistent
+def _before_undo(*_args: object) -> None:
+    running_export.undone()
+
+
+@persistent
 def _after_change(*_args: object) -> None:
     preflight.request()
 
@@ -33,6 +39,8 @@ _HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
     "depsgraph_update_post": _after_change,
+    "undo_pre": _before_undo,
+    "redo_pre": _before_undo,
     "undo_post": _after_change,
     "redo_post": _after_change,
 }

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -83,7 +83,8 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object
     if len(leaves) < 2 or chosen_leaf(material) or not any(leaf.is_linked for leaf in leaves):
         return None
     asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
-    answer = _ask(probe, context, obj, asked, scale=1)
+    _send(probe, context, obj, asked, scale=1)
+    answer = probe.receive()  # waited for: the scene is read by it, and must be as in the copy that was asked
     shares = [
         found["weight"]["mean"][0] if leaf.is_linked else leaf.share
         for leaf, found in zip(leaves, answer["leaves"], strict=True)
@@ -91,10 +92,10 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object
     return leaf_name(leaves[shares.index(max(shares))])
 
 
-def _ask(
+def _send(
     probe: Probe, context: bpy.types.Context, obj: bpy.types.Object, leaves: list[dict[str, Any]], scale: int
-) -> dict[str, Any]:
-    return probe.ask(
+) -> None:
+    probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=obj.active_material_index,
         leaves=leaves, scale=scale, samples=SAMPLES, folder=str(probe.folder),
@@ -108,8 +109,8 @@ def names_by_graph(material: Material) -> list[str]:
 
 def evaluate_graph(
     probe: Probe, context: bpy.types.Context, obj: bpy.types.Object, material: Material
-) -> tuple[Material, NodeGraph]:
-    """The material with the mean of each socket of its graph, and the pictures of them.
+) -> Generator[None, None, tuple[Material, NodeGraph]]:
+    """The material with the mean of each socket of its graph, and the pictures of them; yields while Cycles works.
 
     Raises
     ------
@@ -125,7 +126,10 @@ def evaluate_graph(
         }
         for leaf in leaves
     ]
-    answer = _ask(probe, context, obj, asked, SCALE)
+    _send(probe, context, obj, asked, SCALE)
+    while not probe.is_answered():
+        yield
+    answer = probe.receive()
     files = [probe.folder / answer["positions"]]
 
     def seen(socket: Socket, found: dict[str, Any]) -> Socket:

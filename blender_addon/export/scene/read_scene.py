@@ -57,8 +57,8 @@ def read_scene(
 ) -> SceneData | None:
     """Return the scene as the render would see it, or None with errors in `findings`.
 
-    What only Cycles can tell is asked of `bakes`, while the rest is read. `leaf` names the shader of the target's mix
-    that is fitted.
+    What only Cycles can tell is asked of `bakes`; `finish_scene` puts it in. `leaf` names the shader of the target's
+    mix that is fitted.
     """
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
@@ -107,10 +107,6 @@ def read_scene(
             else:
                 findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
             return None
-        if bakes is not None:
-            bakes.finish(data, findings)
-        if not data.world.is_lit and not data.lights and not data.emitting:
-            findings.error("The scene has no light: add a light or give the world a colour.")
         walk.note_coincident_faces()
         share = share_of_bent_normals(data.target.mesh, camera)
         if share > MOST_BENT:
@@ -121,6 +117,14 @@ def read_scene(
             )
         check_visible(data, target, scene, depsgraph, findings)
     return data
+
+
+def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None = None) -> None:
+    """Put what `bakes` was asked for into the scene, and look whether there is light."""
+    if bakes is not None:
+        bakes.finish(data, findings)
+    if not data.world.is_lit and not data.lights and not data.emitting:
+        findings.error("The scene has no light: add a light or give the world a colour.")
 
 
 def _name_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, findings: Findings) -> None:

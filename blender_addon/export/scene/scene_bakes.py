@@ -90,6 +90,7 @@ class SceneBakes:
         self._world: tuple[int, bpy.types.World] | None = None
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
+        self._number: int | BakeError | None = None  # of the request for them, or why there is none
         self._ids: dict[tuple[str, int, int], str] = {}  # those ids, by object, its data and slot
 
     def __enter__(self) -> Self:
@@ -133,6 +134,19 @@ class SceneBakes:
             self._surfaces[identifier].shown.append(shown)
         return replace(shape, bsdf=identifier)
 
+    def is_ready(self) -> bool:
+        """Whether `finish` would not wait; surfaces are asked for with the first call, when all are known."""
+        self._ask_surfaces()
+        return self._baker.is_ready()
+
+    def _ask_surfaces(self) -> None:
+        if self._number is None and self._surfaces:
+            try:
+                requests = [asked.request for asked in self._surfaces.values()]
+                self._number = self._baker.ask("surfaces", surfaces=requests)
+            except BakeError as problem:
+                self._number = problem
+
     def finish(self, data: SceneData, findings: Findings) -> None:
         """Wait for everything that was asked and put it into `data`; what failed is an error in `findings`."""
         for sentence in self._failed:
@@ -143,9 +157,11 @@ class SceneBakes:
             self._put_surfaces(data, findings)
 
     def _put_surfaces(self, data: SceneData, findings: Findings) -> None:
+        self._ask_surfaces()
         try:
-            number = self._baker.ask("surfaces", surfaces=[asked.request for asked in self._surfaces.values()])
-            answer, folder = self._baker.wait(number, len(self._surfaces))
+            if not isinstance(self._number, int):
+                raise self._number or BakeError("It was not asked for.")
+            answer, folder = self._baker.wait(self._number, len(self._surfaces))
             found = answer["surfaces"]
         except BakeError as problem:
             found, folder = [{"status": "failed", "sentence": str(problem)}] * len(self._surfaces), Path()
