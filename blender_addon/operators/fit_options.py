@@ -5,6 +5,7 @@
 # Blender reads properties from annotations
 
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.preferences import chosen_python, new_job_folder
-from ..export.job import ExportError, Steps, drained, export_steps
+from ..export.job import ExportError, Steps, drained, export_job, export_steps
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.picture_setup import PictureSetup
@@ -94,7 +95,10 @@ class FitOptions:
         is_new = not folder.exists()
         name, uid, chosen = material.name, material.session_uid, self._fit(settings, obj)
         try:
-            report = yield from export_steps(context, obj, folder, reference, chosen, made, upright=False)
+            if isinstance(reference, Sequence):  # each picture changes the scene's frame while it is exported
+                report = export_job(context, obj, folder, reference=reference, fit=chosen, reference_view=made)
+            else:
+                report = yield from export_steps(context, obj, folder, reference, chosen, made, upright=False)
         except ExportError as error:
             raise FitError(str(error)) from error
         picture = folder / report.request["reference"]["path"]
