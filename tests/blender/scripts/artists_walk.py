@@ -47,7 +47,7 @@ def scroll(steps):
 
 def shot(name):
     preflight.redraw()
-    yield 2.5  # panels grow and shrink in steps
+    yield 4.0  # panels grow and shrink in steps
     side = region("UI")[1]
     crop = f"{side.width}x{side.height}+{side.x}+{HEIGHT - side.y - side.height}"
     subprocess.run(["import", "-window", "root", "-crop", crop, "+repage", f"{shots}/walk_{name}.png"], check=True)
