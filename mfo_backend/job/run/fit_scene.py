@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,29 +15,24 @@ from numpy.typing import NDArray
 from ...metrics.display.tone_mapping import View
 from ...render.models.graph_pictures import GraphPictures
 from ...render.sheet.contact_sheet import ContactSheet
-from ...types.errors import BadInputError, UnrecordableError
+from ...types.errors import BadInputError
 from ...types.event import Event, Listener, Preview
 from ...types.image import Image, Pixels
 from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
-from ...types.status import Status
-from ...types.verdict import Verdict
 from ..folder.graph_files import locate_files
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request, request_to_json
+from .class_trials import Fitted, with_other_classes, with_plainer_glow
 from .graph_blender import evaluated_graph
 from .material_classes import (
     MaterialClass,
     brightest_glow,
     changed,
-    doubted,
-    is_better,
+    is_rich,
     is_worth_another,
     other_classes,
     parameters_of,
-    tried_notes,
-    value_of,
-    with_values_of,
 )
 from .more_pictures import JobPicture
 
@@ -200,7 +195,7 @@ def _fit_scene(
         labels = [picture.label for picture in pictures]
         return one_sheet(renderers, [p.reference for p in pictures], [p.view for p in pictures], labels)
 
-    def fit(renderer: Renderer, together: SheetTask | None, *, hand_over: bool = True) -> _Fitted:
+    def fit(renderer: Renderer, together: SheetTask | None, *, hand_over: bool = True) -> Fitted:
         heard, shown, display = listener, reference, view
         if together is not None:
             shown, display = together.reference, together.display or view
@@ -211,7 +206,7 @@ def _fit_scene(
         )  # fmt: skip
         result = outcome.result if together is None else with_notes(outcome.result, together.notes)
         sheet = None if together is None else together.renderer.sheet
-        return _Fitted(result, outcome.start_image, outcome.result_image, outcome.counted, sheet)
+        return Fitted(result, outcome.start_image, outcome.result_image, outcome.counted, sheet)
 
     def renderer_of(renderers: Sequence[MitsubaRenderer], together: SheetTask | None) -> Renderer:
         return renderers[0] if together is None else together.renderer
@@ -233,13 +228,13 @@ def _fit_scene(
         table = renderers[0].table
         del renderers, together
 
-        def fit_from(other: MaterialClass) -> _Fitted:
+        def fit_from(other: MaterialClass) -> Fitted:
             # values inside nodes are those of the material in the scene
             loaded = load(lambda material: changed(material, other), parameters_of(other, table.names), None)
             again = task_of(loaded)
             return fit(renderer_of(loaded, again), again, hand_over=False)
 
-        def is_wanted(found: _Fitted) -> bool:
+        def is_wanted(found: Fitted) -> bool:
             # no class of material makes up for a wrong light
             agree = found.result.contradiction is None
             return agree and not should_stop() and is_worth_another(found.result, request.fit.parameters)
@@ -248,7 +243,9 @@ def _fit_scene(
             counted = fitted.counted if fitted.sheet is None else fitted.sheet.cut(fitted.counted, 0)
             glow = brightest_glow(reference, view, counted) / request.film_exposure
             classes = other_classes(first[target], glow)
-            fitted = _with_other_classes(fitted, first[target], classes, fit_from, is_wanted)
+            fitted = with_other_classes(fitted, first[target], classes, fit_from, is_wanted)
+            if is_rich(fitted.result, request.fit.parameters) and not should_stop():
+                fitted = with_plainer_glow(fitted, first[target], classes, fit_from)
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
@@ -328,63 +325,6 @@ def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
         return ()
     flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
     return (_GRAPH_UNSEEN.format(names=names), *flat)
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    """A judged result and the pictures of `JobOutcome`."""
-
-    result: FitResult
-    start_image: Pixels
-    result_image: Pixels
-    counted: NDArray[np.bool_]
-    sheet: ContactSheet | None = None
-
-
-def _with_other_classes(
-    fitted: _Fitted,
-    material: Mapping[str, Any],
-    classes: Sequence[MaterialClass],
-    fit_from: Callable[[MaterialClass], _Fitted],
-    is_wanted: Callable[[_Fitted], bool],
-) -> _Fitted:
-    """The fit or a better one of other `classes`, tried while one is wanted; where none is better, the notes say so."""
-    first, no_nearer, refused = fitted.result.recovered, [], []
-    for other in classes:
-        if not is_wanted(fitted):
-            break
-        try:
-            again = fit_from(other)
-        except UnrecordableError:
-            refused.append(other)
-            continue
-        if again.result.status is not Status.CANCELLED:
-            no_nearer.append(other)
-        fitted = _better(fitted, again, other, material)
-    if fitted.result.recovered is not first:  # the note of the class that was better says enough
-        return fitted
-    notes = (*fitted.result.notes, *tried_notes(no_nearer, refused))
-    return replace(fitted, result=replace(fitted.result, notes=notes))
-
-
-def _better(first: _Fitted, again: _Fitted, other: MaterialClass, material: Mapping[str, Any]) -> _Fitted:
-    """The first fit, or that of another class where it is clearly better; the user's values are its start, too."""
-    before, after = first.result, again.result
-    seconds, passes = before.seconds + after.seconds, before.passes + after.passes
-    if before.judgement is None or not is_better(after.judgement, before.judgement, other):
-        return replace(first, result=replace(before, seconds=seconds, passes=passes))
-    if before.judgement.verdict is Verdict.CLOSE:
-        after = doubted(after, before)
-    after = with_values_of(other, after, material)
-    result = replace(
-        after,
-        initial={name: before.initial.get(name, value_of(material, name)) for name in after.recovered},
-        errors={name: (before.errors[name][0], error) for name, (_, error) in after.errors.items()},
-        notes=(*after.notes, other.note),
-        seconds=seconds,
-        passes=passes,
-    )
-    return replace(again, result=result, start_image=first.start_image)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

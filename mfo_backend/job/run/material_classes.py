@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...material.principled.principled_dict import socket_value
 from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...metrics.display.tone_mapping import View
+from ...types.certainty import Level
 from ...types.image import Encoding, Image
 from ...types.parameter import Value
 from ...types.result import FitResult
@@ -34,6 +35,11 @@ _ABOVE_EMISSION = tuple(name for name in BLENDER_PRINCIPLED.names if name.starts
 # A glow adds to every pixel, so none is darker but by noise; of the median of the target, which may be clipped
 MOST_GLOW = 2.0
 _AROUND = (Cause.LIGHT, Cause.SURROUNDINGS, Cause.PICTURE)  # where the surroundings differ
+# Layers over a plain dielectric, and how much of one counts. A ball of strength 0.4 in a light probe looked the same as
+# a metal with a coat and a sheen
+LAYERS, LAYER = ("metallic", "specular_tint", "coat_weight", "sheen_weight"), 0.05
+MANY_LAYERS = 3
+PLAINER_GLOW = "A plainer material that glows looks the same as one of many layers, so it is the result."
 CLEARLY_BETTER = 0.5  # times the difference of the first result, and less than that by so much FLIP
 LEAST_GAIN = 0.01
 
@@ -173,16 +179,53 @@ def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[st
     return replace(result, recovered=values, certainty=certainty, bounds=bounds | dict(result.bounds))
 
 
-def doubted(result: FitResult, other: FitResult) -> FitResult:
-    """A result as unsure as it is far from another one that nearly explains the picture, too."""
+def doubted(result: FitResult, other: FitResult, material: Mapping[str, Any]) -> FitResult:
+    """A result as unsure as it is far from another one that explains the picture nearly as well or as well.
+
+    What the other fit has not changed is as in the scene's material. An unsure value that has another value there was
+    changed, so it is not told apart.
+    """
     from ...fit.certainty.covariance import certainties_away  # which needs Mitsuba's variant to be set
 
     if not result.certainty:
         return result
     table = BLENDER_PRINCIPLED.select(result.certainty)
-    near = {name: other.recovered.get(name, result.recovered[name]) for name in table.names}
+    near = {name: other.recovered.get(name, value_of(material, name)) for name in table.names}
     away = table.pack(result.recovered) - table.pack(near)
-    return replace(result, certainty=certainties_away(result.certainty, away, table))
+    found = certainties_away(result.certainty, away, table)
+    for name, certainty in found.items():
+        if certainty.level is Level.NOT_VISIBLE and np.any(away[table.slice_of(name)]):
+            found[name] = replace(certainty, level=Level.NOT_TOLD_APART)
+    return replace(result, certainty=found)
+
+
+def look_alike(first: Judgement, second: Judgement) -> bool:
+    """Whether no eye sees which of two results is nearer to the reference."""
+    return abs(first.target.visible - second.target.visible) < LEAST_GAIN
+
+
+def is_rich(result: FitResult, selection: str | Sequence[str]) -> bool:
+    """Whether a result that looks the same has so many layers that a plain material which glows may be the truth."""
+    judgement = result.judgement
+    if judgement is None or selection != "all" or result.model != "blender_principled":
+        return False
+    return judgement.verdict is Verdict.SAME and _layers(result.recovered, result.initial) >= MANY_LAYERS
+
+
+def is_plainer(glowing: FitResult, than: FitResult, material: Mapping[str, Any]) -> bool:
+    """Whether a result has fewer layers that the scene's material lacks, its glow being one."""
+    own = {name: value_of(material, name) for name in LAYERS}
+    return _layers(glowing.recovered, own) + 1 < _layers(than.recovered, own)
+
+
+def _layers(values: Mapping[str, Value], own: Mapping[str, Value]) -> int:
+    """How many of the layers `values` have and a material of its `own` lacks; of a tint what is not white."""
+    plain = {name: 1.0 if name.endswith("_tint") else 0.0 for name in LAYERS}
+
+    def is_there(name: str, of: Mapping[str, Value]) -> bool:
+        return bool(np.max(np.abs(np.subtract(of.get(name, plain[name]), plain[name]))) > LAYER)
+
+    return sum(is_there(name, values) and not is_there(name, own) for name in LAYERS)
 
 
 def is_better(judgement: Judgement | None, than: Judgement, other: MaterialClass) -> bool:

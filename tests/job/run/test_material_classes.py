@@ -9,11 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mfo_backend.job.run import fit_scene as module
+from mfo_backend.job.run import class_trials as module
 from mfo_backend.job.run.material_classes import (
+    PLAINER_GLOW,
     brightest_glow,
     changed,
     is_better,
+    is_rich,
     is_worth_another,
     other_classes,
     parameters_of,
@@ -134,19 +136,50 @@ def test_a_glow_is_written_as_a_full_colour_and_a_strength():
 def test_a_class_that_takes_the_place_of_a_close_one_is_unsure_of_what_it_has_changed(verdict, level):
     """A rough glass of a third stood for a cloth that was close: two values were determined and wrong."""
     glass = other_classes(material(), 0.0)[0]
-    sure = {"metallic": Certainty((0.004,), Level.DETERMINED), "roughness": Certainty((0.01,), Level.DETERMINED)}
+    sure = {name: Certainty((0.004,), Level.DETERMINED) for name in ("metallic", "transmission_weight")}
     after = fitted(0.01, Verdict.SAME)
-    recovered = {"metallic": 0.45, "roughness": 0.3}  # the first fit's metallic is 0.4, it had no roughness
+    recovered = {"metallic": 0.45, "transmission_weight": 0.1}  # metallic 0.4 in the first fit, which had no glass
     after = replace(after, result=replace(after.result, recovered=recovered, certainty=sure))
-    found = module._better(fitted(0.09, verdict), after, glass, material()).result.certainty
-    assert (found["metallic"].level, found["roughness"].level) == (level, Level.DETERMINED)
+    found = module.better(fitted(0.09, verdict), after, glass, material()).result.certainty
+    assert (found["metallic"].level, found["transmission_weight"].level) == (level, level)
     assert found["metallic"].sd == pytest.approx((np.hypot(0.004, 0.05 if verdict is Verdict.CLOSE else 0.0),))
+
+
+def test_a_plain_glow_takes_the_place_of_many_layers():
+    layers = {"metallic": 0.9, "coat_weight": 0.9, "sheen_weight": 0.2}
+    rich = fitted(0.01, Verdict.SAME)
+    sure = {"metallic": Certainty((0.004,), Level.DETERMINED)}
+    rich = replace(rich, result=replace(rich.result, recovered=layers, certainty=sure))
+    assert is_rich(rich.result, "all")
+    assert not is_rich(rich.result, "reduced")
+    assert not is_rich(replace(rich.result, recovered=layers | {"sheen_weight": 0.0}), "all")
+    assert not is_rich(fitted(0.2).result, "all")  # which has other classes tried
+    glow = fitted(0.012, Verdict.SAME)
+    values = {"metallic": 0.0, "emission_color": (0.1, 0.2, 0.1)}
+    glow = replace(glow, result=replace(glow.result, recovered=values, certainty=sure))
+    classes = other_classes(material(), 4.0)
+    found = module.with_plainer_glow(rich, material(), classes, lambda other: glow).result
+    assert found.recovered["emission_strength"] == pytest.approx(0.8)
+    assert found.notes == (PLAINER_GLOW,)
+    # both look the same, so what they differ in is not determined
+    assert found.certainty["metallic"].level is Level.NOT_TOLD_APART
+    seen = replace(glow, result=replace(glow.result, judgement=judgement(Verdict.SAME, None, 0.0)))
+    worse = replace(rich, result=replace(rich.result, judgement=judgement(Verdict.SAME, None, 0.012)))
+    found = module.with_plainer_glow(worse, material(), classes, lambda other: seen).result
+    assert found.certainty["metallic"].level is Level.DETERMINED
+    as_rich = replace(glow, result=replace(glow.result, recovered=layers | values | {"metallic": 0.5}))
+    kept = module.with_plainer_glow(rich, material(), classes, lambda other: as_rich).result
+    assert (kept.recovered, kept.certainty["metallic"].level) == (layers, Level.NOT_TOLD_APART)
+    differs = fitted(0.2)
+    kept = module.with_plainer_glow(rich, material(), classes, lambda other: differs).result
+    assert (kept.recovered, kept.certainty) == (layers, sure)
+    assert kept.seconds == 2.0
 
 
 def test_what_a_class_has_held_is_part_of_its_result():
     glass = material(Transmission_Weight=1.0, Metallic=0.0)
     opaque = next(other for other in other_classes(glass, 0.0) if other.name == "opaque")
-    found = module._better(fitted(0.2), fitted(0.01, Verdict.SAME), opaque, glass).result
+    found = module.better(fitted(0.2), fitted(0.01, Verdict.SAME), opaque, glass).result
     assert found.recovered == {"metallic": 0.4, "transmission_weight": 0.0}
     assert found.initial == {"metallic": 0.0, "transmission_weight": 1.0}
 
@@ -157,7 +190,7 @@ def fitted(visible, verdict=Verdict.DIFFERENT, status=Status.DIFFERENT):
         1.0, 2.0, judgement=judgement(verdict, Cause.MATERIAL, visible),
     )  # fmt: skip
     picture = np.full((2, 2, 3), visible, np.float32)
-    return module._Fitted(result, picture, picture, np.ones((2, 2), bool))
+    return module.Fitted(result, picture, picture, np.ones((2, 2), bool))
 
 
 def best_of(ends):
@@ -173,7 +206,7 @@ def best_of(ends):
         return is_worth_another(found.result, "all")
 
     classes = other_classes(material(), 0.0)
-    return module._with_other_classes(fitted(0.2), material(), classes, fit_from, is_wanted).result
+    return module.with_other_classes(fitted(0.2), material(), classes, fit_from, is_wanted).result
 
 
 def test_what_was_tried_in_vain_is_said():
