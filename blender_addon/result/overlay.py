@@ -39,7 +39,7 @@ def show(scene: bpy.types.Scene) -> None:
 
 def hide(camera: bpy.types.Object | None) -> None:
     """Take it away, with its image."""
-    while (background := _background(camera)) is not None:
+    while camera is not None and (background := _background(camera)) is not None:
         image = background.image
         camera.data.background_images.remove(background)
         bpy.data.images.remove(image)

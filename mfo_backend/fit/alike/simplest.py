@@ -133,6 +133,7 @@ class OtherEnds:
 
         A few tiles with fireflies do not make it so.
         """
+        end: Solution | None = None
         for problem in (self._all,) if self._few is self._all else (self._few, self._all):
             end = self._solve(problem, start, NEAR_EVALUATIONS, box=box, wanted=np.inf)
             if not compare(problem, found.x, end.x).common <= HOPELESS:

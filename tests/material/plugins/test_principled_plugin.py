@@ -103,6 +103,13 @@ def test_alpha_mixes_with_what_is_behind(integrator: str) -> None:
     assert centre == pytest.approx(0.5 * 0.4**2, abs=0.02)
 
 
+@pytest.mark.parametrize("alpha", [1.0, 0.3])
+def test_shadow_rays_pass_by_what_alpha_leaves(alpha: float) -> None:
+    bsdf = mi.load_dict({"type": "blender_principled", "base_color": COLOUR, "alpha": alpha})
+    passed = np.array(bsdf.eval_null_transmission(interaction(unit(30, 0)))).ravel()
+    np.testing.assert_allclose(passed, 1.0 - alpha, atol=1e-6)
+
+
 # Cycles 5.0.1, one surface of rough glass in a uniform world of radiance 1 (see test_lobe_sampling)
 @pytest.mark.parametrize(("angle", "expected"), [(20, (0.95046, 0.89777, 0.84174)), (70, (0.95128, 0.89949, 0.84474))])
 def test_rough_glass_in_a_uniform_world(angle: int, expected: tuple[float, float, float]) -> None:
