@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from mfo_backend.metrics.display.colour import linear_from_srgb
+from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.metrics.flip.exposure_range import ExposureRange, lit_exposures, official_exposures
 from mfo_backend.metrics.flip.flip_difference import FlipDifference
+from mfo_backend.metrics.flip.flip_error import flip_error
 from mfo_backend.metrics.flip.flip_features import Perceived
 from mfo_backend.metrics.flip.flip_reference import FlipReference
 from mfo_backend.metrics.flip.hdr_flip import HdrFlip, hdr_flip_map
 from mfo_backend.metrics.flip.ldr_flip import flip_map, planes_of
 from mfo_backend.metrics.flip.tone_curve import ToneCurve
 from mfo_backend.types.errors import BadInputError
+from mfo_backend.types.image import Encoding, Image
 
 # Generated with flip-evaluator 1.7, printed to six digits: mean, min, max, [0, 0], [24, 35], [47, 63]
 LDR_GOLDEN = {
@@ -224,3 +227,13 @@ def test_black_has_the_slope_that_light_added_to_it_sees(curve):
     np.testing.assert_allclose(slope, rise, rtol=1e-3, atol=1e-6)
     assert (slope > 0.0).all()
     assert (tone.pullback(black - step, 1.0, np.ones_like(black)) == 0.0).all()
+
+
+def test_a_picture_of_a_display_is_compared_without_an_exposure_of_ours():
+    linear = np.random.default_rng(3).uniform(0.0, 0.2, (9, 12, 3)).astype(np.float32)  # dark: it would be exposed
+    shown = Image(DisplayView().display(linear), Encoding.SRGB)
+    for pair in ((shown, Image(linear, Encoding.LINEAR)), (Image(linear, Encoding.LINEAR), shown)):
+        assert flip_error(*pair).mean < 1e-6
+    darker = Image(0.5 * linear, Encoding.LINEAR)
+    exposed = flip_error(Image(linear, Encoding.LINEAR), darker).mean
+    assert exposed > 1.2 * flip_error(shown, darker).mean  # a brighter picture shows the difference better
