@@ -185,7 +185,7 @@ class MFO_OT_choose_shader(bpy.types.Operator):
 
     bl_idname = "mfo.choose_shader"
     bl_label = "Choose Shader to Fit"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}  # of a button that knows the names
 
     shader: StringProperty(name="Shader", description="Its node, after the groups it lies in", options={"SKIP_SAVE"})
 
