@@ -2,8 +2,10 @@
 """Which further picture would tell most of the values that are not determined.
 
 A candidate is recorded with few lanes at the solution. Its normal equations add to the information that there is, so
-the covariance with it is (C^-1 + J'J / s^2)^-1, before the picture exists (optimal design of experiments; V. Fedorov,
-"Theory of Optimal Experiments", 1972). s^2 is what the residuals of the present pictures count for.
+the covariance with it is (C^-1 + I)^-1, before the picture exists (optimal design of experiments; V. Fedorov, "Theory
+of Optimal Experiments", 1972). The present camera is recorded in the same way, and what a picture from there tells is
+known: C^-1. A candidate tells as much more or less of it as its normal equations are larger or smaller, in the
+directions in which they differ most; the noise of so few lanes is in both.
 """
 
 from __future__ import annotations
@@ -21,14 +23,13 @@ from ...types.certainty import Certainty, Level
 from ...types.errors import BadInputError
 from ...types.parameter import ParameterTable
 from ...types.result import NextPicture
-from ..squares.problem import Problem
 from ..squares.recording_noise import rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
-from ..tolerances import DETERMINED_BELOW, WEAK_BELOW
+from ..tolerances import DETERMINED_BELOW
 
 Vector = NDArray[np.float64]
 
-TURNS = tuple(range(30, 360, 30))  # degrees
+TURNS = tuple(range(0, 360, 30))  # degrees; the first is the present camera
 SIDE = 40  # pixels along the longer side of a candidate: some hundred see the target
 GRID = 2  # squared: camera rays of a pixel
 LEAST_GAIN = 2.0  # times smaller: a deviation that shrinks less is not worth a picture
@@ -38,19 +39,16 @@ _RIDGE = 1e-9  # of the largest entry
 
 @dataclass(frozen=True)
 class Known:
-    """What the present pictures tell: the solution, its covariance in widths of the box, and their last problem.
+    """What the present `pictures` tell: the solution and its covariance in widths of the box.
 
-    `covered` pixels see the target; `user` are the scene's own values.
+    `user` are the scene's own values.
     """
 
     x: Vector
     spread: Vector
     certainty: Mapping[str, Certainty]
-    problem: Problem
-    reference: NDArray[np.float32]
-    covered: int
-
     user: Vector
+    pictures: int
 
     def open(self, table: ParameterTable) -> tuple[str, ...]:
         """Values that a further picture is for; none where all that is not determined is the user's own again."""
@@ -67,29 +65,29 @@ def next_picture(scene: RecordedScene, known: Known, seed: int) -> NextPicture |
         return None
     center = target_center(scene.renderer.shape)
     with scene.renderer.counter.uncounted():  # the result is known without it
-        variance, density = _residual_variance(known, table), len(known.problem.groups) / max(known.covered, 1)
-        present = np.linalg.inv(_regular(known.spread)) + np.eye(table.length) / NOTHING_KNOWN**2
-        predicted = [
-            (turn, _deviations(present + density * told / variance))
-            for turn, told in _told(scene, known.x, center, seed)
-        ]
-    if not predicted:
+        told = dict(_told(scene, known.x, center, seed))
+    own = told.pop(0.0, None)
+    if own is None or not told:
         return None
-    now = _deviations(present)
+    of_pictures = np.linalg.inv(_regular(known.spread))
+    of_one = of_pictures / known.pictures
+    predicted = [(turn, _deviations(of_pictures + _information(gram, own, of_one))) for turn, gram in told.items()]
+    now = _deviations(of_pictures)
     turn, after = min(predicted, key=lambda one: _score(one[1], now, wanted, table))
     return _proposal(turn, center, after, now, wanted, table)
 
 
-def _residual_variance(known: Known, table: ParameterTable) -> float:
-    """What a relative residual of one group counts for, by the covariance that all of them have led to."""
-    residual = RelativeResidual(known.problem.groups.average(known.reference))
-    rows, own = rows_of_samples(known.problem.evaluate.samples(known.x), residual)
-    gram = _gram(rows, own, table)
-    sure = np.diag(known.spread) < WEAK_BELOW**2
-    ratio = np.diag(known.spread) / np.diag(np.linalg.inv(_regular(gram)))
-    # channels of a group share their noise
-    of_groups = float(np.mean(np.square(rows[:, :, 0].sum(axis=1)))) / 3.0
-    return max(of_groups, float(np.median(ratio[sure])) if sure.any() else 0.0)
+def _information(candidate: Vector, present: Vector, known: Vector) -> Vector:
+    """What a candidate tells, from its products of derivatives, those of the present camera, and what that told.
+
+    In the basis V with V' present V = 1 and V' candidate V = diag(l), each direction counts l times.
+    """
+    root = np.linalg.inv(np.linalg.cholesky(_regular(present)))
+    ratios, directions = np.linalg.eigh(root @ candidate @ root.T)
+    basis = root.T @ directions
+    scale = np.sqrt(np.maximum(ratios, 0.0))
+    back = np.linalg.inv(basis)
+    return back.T @ (scale[:, None] * (basis.T @ known @ basis) * scale) @ back
 
 
 def _deviations(information: Vector) -> Vector:
@@ -139,7 +137,11 @@ def _regular(matrix: Vector) -> Vector:
 def _score(after: Vector, now: Vector, wanted: Sequence[str], table: ParameterTable) -> float:
     """How much of the wanted values' deviations is left; what is determined gains nothing by more."""
     entries = [i for name in wanted for i in range(*table.slice_of(name).indices(table.length))]
-    return float(np.log(np.maximum(after[entries], DETERMINED_BELOW) / now[entries]).mean())
+    return float(
+        np.log(
+            np.clip(after[entries], DETERMINED_BELOW, NOTHING_KNOWN) / np.minimum(now[entries], NOTHING_KNOWN)
+        ).mean()
+    )
 
 
 def _proposal(

@@ -143,17 +143,17 @@ class RecordedRoute:
             stages=tuple(course.reports),
             notes=tuple(notes),
             contradiction=disagree,
-            next_picture=None if disagree else self._next_picture(end, kept),
+            next_picture=None if disagree else self._next_picture(kept),
         )
 
-    def _next_picture(self, end: OnRecording, kept: Kept) -> NextPicture | None:
+    def _next_picture(self, kept: Kept) -> NextPicture | None:
         """The further picture that would tell most of the weak values."""
         task = self._task
         if task.settings.preset == "fast" or task.should_stop():
             return None
         scene = self._scene if isinstance(self._scene, RecordedScene) else self._scene.first
-        covered = int(task.mask.sum())
-        known = Known(kept.x, kept.spread, kept.certainty, end.refined.all, task.light, covered, self._renderer.start)
+        pictures = 1 if task.sheet is None else len(task.sheet)
+        known = Known(kept.x, kept.spread, kept.certainty, self._renderer.start, pictures)
         return next_picture(scene, known, Stream.NEXT_PICTURE.seed(task.settings.seed))
 
     def _contradiction(self, end: OnRecording, kept: Kept) -> Contradiction | None:

@@ -15,9 +15,9 @@ from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.verdict import Verdict
-from tests.render.scenes import FLOOR, POINT
+from tests.render.scenes import AREA, FLOOR, POINT
 
-from .two_scenes import VALUES, mean_light, pictures_of, views
+from .two_scenes import FROM, VALUES, mean_light, pictures_of, views
 
 LABELS = ["1 (a.exr)", "2 (b.exr)", "3 (c.exr)", "4 (d.exr)"]
 FAST = FitSettings(preset="fast", verify_spp=16)
@@ -127,3 +127,26 @@ def test_a_picture_whose_lamp_had_moved_is_named_and_no_other(tmp_path):
     assert found.status.exit_code != 0
     task = one_sheet(renderers, pictures_of(renderers, VALUES), [DisplayView()] * 3, LABELS[:3])
     assert fitted(task.renderer, task.reference).result.contradiction is None
+
+
+def test_the_proposed_picture_is_as_good_as_it_was_said(tmp_path):
+    """The proposal's camera is built by hand, from the angle and the centre that it names."""
+    names = ["base_color", "roughness", "specular", "clearcoat", "clearcoat_gloss"]
+    values = {**VALUES, "clearcoat": 0.5, "clearcoat_gloss": 0.8}
+    settings = replace(FAST, preset="balanced")
+    first = views(tmp_path / "one", [AREA], [40], names)
+    reference = pictures_of(first, values, spp=256)
+    alone = fitted(first[0], reference[0], settings=settings).result
+    proposal = alone.next_picture
+    assert proposal is not None
+    np.testing.assert_allclose(proposal.center, 0.0, atol=1e-6)
+    turn = np.radians(proposal.turn)
+    place = f"{4.0 * np.sin(turn):.5f}, {-4.0 * np.cos(turn):.5f}, 1"
+    both = views(tmp_path / "two", [AREA, AREA], [40, 40], names, places=(FROM[0], place))
+    task = one_sheet(both, pictures_of(both, values, spp=256), [DisplayView()] * 2, LABELS[:2])
+    together = fitted(task.renderer, task.reference, settings=settings).result
+    assert proposal.predicted
+    for name, deviation in proposal.predicted.items():
+        realised = max(together.certainty[name].sd)
+        assert deviation < max(alone.certainty[name].sd), name
+        assert 0.4 < realised / deviation < 2.5, (name, realised, deviation)

@@ -16,15 +16,20 @@ VALUES = {"base_color": (0.6, 0.2, 0.1), "roughness": 0.35, "specular": 0.6}
 
 
 def views(
-    folder: Path, lights: list[str], sizes: list[int], parameters: list[str] | None = None, *, depth: int = 2
+    folder: Path,
+    lights: list[str],
+    sizes: list[int],
+    parameters: list[str] | None = None,
+    *,
+    places: tuple[str, ...] = FROM,
 ) -> list:
     """A renderer for each light, from another side each, of pictures of these sizes."""
     found = []
     for number, (light, size) in enumerate(zip(lights, sizes, strict=True)):
         here = folder / str(number)
         here.mkdir(parents=True, exist_ok=True)
-        file = write_scene(here, light, size=size, depth=depth)
-        file.write_text(file.read_text("utf-8").replace(FROM[0], FROM[number]), "utf-8")
+        file = write_scene(here, light, size=size)
+        file.write_text(file.read_text("utf-8").replace(FROM[0], places[number]), "utf-8")
         names = parameters or list(VALUES)
         found.append(load_renderer(file, "target", model="mitsuba_principled", parameters=names))
     return found
