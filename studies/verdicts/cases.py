@@ -100,8 +100,14 @@ def sockets_of(case: Case) -> dict[str, Any]:
             "IOR": draw.uniform(1.35, 1.6),
         },
         "cutout": plain | {"Alpha": 0.5},
-        "glowing": plain | {"Emission Color": colour, "Emission Strength": draw.uniform(1.0, 3.0)},
+        "glowing": plain | _emission(colour, draw.uniform(1.0, 3.0)),
     }[case.material]
+
+
+def _emission(colour: tuple[float, ...], strength: float) -> dict[str, Any]:
+    """Colour and strength as a fit says them, the largest channel being 1."""
+    peak = max(colour[:3])
+    return {"Emission Color": (*(c / peak for c in colour[:3]), 1.0), "Emission Strength": strength * peak}
 
 
 def start_of(case: Case) -> dict[str, Any]:
