@@ -44,8 +44,9 @@ def main(shots: Path) -> None:
 def _sidebar(path: Path) -> Image.Image:
     """The sidebar without the empty rest below its last panel."""
     part = Image.open(path).convert("RGB")
-    if not path.name.startswith("walk_"):  # a picture of the whole screen
-        part = part.crop(SIDEBAR)
+    if path.name.startswith("walk_"):  # a sidebar already
+        return part
+    part = part.crop(SIDEBAR)
     # below the panels the viewport shines through: grid lines there, panel grey above
     row = next((y for y in range(part.height - 1, 0, -1) if _is_panel(part.getpixel((10, y)))), part.height - 1)
     return part.crop((0, 0, part.width, min(part.height, row + 8)))

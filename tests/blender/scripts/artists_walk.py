@@ -46,8 +46,9 @@ def scroll(steps):
 
 
 def shot(name):
-    preflight.redraw()
-    yield 4.0  # panels grow and shrink in steps
+    for _ in range(12):  # panels grow and shrink in steps, one with each draw
+        preflight.redraw()
+        yield 0.3
     side = region("UI")[1]
     crop = f"{side.width}x{side.height}+{side.x}+{HEIGHT - side.y - side.height}"
     subprocess.run(["import", "-window", "root", "-crop", crop, "+repage", f"{shots}/walk_{name}.png"], check=True)
@@ -71,7 +72,7 @@ def story():
     scene, head = bpy.context.scene, bpy.data.objects["Suzanne"]
     bpy.context.view_layer.objects.active = head
     head.select_set(True)
-    scene.mfo.reference_path = reference
+    scene.mfo.reference_path = bpy.path.relpath(reference)
     scene.render.use_border, scene.camera = True, None
     yield 1.0
     press(bpy.ops.mfo.mend, kind="camera", argument="Camera")
