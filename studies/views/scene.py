@@ -16,7 +16,7 @@ import random
 from pathlib import Path
 
 import bpy
-from mathutils import Matrix, Vector
+from mathutils import Matrix, Vector  # pyright: ignore[reportMissingImports]  # part of bpy
 
 TARGET, CENTER = "Target", Vector((0.0, 0.0, 1.1))
 TURNS = range(30, 360, 30)
