@@ -27,6 +27,7 @@ _GERMAN = {
     "Use": "Verwenden",
     "A photograph, or a render under the view transform Standard: compared under Standard": "Ein Foto oder ein Rendering unter der Ansichtstransformation Standard: verglichen unter Standard",
     "A Python of your own that has Mitsuba; empty: the one that Install makes": "Ein eigenes Python, das Mitsuba hat; leer: das von Installieren angelegte",
+    "new node": "neuer Node",
     "A backend is loading": "Ein Backend lädt",
     "Keep Ready": "Bereithalten",
     "Minutes that a loaded backend waits for the next fit, which then begins at once; 0: none waits": "Minuten, die ein geladenes Backend auf die nächste Anpassung wartet, die dann sofort beginnt; 0: keines wartet",

@@ -41,7 +41,7 @@ class MFO_OT_remove_picture(bpy.types.Operator):
 
     bl_idname = "mfo.remove_picture"
     bl_label = "Remove Picture"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}  # it needs a number
 
     index: IntProperty(name="Index", description="Counted from 0", min=0, options={"HIDDEN", "SKIP_SAVE"})
 

@@ -16,7 +16,13 @@ class MFO_MT_material_fit(bpy.types.Menu):
         """List the operators in the order of the work."""
         layout = self.layout
         for names in (
-            ("mfo.check", "mfo.render_reference"),
+            (
+                "mfo.check",
+                "mfo.render_reference",
+                "mfo.overlay_reference",
+                "mfo.add_picture",
+                "mfo.set_up_next_picture",
+            ),
             ("mfo.fit", "mfo.fit_selected", "mfo.cancel"),
             ("mfo.show_pictures", "mfo.check_in_cycles", "mfo.cancel_cycles", "mfo.open_report", "mfo.open_job"),
             ("mfo.apply", "mfo.toggle", "mfo.revert", "mfo.copy_values"),
