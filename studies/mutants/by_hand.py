@@ -30,7 +30,7 @@ WRONG = [
         "return (*map(float, color), *(1.0 for _ in kept[3:]))",
     ),
     # Revert leads to what an earlier fit applied
-    ("blender_addon/result/write_back.py", "if name not in kept.originals:", "if True:"),
+    ("blender_addon/result/write_back.py", "if key not in kept.originals:", "if True:"),
     # the end of a line that was too long counts as a line of its own
     (
         "blender_addon/process/progress_lines.py",

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m studies.views OUT.jsonl --numbers 0-19`: one row for each scene, and a summary.
+"""Several pictures of a material and the proposal of the next: one row for each scene, and a summary.
+
+    python -m studies.views OUT.jsonl --numbers 0-19
 
 A scene's material is fitted to one picture; to that and the proposed one; to that and one drawn at random; to all
 three; and to all three when the second was rendered under another lamp than its scene has.
@@ -78,7 +80,7 @@ def _run(module: str, *words: Any) -> dict[str, Any]:
 
 def main() -> None:
     """Measure the scenes that have no row yet, then print the summary."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("rows", type=Path)
     parser.add_argument("--numbers", default="0-19", help="first-last")
     chosen = parser.parse_args()

@@ -27,6 +27,7 @@ class SphereRenderer:
     """Lambert plus an isotropic GGX lobe without shadowing. `noise` is the deviation of its seeded pixel noise."""
 
     model = "sphere"
+    graph = None  # no values inside nodes
     table = TABLE
 
     def __init__(self, start: NDArray[np.float64], noise: float = 0.0) -> None:

@@ -85,7 +85,8 @@ def test_slots_objects_and_names(scene: Any, export: Any, mitsuba: Any) -> None:
     report = export(item)
     shapes = shapes_of(mitsuba, report)
     assert report.request["target"] == {
-        "shape_id": "target", "bsdf_id": "target_bsdf", "object": item.name, "material": 'sec"ond', "slot": 1
+        "shape_id": "target", "bsdf_id": "target_bsdf", "object": item.name, "material": 'sec"ond', "slot": 1,
+        "node": ["Principled BSDF"], "labels": {},
     }  # fmt: skip
     assert {name: shape.face_count() for name, shape in shapes.items()} == {
         "target": 4, "shape_0001": 2, "shape_0002": 2, "shape_0003": 2
