@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
-from ..export.nodes.shader_graph import source_of
+from ..export.nodes.shader_graph import Links, source_of
 from ..export.nodes.target_shader import Place as SocketPlace
 from ..export.nodes.target_shader import TargetShader
 from . import ranges
@@ -55,13 +55,14 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
     """The values of the graph of a target, in the order in which they are met on the way up from its sockets."""
     tree = (target.groups[0] if target.groups else target.node).id_data
     found: dict[Place, _Met] = {}
+    links = Links()
     for name, place in target.places.items():
         if name in NOT_FITTED or not place.socket.is_linked:
             continue
         is_color = place.socket.type == "RGBA"
         for met in _tints(name, place):
             found[met.place] = met
-        for met in _upstream(place.socket, place.groups):
+        for met in _upstream(place.socket, place.groups, links):
             known = found.setdefault(met.place, met)
             known.sockets.append(name) if name not in known.sockets else None
             known.asks_color |= is_color
@@ -115,29 +116,26 @@ class _Met:
     label: str = ""  # in place of the node's
 
 
-def _upstream(
-    socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], seen: set[Any] | None = None
-) -> Iterator[_Met]:
+def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], links: Links) -> Iterator[_Met]:
     """The values upstream of a socket that lies in `groups`."""
-    seen = set() if seen is None else seen
-    source = source_of(socket)
-    if source is None or source.node.mute:
-        return
-    node = source.node
-    key = (*(group.as_pointer() for group in groups), node.as_pointer(), source.identifier)
-    if key in seen or not node.is_registered_node_type():
-        return
-    seen.add(key)
-    if node.bl_idname not in (GROUP, GROUP_INPUT):
-        yield from _own_values(node, groups, source)
-    for further, within in feeding(node, source, groups):
-        if is_tint(node) and not further.is_linked:
-            continue  # it has names of its own
-        if further.is_linked:
-            if source_of(further) is not None:
-                yield from _upstream(further, within, seen)
-        elif further.node.bl_idname != GROUP_INPUT:
-            yield from _input_values(further, within)
+    seen: set[tuple[Any, ...]] = set()
+    ways = [iter([(socket, groups)])]
+    while ways:
+        further, within = next(ways[-1], (None, ()))
+        if further is None:
+            ways.pop()
+        elif not further.is_linked:
+            if further.node.bl_idname != GROUP_INPUT and not is_tint(further.node):  # a tint has names of its own
+                yield from _input_values(further, within)
+        elif (source := source_of(further, links)) is not None and not source.node.mute:
+            node = source.node
+            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier)
+            if key in seen or not node.is_registered_node_type():
+                continue
+            seen.add(key)
+            if node.bl_idname not in (GROUP, GROUP_INPUT):
+                yield from _own_values(node, within, source)
+            ways.append(feeding(node, source, within))
 
 
 def _tints(name: str, place: SocketPlace) -> Iterator[_Met]:

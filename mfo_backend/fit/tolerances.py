@@ -40,6 +40,11 @@ DETERMINED_BELOW = 0.02
 # that only noise has chosen stay. Smaller: values that the picture shows go back. No measurement.
 WEAK_BELOW = 0.15
 
+# Part of the tiles that alone say nothing against a material. In a picture by Cycles of 64 x 64 pixels one firefly of 8
+# standard deviations asked for a black tint with a chi squared of 80; a coat's highlight under a sun fills more tiles.
+# Larger: small highlights ask for nothing. Smaller: fireflies ask for lobes.
+LOUDEST = 0.01
+
 # ---- what can be seen
 
 # Mean FLIP that a change may add and still count as unseen; values that the picture does not show change it by less
@@ -72,3 +77,16 @@ ANOTHER_BASIN = 0.1
 ANOTHER_MATERIAL = 0.02
 # A value this near to its lower bound is switched off. Larger: weak lobes count as none. No measurement.
 OFF = 0.002
+
+# ---- several pictures
+
+# Mean square of all pictures' residuals over that of the others where one is left out: from it on this one does not go
+# with them. Five scenes of Cycles with a moved lamp and fifteen fits without are on the right sides of it
+# (docs/notebook/several_pictures.md), which does not calibrate it. Larger: a wrong picture is averaged in silence.
+AGAINST_REST = 2.0
+# Of two pictures whose ratios differ by less both are named. Larger: the right one is accused, too. No measurement.
+TOLD_APART = 2.0
+# A further picture is proposed where it divides a deviation by so much. Larger: fewer proposals. No measurement.
+WORTH_A_PICTURE = 2.0
+# Deviation, of the box, of a value that may lie anywhere in it: about 1/sqrt(12), that of a uniform distribution.
+NOTHING_KNOWN = 0.3

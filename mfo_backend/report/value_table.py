@@ -9,7 +9,7 @@ import numpy as np
 
 from ..metrics.display.colour import srgb_from_linear
 from ..types.certainty import Certainty, Level
-from ..types.parameter import Value
+from ..types.parameter import Value, socket_name
 from ..types.result import FitResult
 
 _WITH_SPREAD = (Level.DETERMINED, Level.WEAK)
@@ -18,11 +18,6 @@ _WITH_SPREAD = (Level.DETERMINED, Level.WEAK)
 def value_rows(result: FitResult) -> str:
     """One table row per fitted parameter."""
     return "".join(_row(name, result) for name in result.recovered)
-
-
-def socket_name(parameter: str) -> str:
-    """What Blender calls the parameter: ``specular_ior_level`` is Specular IOR Level."""
-    return " ".join(word.upper() if word == "ior" else word.title() for word in parameter.split("_"))
 
 
 def value_text(value: Value) -> str:

@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from .parameter import socket_name
+
 
 class Level(Enum):
     """How sure a recovered value is."""
@@ -32,7 +34,7 @@ class Certainty:
     def words(self) -> str:
         """The level for a user."""
         if self.level is Level.NOT_TOLD_APART and self.along:
-            return f"not told apart from {', '.join(name.replace('_', ' ').title() for name in self.along)}"
+            return f"not told apart from {', '.join(map(socket_name, self.along))}"
         return _WORDS[self.level]
 
 

@@ -22,6 +22,11 @@ def parameter_name(text: str) -> str:
     return "_".join(text.lower().replace("_", " ").split())
 
 
+def socket_name(parameter: str) -> str:
+    """What Blender calls a parameter: ``specular_ior_level`` is Specular IOR Level."""
+    return " ".join(word.upper() if word == "ior" else word[:1].upper() + word[1:] for word in parameter.split("_"))
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One value of a material model.

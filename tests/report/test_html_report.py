@@ -16,9 +16,10 @@ from PIL import Image as Pillow
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.report.html_report import ReportContent, report_html
 from mfo_backend.report.picture import displayed, displayed_linear, png_bytes
-from mfo_backend.report.value_table import socket_name, swatch_colour, value_text
+from mfo_backend.report.value_table import swatch_colour, value_text
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.model_gap import ModelGap
+from mfo_backend.types.parameter import socket_name
 from mfo_backend.types.result import CurvePoint, FitResult, StageReport
 from mfo_backend.types.status import Status
 from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict

@@ -38,13 +38,29 @@ class MissingPictureError(UnsupportedNodeError):
     """A picture whose file is missing, for which Cycles shows magenta."""
 
 
-def source_of(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
-    """Return the output socket that feeds `socket`, or None if nothing does.
+class Links:
+    """The links of node trees by where they end, for one walk: `socket.links` looks through all of a tree each time."""
+
+    def __init__(self) -> None:
+        self._of: dict[int, dict[int, bpy.types.NodeLink]] = {}
+
+    def into(self, socket: bpy.types.NodeSocket) -> bpy.types.NodeLink:
+        """The link into a linked input."""
+        tree = socket.id_data
+        known = self._of.get(tree.as_pointer())
+        if known is None:
+            known = {link.to_socket.as_pointer(): link for link in tree.links}
+            self._of[tree.as_pointer()] = known
+        return known[socket.as_pointer()]
+
+
+def source_of(socket: bpy.types.NodeSocket, links: Links | None = None) -> bpy.types.NodeSocket | None:
+    """Return the output socket that feeds `socket`, or None if nothing does; `links` are those of a longer walk.
 
     Reroutes are skipped, and so are muted nodes: what they let through is an input of theirs, or nothing.
     """
     while socket.is_linked:
-        link = socket.links[0]
+        link = socket.links[0] if links is None else links.into(socket)
         if link.is_muted or not link.is_valid:
             return None
         node, output = link.from_node, link.from_socket

@@ -21,13 +21,11 @@ from ...material.principled.blender_selection import AMOUNT_OF
 from ...types.parameter import ParameterTable
 from ..squares.problem import Problem, Rival
 from ..squares.recording_noise import MOST_OWN, rows_of_samples
+from ..tolerances import LOUDEST
 from .unneeded_lobes import is_off
 
 Vector = NDArray[np.float64]
 
-# Part of the tiles that alone say nothing against a material. In a Cycles picture of 64 pixels one firefly of 8
-# standard deviations asked for a black tint with a chi squared of 80; a coat's highlight under a sun fills more tiles
-LOUDEST = 0.01
 # Of a sentence on another material
 TOLD_FROM = 0.05  # its probability; rarer ones still widen the deviations
 SEEN_CHANGE = 0.05  # of a value's range

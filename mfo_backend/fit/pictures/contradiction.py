@@ -15,17 +15,12 @@ from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import NormalEquations, SolveLimits, solve_bounded
 from ...types.result import Contradiction
+from ..plans import NEAR_EVALUATIONS
 from ..squares.problem import Problem
 from ..squares.residuals import gram_of, residual_rows
+from ..tolerances import AGAINST_REST, AT_NOISE, TOLD_APART
 
 Vector = NDArray[np.float64]
-
-# Mean square of all pictures' residuals over that of the others where one is left out, from which on this one does not
-# go with them. Measured by `studies.views`.
-AGAINST_REST = 2.0
-CLEARLY = 2.0  # times the next candidate's: else both are named
-LEAST_MISFIT = 1.5  # deviations of the noise: below, all pictures are explained
-EVALUATIONS = 12
 
 
 def contradiction(
@@ -56,16 +51,16 @@ def contradiction(
         return np.array([values[numbers == number].mean() for number in range(len(labels))])
 
     together = squares(x)
-    if together.mean() < LEAST_MISFIT**2:
+    if together.mean() < AT_NOISE**2:
         return None
     gains = np.empty(len(labels))
     for number in range(len(labels)):
-        limits = SolveLimits(evaluations=EVALUATIONS, cost_change=1e-3)
+        limits = SolveLimits(evaluations=NEAR_EVALUATIONS, cost_change=1e-3)
         found = solve_bounded(_without(solved, numbers == number), x, *box, limits, should_stop).x
         gains[number] = together.mean() / max(np.delete(squares(found), number).mean(), 1e-12)
     if should_stop() or gains.max() < AGAINST_REST:
         return None
-    named = tuple(label for label, gain in zip(labels, gains, strict=True) if gain > gains.max() / CLEARLY)
+    named = tuple(label for label, gain in zip(labels, gains, strict=True) if gain > gains.max() / TOLD_APART)
     return Contradiction(named, _sentence(named, len(labels)))
 
 

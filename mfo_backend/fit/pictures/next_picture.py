@@ -21,19 +21,17 @@ from ...render.paths.recorded_scene import RecordedScene
 from ...render.sheet.turned_camera import target_center, turned_cameras
 from ...types.certainty import Certainty, Level
 from ...types.errors import BadInputError
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, socket_name
 from ...types.result import NextPicture
 from ..squares.recording_noise import rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
-from ..tolerances import DETERMINED_BELOW
+from ..tolerances import DETERMINED_BELOW, NOTHING_KNOWN, WORTH_A_PICTURE
 
 Vector = NDArray[np.float64]
 
 TURNS = tuple(range(0, 360, 30))  # degrees; the first is the present camera
 SIDE = 40  # pixels along the longer side of a candidate: some hundred see the target
 GRID = 2  # squared: camera rays of a pixel
-LEAST_GAIN = 2.0  # times smaller: a deviation that shrinks less is not worth a picture
-NOTHING_KNOWN = 0.3  # of the box: about the deviation of a value that may lie anywhere in it
 _RIDGE = 1e-9  # of the largest entry
 
 
@@ -150,7 +148,7 @@ def _proposal(
     worst = {name: float(after[table.slice_of(name)].max()) for name in wanted}
     before = {name: float(now[table.slice_of(name)].max()) for name in wanted}
     settles = tuple(name for name, sd in worst.items() if sd < DETERMINED_BELOW)
-    surer = tuple(name for name, sd in worst.items() if LEAST_GAIN * sd < before[name] and name not in settles)
+    surer = tuple(name for name, sd in worst.items() if WORTH_A_PICTURE * sd < before[name] and name not in settles)
     if not settles and not surer:
         return None
     width = {name: table[name].upper - table[name].lower for name in wanted}
@@ -170,5 +168,5 @@ def _proposal(
 
 
 def _listed(names: Sequence[str]) -> str:
-    words = [name.replace("_", " ").title() for name in names]
+    words = [socket_name(name) for name in names]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

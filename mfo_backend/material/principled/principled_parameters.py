@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ...types.parameter import Parameter, ParameterTable
+from ...types.parameter import Parameter, ParameterTable, socket_name
 
 # Bounds keep every gradient finite: a mirror (roughness 0) has no value to differentiate, an index of 1 no surface,
 # and a black coat tint an infinite absorption. Defaults are those of the node in Blender 5.0.
@@ -35,13 +35,11 @@ BLENDER_PRINCIPLED = ParameterTable(
     ]
 )
 
-_ACRONYMS = {"ior": "IOR"}
-
 
 def parameter_to_socket(name: str) -> str:
     """Blender's socket name, "specular_ior_level" giving "Specular IOR Level"."""
     BLENDER_PRINCIPLED[name]  # raises KeyError for a name that is not in the table
-    return " ".join(_ACRONYMS.get(word, word.capitalize()) for word in name.split("_"))
+    return socket_name(name)
 
 
 SOCKET_OF_PARAMETER = {name: parameter_to_socket(name) for name in BLENDER_PRINCIPLED.names}

@@ -231,3 +231,24 @@ def test_a_picture_is_tinted_by_a_node_that_apply_puts_there(graph: SimpleNamesp
     toggle_values(graph.material)
     assert revert_values(graph.material) == []
     assert tuple(tint.inputs[1].default_value) == (1.0, 1.0, 1.0)
+
+
+def test_a_long_graph_is_walked_once(graph: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.graph_values import table
+
+    tree, last = graph.material.node_tree, graph.noise
+    for _ in range(1200):
+        node = tree.nodes.new("ShaderNodeRGBToBW")
+        tree.links.new(last.outputs[0], node.inputs[0])
+        last = node
+    tree.links.new(last.outputs[0], graph.shader.inputs["Metallic"])
+    looked, looks = table.source_of, []
+
+    def count(socket: Any, links: Any = None) -> Any:
+        looks.append(links)
+        return looked(socket, links)
+
+    monkeypatch.setattr(table, "source_of", count)
+    assert "Metallic" in values_of(graph.material)["Noise Texture/Scale"].sockets
+    assert len(looks) < 1300  # about one for each link
+    assert sum(links is None for links in looks) < 10  # those look through all links of the tree

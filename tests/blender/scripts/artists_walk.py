@@ -13,9 +13,12 @@ import importlib
 import subprocess
 import sys
 import time
-import traceback
+from pathlib import Path
 
 import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import steps
 
 ADDON = "bl_ext.user_default.material_fit_mfo.blender_addon"
 HEIGHT = 1000  # of the screen in pixels
@@ -93,18 +96,4 @@ def story():
     yield from shot("4_values")
 
 
-steps = story()
-
-
-def tick():
-    try:
-        return next(steps)
-    except StopIteration:
-        pass
-    except BaseException:
-        traceback.print_exc(file=sys.stdout)
-    bpy.ops.wm.quit_blender()
-    return None
-
-
-bpy.app.timers.register(tick, first_interval=2.0, persistent=True)
+steps.take(story())

@@ -12,11 +12,13 @@ import signal
 import subprocess
 import sys
 import time
-import traceback
 from pathlib import Path
 
 import addon_utils
 import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import steps
 
 addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
@@ -357,19 +359,4 @@ def story():
     print(f"ALL GOOD, longest stall {stall * 1000:.1f} ms in {len(spent)} calls", flush=True)
 
 
-steps = story()
-
-
-def tick():
-    try:
-        return next(steps)
-    except StopIteration:
-        pass
-    except BaseException:
-        traceback.print_exc(file=sys.stdout)
-        sys.stdout.flush()
-    bpy.ops.wm.quit_blender()
-    return None
-
-
-bpy.app.timers.register(tick, first_interval=2.0, persistent=True)
+steps.take(story())
