@@ -6,8 +6,8 @@
 
 The first fits values of the shader's sockets, the second such inside the nodes, 4 to 9 numbers a graph (`values.py`).
 Truth and start are drawn at random. Each row has the FLIP over the target, in Cycles, of the start, of the result and
-of another render of the truth (the floor), the largest error of each value, and the seconds. Rows that are in the file
-already are not made again. Needs the bpy module.
+of another render of the truth (the floor), the largest error of each value, its deviation, and the seconds. Rows that
+are in the file already are not made again. Needs the bpy module.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from mfo_backend.metrics.flip.flip_error import flip_error
 from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.image import Encoding, Image, Pixels
 
+from ..verdicts.summary import DEVIATIONS, OFF
 from .materials import GRAPHS
 from .values import FITTED, SOCKETS, Drawn
 
@@ -116,12 +117,20 @@ def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, 
         counted = np.array(mask.pixels).reshape(size, size, -1)[::-1, :, 0] > 0.5  # Blender's rows begin below
     flips = {name: _flip(floor, other, counted) for name, other in
              (("before", before), ("after", after), ("floor", reference))}  # fmt: skip
-    sure = {name: result.certainty.get(key, "") for name, key in zip(names, parameters, strict=True)}
+    of = list(zip(names, parameters, strict=True))
+    sure = {name: result.certainty.get(key, "") for name, key in of}
+    spread = {name: drawn.share(name, result.spread[key], truth[name]) for name, key in of if key in result.spread}
     return {
         **known, "seconds": round(seconds, 1), "verdict": result.verdict,
         **{f"flip_{name}": round(value, 5) for name, value in flips.items()},
         "wrong": {name: round(error, 4) for name, error in drawn.errors(truth).items()}, "certainty": sure,
+        "spread": {name: round(share, 5) for name, share in spread.items() if math.isfinite(share)},
     }  # fmt: skip
+
+
+def is_wrong(made: dict[str, Any], name: str) -> bool:
+    """Whether a value of a row is off by more than a fiftieth of its range and by more than three deviations."""
+    return made["wrong"][name] > max(OFF, DEVIATIONS * made["spread"].get(name, 0.0))
 
 
 def _cycles(samples: int, seed: int) -> Pixels:

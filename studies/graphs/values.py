@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Sequence
 from typing import Any
@@ -78,6 +79,13 @@ class Drawn:
             apart = np.log(here / there) / np.log(4.0) if self._by_factors(name) else (here - there) / (high - low)
             found[name] = float(np.abs(apart).max())
         return found
+
+    def share(self, name: str, deviation: float, truth: Any) -> float:
+        """A standard deviation of a value in the unit of its `errors`."""
+        if self._by_factors(name):
+            return deviation / (float(np.min(truth)) * math.log(4.0))
+        low, high = self._limits(name)
+        return deviation / (high - low)
 
     def _by_factors(self, name: str) -> bool:
         return name in self._inside and self._inside[name].range.logarithmic

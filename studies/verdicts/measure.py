@@ -78,12 +78,13 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
     }
     return Row(
         kind, asdict(case), result.get("verdict") or "", result.get("verdict_cause") or "",
-        code, *_flips(folder), start_flip=result["errors"]["flip"][0], seconds=result["seconds"], values=values,
+        code, *flips(folder), start_flip=result["errors"]["flip"][0], seconds=result["seconds"], values=values,
         notes=result["notes"],
     )  # fmt: skip
 
 
-def _flips(folder: Path) -> tuple[float, float, float, float]:
+def flips(folder: Path) -> tuple[float, float, float, float]:
+    """Mean FLIP of after.exr and floor.exr against reference.exr, over the whole picture and then over the target."""
     from mfo_backend.metrics.flip.flip_error import flip_error
     from mfo_backend.scene.image_file import read_image
 

@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
+from mfo_backend.bench.rows.blender_row import WRONG
+
 from .measure import Row
 
-WRONG = 0.05  # FLIP above the noise from which on a result must not be called the same
 VERDICTS = ("same", "close", "different", "failed")
 OFF, DEVIATIONS = 0.02, 3.0  # a determined value is wrong beyond both
 
@@ -30,16 +31,16 @@ def summary(rows: Sequence[Row]) -> str:
     for name, group in groups.items():
         count = Counter(row.verdict for row in group)
         lines.append(f"| {name} | " + " | ".join(str(count[verdict]) for verdict in VERDICTS) + " |")
-    wrong, determined = _determined(rows)
-    lines += ["", f"{wrong} of {determined} values called determined are off by more than {OFF} and 3 deviations."]
+    wrong, sure = determined(value for row in rows for value in row.values.values())
+    lines += ["", f"{wrong} of {sure} values called determined are off by more than {OFF} and 3 deviations."]
     causes = Counter((row.case["plant"], row.cause) for row in rows if row.verdict != "same")
     lines += [f"{plant or 'nothing'}: {cause or 'no cause'} {number}" for (plant, cause), number in causes.items()]
     return "\n".join(lines)
 
 
-def _determined(rows: Sequence[Row]) -> tuple[int, int]:
-    values = [value for row in rows for value in row.values.values() if value.get("level") == "determined"]
-    known = [value for value in values if value["truth"] is not None]
+def determined(values: Iterable[dict[str, Any]]) -> tuple[int, int]:
+    """How many values called determined are wrong, and how many there are; those of unknown truth are not counted."""
+    known = [value for value in values if value.get("level") == "determined" and value["truth"] is not None]
     return sum(_is_wrong(value) for value in known), len(known)
 
 

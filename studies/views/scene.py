@@ -4,13 +4,14 @@
     python -m studies.views.scene build NUMBER FOLDER
     python -m studies.views.scene render FOLDER CAMERA FILE [--moved]
 
-`build` writes truth.blend and start.blend with the camera Front and its turns T030 to T330 around the target; `render`
-shows the truth from one of them, with `--moved` under a lamp that is elsewhere.
+`build` writes truth.blend, its values in truth.json, and start.blend, with the camera Front and its turns T030 to T330
+around the target; `render` shows the truth from one of them, with `--moved` under a lamp that is elsewhere.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import random
 from pathlib import Path
@@ -68,6 +69,7 @@ def build(number: int, folder: Path) -> None:
     for name, value in truth.items():
         sockets[name].default_value = value
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "truth.blend"), copy=True)
+    (folder / "truth.json").write_text(json.dumps({name.lower().replace(" ", "_"): v for name, v in truth.items()}))
 
 
 def render(folder: Path, camera: str, file: Path, *, moved: bool) -> None:

@@ -10,10 +10,12 @@ from html import escape
 from pathlib import Path
 
 from ...job.folder.atomic_file import write_atomically
+from ..rows.blender_row import read_blender_rows
 from ..rows.method import METHODS
 from ..rows.row import Row
 from ..rows.row_file import RowFile
 from ..rows.summary import SOLVED_FLIP, TARGETS, Summary, comparable, quantile, summaries
+from .blender_section import blender_table
 from .figure import svg
 from .findings import ablations, against_the_loop, calibration, promises, stage_gains, time_parts
 from .gallery import gallery
@@ -88,6 +90,7 @@ def write_report(folder: Path, *, notes: Sequence[str] = ()) -> str:
         ("What each stage gains", stage_gains(rows)),
         ("Ablations", ablations(rows)),
         ("Hard cases", hard_section(folder)),
+        ("From .blend files, judged by Cycles", blender_table(read_blender_rows(folder))),
         ("How well the predicted standard deviations hold", calibration(rows)),
         ("Where the time goes: median seconds", time_parts(rows)),
         ("What raised", _raised(rows)),
