@@ -18,7 +18,7 @@ from ..export.images.image_pixels import UnreadableImageError, is_data, read_pix
 from ..export.images.picture_header import read_header
 from ..export.materials.read_material import read_target
 from ..export.nodes.shader_graph import source_of
-from ..export.nodes.target_shader import TargetShader, target_shader
+from ..export.nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 from ..export.reference.reference import (
     DISPLAY_SUFFIXES,
     LINEAR_SUFFIXES,
@@ -32,6 +32,7 @@ from ..export.reference.reference_view import SCENE, mixed_by, needs_table, outp
 from ..export.reference.turned_picture import turn_notes
 from ..export.render_state import instanced_objects, rendered_objects
 from ..export.scene.read_scene import MESH_TYPES
+from ..graph_values.mix_values import inside_values, mix_values
 from ..graph_values.table import chosen_values, graph_values
 from ..properties import SOCKET_ITEMS, crossed_limits
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
@@ -132,7 +133,7 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
     linked = [name for name, socket in sockets.items() if source_of(socket) is not None]
     settings = scene.mfo
     found = [Finding(FINE, f"'{material.name}' has a {target.node.bl_label}.")]
-    inside = _inside(settings, target)
+    inside = _inside(settings, target, material)
     if settings.parameter_set == "chosen" and settings.model == "blender_principled":
         chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets and name in sockets}
         if not chosen - set(linked) and not inside:
@@ -144,21 +145,23 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
     linked = [target.own_name(name) for name in linked if f"{target.own_name(name)} of material" not in said]
     if inside:
         more = f" and {len(inside) - SHOWN_INSIDE} more" if len(inside) > SHOWN_INSIDE else ""
-        found.append(Finding(FINE, f"Fitted inside nodes: {', '.join(inside[:SHOWN_INSIDE])}{more}."))
+        where = "beside it" if target.is_mixed else "inside nodes"
+        found.append(Finding(FINE, f"Fitted {where}: {', '.join(inside[:SHOWN_INSIDE])}{more}."))
     elif linked:
         sentence = f"Kept as nodes give it, not fitted: {', '.join(linked)}."
         found.append(Finding(FINE, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
     return found
 
 
-def _inside(settings: bpy.types.PropertyGroup, target: TargetShader) -> list[str]:
-    """Names of the values inside the target's nodes that the next fit changes."""
+def _inside(settings: bpy.types.PropertyGroup, target: TargetShader, material: bpy.types.Material) -> list[str]:
+    """Names of the values inside the target's nodes, or of a mix the others', that the next fit changes."""
     if settings.model != "blender_principled" or settings.parameter_set == "reduced" or settings.preset == "paper":
         return []
-    values = graph_values(target)
-    if settings.parameter_set == "all":
-        return [value.name for value in chosen_values(values, "all")]
-    return [value.name for value in values if value.name in settings.node_values]
+    if settings.parameter_set == "chosen":
+        return [value.name for value in inside_values(target) if value.name in settings.node_values]
+    if not target.is_mixed:
+        return [value.name for value in chosen_values(graph_values(target), "all")]
+    return [value.name for value in mix_values(target) if value.by_default] if fits_all_leaves(material) else []
 
 
 def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:

@@ -20,6 +20,7 @@ from ..versions import PRINCIPLED
 from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .material_model import Material, Socket
+from .materials.chosen_leaves import chosen_mix_values, named_mix_values, with_mix_values
 from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import evaluate_graph, largest_leaf, probe_for
@@ -182,6 +183,7 @@ def partial_export(
     `alone` says that it is the only one.
     """
     findings = Findings()
+    of_mix, fit = named_mix_values(obj, fit)
     values, fit = chosen_graph_values(obj, fit, findings, alone=alone)
     with probe_for(obj, always=bool(values)) as probe:
         # names that the user chose are those of the leaf that the panel shows
@@ -198,11 +200,13 @@ def partial_export(
             assert target is not None
             data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
             findings.raise_first()
-            fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not values)
+            chosen = chosen_mix_values(obj, target, of_mix, fit, findings)
+            data.materials[TARGET_BSDF] = with_mix_values(data.materials[TARGET_BSDF], target, chosen)
+            fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not (values or chosen))
             unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
             named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
             tree = obj.active_material.node_tree
-            named |= {v.name: holder_of(tree, v.place) for v in values if is_there(tree, v.place)}
+            named |= {v.name: holder_of(tree, v.place) for v in (*values, *chosen) if is_there(tree, v.place)}
             for said in animation_notes(named, context.scene.frame_current):
                 findings.note(said, explains=False)
             tell(0.4)
@@ -297,13 +301,23 @@ def _name_shares(material: Material, findings: Findings) -> None:
     if len(leaves) < 2:
         return
     listed = ", ".join(f"'{'/'.join(leaf.node)}' {100.0 * float(leaf.weight.value):.0f} %" for leaf in leaves)
-    findings.note(f"Shares of the target's shaders: {listed}; the first is fitted.", explains=False)
+    findings.note(f"Shares of the target's shaders: {listed}; {_said_of(material)}.", explains=False)
     for leaf in material.leaves:
         if leaf.is_nearest and float(leaf.weight.value) > MOST_UNKNOWN:
             raise ExportError(
                 f"'{leaf.name}' is {100.0 * float(leaf.weight.value):.0f} % of material '{material.name}', and the fit "
                 "has no model of it: its values cannot be told from the others'. Unlink it, or fit another material."
             )
+
+
+def _said_of(material: Material) -> str:
+    """What is fitted of a mix."""
+    others = sum(bool(leaf.free) for leaf in material.leaves)
+    if not (others or material.factors):
+        return "the first is fitted"
+    of = [f"{others} more"] if others else []
+    of += ["Mix factors"] if material.factors else []
+    return f"the first is fitted, and {' and '.join(of)}"
 
 
 def parameter_of(name: str) -> str:
@@ -379,6 +393,8 @@ def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
         described["shader"] = shader
     if material.is_mixed:
         described["weight"] = _socket(material.weight, files)
+    extra = {"free": dict(material.free), "factors": list(material.factors), "ways": list(material.ways)}
+    described |= {name: value for name, value in extra.items() if value}
     if material.leaves:
         described["leaves"] = [_material(leaf, files) for leaf in material.leaves]
     return described

@@ -56,7 +56,8 @@ class Material:
 
     The target may be one leaf of a mix: `weight` is its share, and `leaves` are the others with theirs. `node` is the
     path of names to its node, `labels` what that calls sockets that have another name here, and `is_nearest` says that
-    its model is only the nearest.
+    its model is only the nearest. Free besides the fitted leaf's values are sockets of leaves, `free` with the names of
+    their values, and Mix `factors`, which a weight depends on by its `ways`; both as in request.json.
     """
 
     name: str
@@ -73,6 +74,9 @@ class Material:
     node: tuple[str, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     is_nearest: bool = False
+    free: Mapping[str, str] = field(default_factory=dict)
+    factors: tuple[dict[str, Any], ...] = ()
+    ways: tuple[dict[str, Any], ...] = ()
 
     @property
     def is_mixed(self) -> bool:

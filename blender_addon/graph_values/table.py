@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import bpy
 
@@ -24,6 +24,23 @@ from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 NOT_FITTED = ("Emission Color", "Emission Strength", "Alpha", "Transmission Weight")
 MOST = 256  # values of one graph; what lies further upstream is not offered
 _AXES = ("X", "Y", "Z", "W")
+
+
+class HasName(Protocol):
+    """A value that is called by its node's label and its own name."""
+
+    @property
+    def name(self) -> str:
+        """Both, with a slash between."""
+        ...
+
+    @property
+    def place(self) -> Place:
+        """Where it is kept."""
+        ...
+
+
+Named = TypeVar("Named", bound=HasName)
 
 
 class GraphValueError(Exception):
@@ -68,7 +85,7 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
             known.asks_color |= is_color
             if len(found) >= MOST:
                 break
-    return _named([_finished(met, tree) for met in found.values()])
+    return named_apart([_finished(met, tree) for met in found.values()])
 
 
 def chosen_values(values: Sequence[GraphValue], wanted: str | Sequence[str]) -> list[GraphValue]:
@@ -81,22 +98,33 @@ def chosen_values(values: Sequence[GraphValue], wanted: str | Sequence[str]) -> 
     """
     if isinstance(wanted, str):
         return [v for v in values if v.range.group in ranges.BY_DEFAULT] if wanted == "all" else []
-    by_name = {_plain(value.name): value for value in values}
+    return named(values, wanted)
+
+
+def named(values: Sequence[Named], wanted: Sequence[str]) -> list[Named]:
+    """Those values that a list of names holds, which other names may be in.
+
+    Raises
+    ------
+    GraphValueError
+        If a name with a slash is none of theirs.
+    """
+    by_name = {plain_name(value.name): value for value in values}
     chosen = []
     for name in wanted:
         if "/" not in name:
             continue
-        if _plain(name) not in by_name:
-            near = get_close_matches(_plain(name), by_name, n=1, cutoff=0.3)
+        if plain_name(name) not in by_name:
+            near = get_close_matches(plain_name(name), by_name, n=1, cutoff=0.3)
             guess = f" (the nearest is '{by_name[near[0]].name}')" if near else ""
             have = ", ".join(f"'{value.name}'" for value in values[:12]) or "no unlinked values"
             more = " and more" if len(values) > 12 else ""
             raise GraphValueError(f"The material's nodes have no value '{name}'{guess}: they have {have}{more}.")
-        chosen.append(by_name[_plain(name)])
+        chosen.append(by_name[plain_name(name)])
     return list(dict.fromkeys(chosen))
 
 
-def _plain(name: str) -> str:
+def plain_name(name: str) -> str:
     """A name as the backend compares it."""
     return "_".join(name.lower().replace("_", " ").split())
 
@@ -206,28 +234,30 @@ def _finished(met: _Met, tree: bpy.types.NodeTree) -> GraphValue:
     numbers = value if isinstance(value, tuple) else (value,)
     limits = met.range or plain_range(numbers[0])
     limits = replace(limits, lower=min(limits.lower, *numbers, limits.upper), upper=max(limits.upper, *numbers))
-    label, inside = _one_word(met.label or met.node.label or met.node.name), _one_word(met.inside)
+    label, inside = one_word(met.label or met.node.label or met.node.name), one_word(met.inside)
     return GraphValue(f"{label}/{inside}", label, place, limits, tuple(met.sockets))
 
 
-def _one_word(text: str) -> str:
+def one_word(text: str) -> str:
     """Without what separates names."""
     return text.replace("/", " ").replace(",", " ").strip()
 
 
-def _named(values: Iterable[GraphValue]) -> list[GraphValue]:
+def named_apart(values: Iterable[Named]) -> list[Named]:
     """With names that differ: those of groups before, or a number behind, where they would be the same."""
     values = list(values)
-    count = Counter(_plain(value.name) for value in values)
-    longer = [
-        replace(v, name="/".join((*v.place.path[:-1], v.name))) if count[_plain(v.name)] > 1 and len(v.place.path) > 1
-        else v
-        for v in values
-    ]  # fmt: skip
+    count = Counter(plain_name(value.name) for value in values)
+
+    def in_groups(value: Named) -> Named:
+        groups = value.place.path[:-1]
+        is_met_twice = groups and count[plain_name(value.name)] > 1
+        return replace(value, name="/".join((*groups, value.name))) if is_met_twice else value
+
+    longer = [in_groups(value) for value in values]
     met: Counter[str] = Counter()
-    named = []
+    apart = []
     for value in longer:
-        met[_plain(value.name)] += 1
-        number = met[_plain(value.name)]
-        named.append(value if number == 1 else replace(value, name=f"{value.name} {number}"))
-    return named
+        met[plain_name(value.name)] += 1
+        number = met[plain_name(value.name)]
+        apart.append(value if number == 1 else replace(value, name=f"{value.name} {number}"))
+    return apart

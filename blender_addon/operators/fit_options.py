@@ -18,7 +18,7 @@ from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference_view import REFERENCE_VIEWS
-from ..graph_values.table import graph_values
+from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
 from ..properties import chosen_of, crossed_limits
 from ..result.local_copy import unwritable
@@ -225,7 +225,7 @@ def _chosen_inside(obj: bpy.types.Object, settings: bpy.types.PropertyGroup, mod
     target = target_shader(obj.active_material)
     if model != "blender_principled" or target is None or not settings.node_values:
         return []
-    return [value.name for value in graph_values(target) if value.name in settings.node_values]
+    return [value.name for value in inside_values(target) if value.name in settings.node_values]
 
 
 def _pictures(settings: bpy.types.PropertyGroup, first: Path | bpy.types.Image) -> list[PictureSetup]:

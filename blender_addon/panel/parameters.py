@@ -7,9 +7,10 @@ from itertools import groupby
 
 import bpy
 
-from ..export.nodes.target_shader import TargetShader, fitted_leaves, leaf_name, target_shader
+from ..export.nodes.target_shader import ALL, TargetShader, fits_all_leaves, fitted_leaves, leaf_name, target_shader
+from ..graph_values.mix_values import MixValue, inside_values
 from ..graph_values.place import holder_of, is_there
-from ..graph_values.table import GraphValue, graph_values
+from ..graph_values.table import GraphValue
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
 from ..running import running_job
 
@@ -52,16 +53,18 @@ class Parameters:
 
 
 def _draw_leaves(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Of a mix of shaders, a button for each that can be fitted."""
+    """Of a mix of shaders, a button for each that can be fitted, and one for all."""
     material = context.object.active_material if context.object else None
     leaves = fitted_leaves(material)
     if len(leaves) < 2:
         return
     target, column = target_shader(material), layout.column(align=True)
     column.label(text="Shader to Fit", icon="NODE_MATERIAL")
+    by_all = fits_all_leaves(material)
+    column.operator("mfo.choose_shader", text="All", depress=by_all).shader = ALL
     for leaf in leaves:
         name = leaf_name(leaf)
-        shown = target is not None and target.name == name
+        shown = target is not None and target.name == name and not by_all
         column.operator("mfo.choose_shader", text=name, translate=False, depress=shown).shader = name
 
 
@@ -95,9 +98,9 @@ def _draw_value(
 
 
 def _draw_nodes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, target: TargetShader) -> None:
-    """The values inside the nodes that feed the target's sockets, under their nodes' labels."""
+    """The values inside the target's nodes, or of a mix those of the others, under their nodes' labels."""
     tree = (target.groups[0] if target.groups else target.node).id_data
-    for (_, label), values in groupby(graph_values(target), lambda value: (value.place.path, value.label)):
+    for (_, label), values in groupby(inside_values(target), lambda value: (value.place.path, value.label)):
         box = layout.box().column(align=True)
         box.label(text=label, icon="NODE")
         for value in values:
@@ -105,7 +108,10 @@ def _draw_nodes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, t
 
 
 def _draw_node_value(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, tree: bpy.types.NodeTree, value: GraphValue
+    layout: bpy.types.UILayout,
+    settings: bpy.types.PropertyGroup,
+    tree: bpy.types.NodeTree,
+    value: GraphValue | MixValue,
 ) -> None:
     """A box that unlocks the value, its name within the node, and the value itself."""
     split = layout.split(factor=0.6, align=True)

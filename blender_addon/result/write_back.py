@@ -12,9 +12,10 @@ import bpy
 
 from ..export.materials.principled_mapping import mitsuba_to_sockets
 from ..export.nodes.target_shader import TargetShader, fitted_leaves, make_own, target_shader, why_no_target
+from ..graph_values.mix_values import MixValue, mix_values
 from ..graph_values.own_groups import make_groups_own
 from ..graph_values.place import INPUT, TINTS, Place, as_held, held, hold, holder_of, is_there
-from ..graph_values.table import graph_values
+from ..graph_values.table import GraphValue, graph_values
 from ..versions import node_tree_of
 from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_at, key_here, left_note, remove_driver
 from .job_result import JobResult, Value
@@ -226,7 +227,7 @@ def _make_own(material: bpy.types.Material, names: Collection[str], leaf: str | 
     notes = make_own(material, [name for name in names if "/" not in name], leaf)
     if not any("/" in name for name in names):
         return notes
-    places = [value.place for value in graph_values(fitted_shader(material, leaf)) if value.name in names]
+    places = [value.place for value in _inside(fitted_shader(material, leaf)) if value.name in names]
     return notes + make_groups_own(material, places)
 
 
@@ -303,6 +304,11 @@ def _slots(material: bpy.types.Material, leaf: str | None) -> dict[str, _Slot]:
         path = (*(group.name for group in found.groups), found.socket.node.name)
         place = Place(path, INPUT, found.socket.identifier)
         slots[name] = _Slot(tree, place, target.own_name(name), found.socket.is_linked)
-    for value in graph_values(target):
+    for value in _inside(target):
         slots[value.name] = _Slot(tree, value.place, value.name, False)
     return slots
+
+
+def _inside(target: TargetShader) -> list[GraphValue | MixValue]:
+    """Values inside nodes, and of a mix those of its other shaders and factors."""
+    return [*graph_values(target), *(mix_values(target) if target.is_mixed else ())]

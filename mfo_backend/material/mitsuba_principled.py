@@ -54,6 +54,7 @@ class MitsubaPrincipled:
     scanned: tuple[str, ...] = ("roughness", "clearcoat_gloss")
     two_sided: bool = False  # the plugin needs the wrapper `twosided`
     limited_width: bool = False
+    widths: tuple[str, ...] = ("roughness",)
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """All values `evaluate` needs besides the free ones, from those of a material; missing ones are the plugin's

@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 from ..types.errors import UnrecordableError
-from ..types.parameter import ParameterTable, Value
+from ..types.parameter import Parameter, ParameterTable, Value
 from .arrays.grid_table import loaded_buffers
 from .cycles_model import CyclesModel
 from .mitsuba_principled import MitsubaPrincipled
 from .principled.blender_principled import BLENDER_5_0, blender_principled
 from .principled.bumped_normals import BUMPED_NORMALS
+from .principled.mix_values import MixValues, amount_of
 from .principled.needed_lobes import needed_lobes
 from .principled.principled_parameters import BLENDER_PRINCIPLED
 
@@ -34,6 +36,8 @@ class RecordedModel(Protocol):
         Whether back faces reflect like front faces without a wrapper.
     limited_width
         Whether the larger width of an anisotropic lobe is at most 1, as in Cycles.
+    widths
+        Values that say how wide the main lobes are, of which the least shapes a recording.
     """
 
     name: str
@@ -42,6 +46,7 @@ class RecordedModel(Protocol):
     scanned: tuple[str, ...]
     two_sided: bool
     limited_width: bool
+    widths: tuple[str, ...]
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """Every value `bind` needs besides the free ones, from those of a material; None is one of a texture.
@@ -71,6 +76,7 @@ class BlenderPrincipledModel:
     scanned: tuple[str, ...] = ("roughness", "coat_roughness")
     two_sided: bool = True
     limited_width: bool = True
+    widths: tuple[str, ...] = ("roughness",)
 
     def __init__(self, cycles: CyclesModel = BLENDER_5_0) -> None:
         self._cycles = cycles
@@ -92,8 +98,73 @@ class BlenderPrincipledModel:
         return loaded_buffers()
 
 
-def recorded_model(name: str, bsdf: Any) -> RecordedModel:
-    """The recorded version of model `name`, with the switches of the scene's `bsdf`.
+class MixedModel(BlenderPrincipledModel):
+    """The leaves of a `closure_tree` that may change, opaque, with their weights; the fitted one is never left out.
+
+    The values of the fitted leaf have the names of a plain material, free ones of others what a user calls them, and
+    what else leaf k has is "leaf_k.base_color" and so on. A leaf's "weight" is what it has without the factors.
+    """
+
+    def __init__(self, tree: Any, mix: MixValues) -> None:
+        super().__init__(tree.model)
+        self._tree, self._mix = tree, mix
+        self._names = {
+            k: {p.name: mix.leaves.get(k, {}).get(p.name, f"leaf_{k}.{p.name}") for p in BLENDER_PRINCIPLED}
+            for k in tree.free_leaves
+        }
+        weights = ["weight", *(f"leaf_{k}.weight" for k in self._names)]
+        held = (
+            replace(BLENDER_PRINCIPLED[name], name=shown)
+            for names in self._names.values()
+            for name, shown in names.items()
+            if shown.startswith("leaf_")
+        )
+        self.table = ParameterTable(
+            [*BLENDER_PRINCIPLED, *mix.parameters, *held, *(Parameter(name, 1, 0.0, 1.0, 1.0) for name in weights)]
+        )
+        rough = [names["roughness"] for names in self._names.values()]
+        self.widths = ("roughness", *rough)
+        # a fit of factors alone has no width to scan
+        self.scanned = (*BlenderPrincipledModel.scanned, *rough)
+
+    def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
+        """See `RecordedModel`; what the other leaves hold is the plugin's to say."""
+        values = super().values({n: v for n, v in given.items() if n in BLENDER_PRINCIPLED.names}, free)
+        values["weight"] = _number(self._tree.fitted.weight)
+        for k, names in self._names.items():
+            leaf = self._tree.held[k]
+            values |= {names[name]: value for name, value in leaf.material.fixed.items()}
+            values[f"leaf_{k}.weight"] = _number(leaf.weight)
+        return {name: value for name, value in values.items() if name not in free}
+
+    def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
+        """See `RecordedModel`."""
+        own = super().bind({n: v for n, v in fixed.items() if n in BLENDER_PRINCIPLED.names}, free)
+        others = {}
+        for k, names in self._names.items():
+            known = {name: fixed[shown] for name, shown in names.items() if shown in fixed}
+            lobes = needed_lobes(known, [name for name, shown in names.items() if shown in free])
+            others[k] = lobes, self._tree.held[k].material.model
+
+        def evaluate(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
+            factors = [parameters[name] for name in self._mix.factors]
+            value = own(parameters, wi, wo) * parameters["weight"] * amount_of(self._tree.fitted.ways, factors)
+            for k, (lobes, model) in others.items():
+                of_leaf = {name: parameters[shown] for name, shown in self._names[k].items()}
+                weight = parameters[f"leaf_{k}.weight"] * amount_of(self._tree.held[k].ways, factors)
+                value = value + blender_principled(of_leaf, wi, wo, lobes, model) * weight
+            return value
+
+        return evaluate
+
+
+def _number(weight: Any) -> float | None:
+    """A weight of the plugin, None for a texture."""
+    return None if hasattr(weight, "eval_1") else float(weight[0])
+
+
+def recorded_model(name: str, bsdf: Any, mix: MixValues | None = None) -> RecordedModel:
+    """The recorded version of model `name`, with the switches of the scene's `bsdf`, of which `mix` is free besides.
 
     Raises
     ------
@@ -102,6 +173,8 @@ def recorded_model(name: str, bsdf: Any) -> RecordedModel:
     """
     if name == "mitsuba_principled":
         return MitsubaPrincipled()
+    if mix is not None:
+        return MixedModel(bsdf, mix)
     if name == "blender_principled":
         return BlenderPrincipledModel(getattr(bsdf, "model", BLENDER_5_0))
     raise UnrecordableError(f"Material model {name!r} has no recorded-path version.")

@@ -15,6 +15,8 @@ from .closure_leaves import ClosureError, ClosureLeaf, Groups, by_identifier, cl
 from .graph_findings import GROUP_INPUT
 from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, why_not_fitted
 
+ALL_LEAVES = "*"  # what a material keeps where all shaders of its mix are fitted
+ALL = "all"  # and what a user calls it
 DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
 
 
@@ -128,6 +130,15 @@ def target_shader(material: bpy.types.Material | None, leaf: str | None = None) 
 
 def chosen_leaf(material: bpy.types.Material | None) -> str:
     """The name of the leaf that the user chose for a material, empty where it is left to the shares."""
+    return "" if fits_all_leaves(material) else _kept_leaf(material)
+
+
+def fits_all_leaves(material: bpy.types.Material | None) -> bool:
+    """Whether the user chose to have all shaders of a mix fitted; the largest has the plain names then."""
+    return _kept_leaf(material) == ALL_LEAVES
+
+
+def _kept_leaf(material: bpy.types.Material | None) -> str:
     kept = getattr(material, "mfo", None)
     return "" if kept is None else kept.leaf
 
@@ -140,6 +151,8 @@ def leaf_name(leaf: ClosureLeaf) -> str:
 def leaf_called(material: bpy.types.Material, wanted: str) -> str:
     """The name of the one leaf that a user calls `wanted`: by its name, its node's, its label or its kind's.
 
+    That of all of them is `ALL_LEAVES`.
+
     Raises
     ------
     ClosureError
@@ -150,6 +163,8 @@ def leaf_called(material: bpy.types.Material, wanted: str) -> str:
     for names in zip(*called, strict=True):
         if names.count(wanted) == 1:
             return leaf_name(leaves[names.index(wanted)])
+    if wanted.lower() == ALL and leaves:
+        return ALL_LEAVES
     listed = ", ".join(f"'{leaf_name(leaf)}'" for leaf in leaves) or "none"
     raise ClosureError(f"Material '{material.name}' has no shader '{wanted}' that can be fitted: give one of {listed}.")
 

@@ -18,6 +18,7 @@ from .checked_object import CheckedObject, is_number, shown
 from .graph_files import check_graph_files
 from .graph_request import NodeGraph, graph_from_json, graph_to_json
 from .job_folder import JobFolder
+from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
 from .scene_files import check_scene_files
 
 SCHEMA_VERSION = 1
@@ -30,6 +31,7 @@ _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
     *("film_exposure", "graph", "fit", "notes", "left_out", "picture", "more_pictures"),
 )
+_MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", *MIX_KEYS)
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,9 @@ class Material:
     shader: str = "principled"
     weight: Socket = field(default_factory=lambda: Socket(1.0))
     leaves: tuple[Material, ...] = ()
+    free: Mapping[str, str] = field(default_factory=dict)
+    factors: tuple[MixFactor, ...] = ()
+    ways: tuple[MixWay, ...] = ()
 
     @property
     def all_sockets(self) -> Iterator[tuple[str, Socket]]:
@@ -282,6 +287,9 @@ def _without_nothing(material: dict[str, Any]) -> None:
         for key in ("texture", "graph"):
             if socket[key] is None:
                 del socket[key]
+    for key in ("free", "factors", "ways"):
+        if not material[key]:
+            del material[key]
     for leaf in material["leaves"]:
         _without_nothing(leaf)
 
@@ -309,26 +317,31 @@ def _target(data: Any) -> Target:
 
 
 def _material(bsdf_id: str, data: Any) -> Material:
-    return _shader(data, f"{WHERE}: materials.{bsdf_id}", SHADERS)
+    where = f"{WHERE}: materials.{bsdf_id}"
+    material = _shader(data, where, SHADERS)
+    check_mix(where, material.factors, [material, *material.leaves])
+    return material
 
 
 def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
-    keys = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves")
-    material = CheckedObject(data, where, keys)
+    material = CheckedObject(data, where, _MATERIAL_KEYS)
     leaves = material.raw("leaves", [])
     if not isinstance(leaves, (list, tuple)) or len(leaves) > MOST_LEAVES:
         raise material.wrong("leaves", f"a list of at most {MOST_LEAVES} materials")
     if leaves and shaders is not SHADERS:
         raise material.wrong("leaves", "empty: a leaf has none")
+    sockets = {name: _socket(entry, f"{where}.sockets.{name}") for name, entry in material.mapping("sockets").items()}
+    is_leaf = shaders is not SHADERS
     return Material(
         name=material.text("name"),
         distribution=material.text("distribution", "MULTI_GGX"),
-        sockets={
-            name: _socket(entry, f"{where}.sockets.{name}") for name, entry in material.mapping("sockets").items()
-        },
+        sockets=sockets,
         subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
         shader=material.choice("shader", list(shaders), "principled"),
         weight=_socket(material.raw("weight", {"value": 1.0}), f"{where}.weight"),
+        free=free_from_json(material, sockets) if is_leaf else {},
+        factors=() if is_leaf else factors_from_json(material),
+        ways=ways_from_json(material),
         leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", (*SHADERS, *OTHER_LEAVES)) for k, leaf in enumerate(leaves)),
     )
 

@@ -4,7 +4,12 @@
 Choose the variant before importing this. Properties are `fitted`, a nested `blender_principled`, and its `weight`;
 further `leaf_0`, `weight_0`, `leaf_1`, ... of the same plugin, which are held, and `clear_0`, `clear_weight_0`, ... ,
 colours of what passes straight through. Weights and colours are numbers, colours or textures. The surface is the sum of
-all, as Mix and Add Shader of Blender have it. Only the fitted material's values are shown by `mi.traverse`.
+all, as Mix and Add Shader of Blender have it.
+
+`factor_0`, `factor_1`, ... are factors of Mix Shaders that may change; a leaf that hangs on them has `ways` (that of
+number k `ways_k`) which its weight is multiplied with: the sum over words such as "1.5 -0 +1", a share times 1 - factor
+0 times factor 1. `mi.traverse` shows the factors, the fitted material's values, and those of leaves that have `free`
+ones.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
@@ -12,7 +17,7 @@ all, as Mix and Add Shader of Blender have it. Only the fitted material's values
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +25,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..arrays.clamp import mean
+from ..principled.mix_values import Way, amount_of, ways_in
 from .principled_plugin import BlenderPrincipled
 
 PLUGIN_NAME = "closure_tree"
@@ -28,14 +34,26 @@ LEAST = 1e-3  # of the weights that choose a leaf: none has no chance where all 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A material and its weight, a number or a texture."""
+    """A material and its weight, a number or a texture, times what the `factors` of the tree make of its `ways`."""
 
     material: BlenderPrincipled
     weight: Any
+    ways: tuple[Way, ...]
+    factors: Sequence[Any]
 
     def weight_at(self, si: Any, active: Any = True) -> Any:
         """The weight at a surface point."""
+        weight = _at(self.weight, si, active)
+        return weight * amount_of(self.ways, self.factors) if self.ways else weight
+
+    def plain_weight_at(self, si: Any, active: Any = True) -> Any:
+        """The same without the factors."""
         return _at(self.weight, si, active)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether something of it may change."""
+        return bool(self.ways or self.material.free)
 
 
 @dataclass(frozen=True)
@@ -63,10 +81,9 @@ class ClosureTree(mi.BSDF):
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
-        self.fitted = Leaf(props["fitted"], _number(props.get("weight", 1.0)))
-        self.held = tuple(
-            Leaf(props[f"leaf_{k}"], _number(props.get(f"weight_{k}", 1.0))) for k in _counted(props, "leaf_")
-        )
+        self.factors = [dr.opaque(mi.Float, float(props[f"factor_{k}"])) for k in _counted(props, "factor_")]
+        self.fitted = self._leaf(props, "fitted", "weight", "ways")
+        self.held = tuple(self._leaf(props, f"leaf_{k}", f"weight_{k}", f"ways_{k}") for k in _counted(props, "leaf_"))
         self.clear = tuple(
             (_colour(props[f"clear_{k}"]), _number(props.get(f"clear_weight_{k}", 1.0)))
             for k in _counted(props, "clear_")
@@ -83,6 +100,20 @@ class ClosureTree(mi.BSDF):
         for flag in components[1:]:
             flags |= flag
         self.m_flags = flags
+
+    def _leaf(self, props: mi.Properties, leaf: str, weight: str, ways: str) -> Leaf:
+        words = str(props.get(ways, ""))
+        return Leaf(props[leaf], _number(props.get(weight, 1.0)), ways_in(words), self.factors)
+
+    @property
+    def free_leaves(self) -> dict[int, Leaf]:
+        """Of the leaves beside the fitted one those that may change, by their numbers."""
+        return {k: leaf for k, leaf in enumerate(self.held) if leaf.is_free}
+
+    @property
+    def is_open(self) -> bool:
+        """Whether more than the fitted material may change."""
+        return bool(self.factors or self.free_leaves)
 
     @property
     def leaves(self) -> tuple[Leaf, ...]:
@@ -108,12 +139,28 @@ class ClosureTree(mi.BSDF):
         return self.fitted.material.directions
 
     def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Show the fitted material."""
+        """Show the fitted material, and what else may change."""
         callback.put("fitted", self.fitted.material, mi.ParamFlags.Differentiable)
+        for k, leaf in self.free_leaves.items():
+            callback.put(f"leaf_{k}", leaf.material, mi.ParamFlags.Differentiable)
+        for k, factor in enumerate(self.factors):
+            callback.put(f"factor_{k}", factor, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        """Keep the factors what no kernel knows."""
+        for factor in self.factors:
+            dr.make_opaque(factor)
 
     def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
-        """The fitted material's values at a surface point."""
-        return self.fitted.material.values_at(si, active)
+        """The fitted material's values at a surface point; where more is free, those of free leaves and weights."""
+        values = self.fitted.material.values_at(si, active)
+        if not self.is_open:
+            return values
+        values["weight"] = self.fitted.plain_weight_at(si, active)
+        for k, leaf in self.free_leaves.items():
+            of_leaf = leaf.material.values_at(si, active) | {"weight": leaf.plain_weight_at(si, active)}
+            values |= {f"leaf_{k}.{name}": value for name, value in of_leaf.items()}
+        return values
 
     def bumped_frame(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
         """The frame of the fitted material's microfacets."""
@@ -124,16 +171,19 @@ class ClosureTree(mi.BSDF):
         return self.fitted.material.directions_at(si, active)
 
     def held_value(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
-        """f_r |cos| of the held materials with their weights, RGB."""
+        """f_r |cos| of the materials that nothing changes with their weights, RGB."""
         context, value = mi.BSDFContext(), mi.Color3f(0)
         for leaf in self.held:
-            value += leaf.weight_at(si, active) * leaf.material.eval(context, si, wo, active)
+            if not leaf.is_free:
+                value += leaf.weight_at(si, active) * leaf.material.eval(context, si, wo, active)
         return value
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
-        own = self.fitted.weight_at(si, active) * self.fitted.material.eval(ctx, si, wo, active)
-        return own + self.held_value(si, wo, active)
+        value = mi.Color3f(0)
+        for leaf in self.leaves:
+            value += leaf.weight_at(si, active) * leaf.material.eval(ctx, si, wo, active)
+        return value
 
     def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""

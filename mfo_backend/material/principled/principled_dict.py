@@ -82,21 +82,39 @@ def closure_tree_dict(
         As `blender_principled_dict`.
     """
     result: dict[str, Any] = {"type": "closure_tree", "fitted": dict(fitted), "weight": _amount(material["weight"])}
-    held = [leaf for leaf in material["leaves"] if leaf["shader"] not in ("transparent", "emission")]
-    for k, leaf in enumerate(held):
+    result |= {f"factor_{k}": float(factor["value"]) for k, factor in enumerate(material.get("factors", ()))}
+    result |= _ways("ways", material)
+    for k, leaf in enumerate(held_leaves(material)):
         result[f"leaf_{k}"] = blender_principled_dict(
             leaf["sockets"],
             distribution=leaf.get("distribution", "MULTI_GGX"),
             version=version,
+            free=[PARAMETER_OF_SOCKET[socket] for socket in leaf.get("free", ())],
             unreachable_refraction=unreachable_refraction,
             shader=leaf["shader"],
         )
         result[f"weight_{k}"] = _amount(leaf["weight"])
+        result |= _ways(f"ways_{k}", leaf)
     clear = [leaf for leaf in material["leaves"] if leaf["shader"] == "transparent"]
     for k, leaf in enumerate(clear):
         result[f"clear_{k}"] = _amount(leaf["sockets"].get("Base Color", {"value": [1.0, 1.0, 1.0]}))
         result[f"clear_weight_{k}"] = _amount(leaf["weight"])
     return result
+
+
+def held_leaves(material: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The leaves of a material of request.json that reflect light, beside the fitted one."""
+    return [leaf for leaf in material.get("leaves", ()) if leaf["shader"] not in ("transparent", "emission")]
+
+
+def _ways(name: str, leaf: Mapping[str, Any]) -> dict[str, str]:
+    """The ways to a leaf as a property of the plugin, its shares and factors by numbers."""
+    ways = leaf.get("ways", ())
+    words = (
+        " ".join([repr(float(way["share"])), *(f"-{k}" for k in way["first"]), *(f"+{k}" for k in way["second"])])
+        for way in ways
+    )
+    return {name: ",".join(words)} if ways else {}
 
 
 def is_mixed(material: Mapping[str, Any]) -> bool:

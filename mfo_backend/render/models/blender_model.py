@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.principled.blender_selection import select_blender_parameters
+from ...material.principled.mix_values import mix_values
 from ...material.principled.principled_dict import (
     blender_principled_dict,
     closure_tree_dict,
@@ -56,7 +57,7 @@ def prepare_blender_principled(
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
     table = ParameterTable(()) if chosen is None else chosen
-    start = table.clip(table.pack(_constants(sockets)))
+    start, mix = table.clip(table.pack(_constants(sockets))), mix_values(materials[target.bsdf_id])
     opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in table.unpack(start).items()}
     textures = _textures(scene)
     # a light Cycles does not sample: directions no microfacet of rough glass leads to do not count there
@@ -88,13 +89,19 @@ def prepare_blender_principled(
         if radiance is not None:
             _replace_radiance(scene, bsdf_id, radiance, textures)
     outer = target.outer
-    key_ends, factors = {name: name for name in table.names}, {}
+    of_fitted = "fitted." if is_mixed(materials[target.bsdf_id]) else ""
+    key_ends, factors = {name: f"{of_fitted}{name}" for name in table.names}, {}
     if EMISSION in table.names:
         strength = float(np.ravel(_constants(sockets)["emission_strength"])[0])
         factors[EMISSION] = strength * materials[target.bsdf_id].get("film_exposure", 1.0)
         key_ends[EMISSION] = RADIANCE_KEY
         _open_emission(scene, target.shape_id, factors[EMISSION] * start[table.slice_of(EMISSION)])
-    return PreparedMaterial(table, start, Target(target.shape_id, target.bsdf_id, outer, outer), key_ends, factors)
+    if mix is not None:
+        others = ParameterTable(mix.parameters)
+        start = np.concatenate([start, others.clip(others.pack(mix.start))])
+        table, key_ends = ParameterTable([*table, *others]), key_ends | mix.key_ends
+    outer_target = Target(target.shape_id, target.bsdf_id, outer, outer)
+    return PreparedMaterial(table, start, outer_target, key_ends, factors, mix)
 
 
 def _open_emission(scene: Element, shape_id: str, radiance: NDArray[np.float64]) -> None:

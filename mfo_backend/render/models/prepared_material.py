@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...material.principled.mix_values import MixValues
 from ...scene.scene_xml import Target
 from ...types.parameter import ParameterTable
 
@@ -24,7 +25,7 @@ class PreparedMaterial:
 
     `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the target's BSDF id,
     that of an emitter with its shape's. What the scene has there is the parameter times its factor in `factors`, 1 for
-    most.
+    most. Of a mix of shaders `mix` says what is free beside the fitted one.
     """
 
     table: ParameterTable
@@ -32,3 +33,4 @@ class PreparedMaterial:
     target: Target
     key_ends: Mapping[str, str]
     factors: Mapping[str, float] = field(default_factory=dict)
+    mix: MixValues | None = None

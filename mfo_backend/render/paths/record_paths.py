@@ -361,12 +361,12 @@ def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Cal
 
 
 def _parted(lanes: TechniqueLanes, hits: _Hits, index: mi.UInt32) -> TechniqueLanes:
-    """Lanes of a mix: what its held materials show, and weights for the fitted one alone."""
+    """Lanes of a mix: what its held materials show, and weights for the fitted one, or all that may change, alone."""
     own = dr.gather(mi.SurfaceInteraction3f, hits.own, index)
     wo = lanes.wo
     if hits.plugin.directions:
         wo = own.to_local(dr.gather(mi.SurfaceInteraction3f, hits.si, index).to_world(wo))
     others = hits.plugin.held_value(own, wo) * lanes.weight
-    weight = lanes.weight * hits.plugin.fitted.weight_at(own)
+    weight = lanes.weight if hits.plugin.is_open else lanes.weight * hits.plugin.fitted.weight_at(own)
     dr.eval(others, weight)
     return replace(lanes, weight=weight, others=others)

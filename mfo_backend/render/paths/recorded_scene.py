@@ -80,7 +80,7 @@ class RecordedScene:
         self.renderer = renderer
         self._covered, self._part = covered, part
         self._taken = 0  # bytes for the rays of the largest recording so far
-        self.model = recorded_model(renderer.model, renderer.shape.bsdf())
+        self.model = recorded_model(renderer.model, renderer.shape.bsdf(), renderer.mix)
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
@@ -148,8 +148,8 @@ class RecordedScene:
         needs = needs or self.needs
         self.renderer.show(vector)
         proposal = DefensiveProposal()
-        width = self._value(vector, self.model.scanned[0])
-        if near and isinstance(width, float):
+        width = self._width(vector)
+        if near and width is not None:
             proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         samples = samples if needs.sampled else 1
@@ -190,12 +190,12 @@ class RecordedScene:
             If no pixel sees the target.
         """
         self.renderer.show(vector)
-        width = self._value(vector, self.model.scanned[0])
+        width = self._width(vector)
         settings = RecordSettings(
             grid=grid,
             seed=seed,
             depth=self.needs.depth,
-            proposal=DefensiveProposal.around(width) if isinstance(width, float) else DefensiveProposal(),
+            proposal=DefensiveProposal() if width is None else DefensiveProposal.around(width),
             hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
             two_sided=self.model.two_sided,
             held=self._held,
@@ -327,6 +327,11 @@ class RecordedScene:
         """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""
         return len(groups.pixels) / max(self._covered, 1)
 
+    def _width(self, vector: NDArray[np.float64]) -> float | None:
+        """The narrowest of the main lobes' widths; None where textures give all of them."""
+        widths = [self._value(vector, name) for name in self.model.widths]
+        return min((width for width in widths if isinstance(width, float)), default=None)
+
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
@@ -358,6 +363,8 @@ def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Val
     asked = hasattr(renderer.shape.bsdf(), "values_at")
     for key in keys.keys():  # noqa: SIM118  the traversed object has no iterator of keys
         parts = key.split(".")
+        if parts[0].startswith("leaf_"):  # the model knows them
+            continue
         name = next((part for part in parts if part in model.table.names), None)
         if name is None:
             continue

@@ -101,6 +101,8 @@ class TracedPaths:
         self._plugin = bsdf if self._tree is None else self._tree.fitted.material
         if not isinstance(self._plugin, BlenderPrincipled):
             raise UnrecordableError(f"Model {renderer.model!r} has no traced version for transmissive materials.")
+        if renderer.mix is not None:
+            raise UnrecordableError("Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.")
         self.renderer, self.table = renderer, renderer.table
         self._bsdf = bsdf
         self._tangents = Tangents.of(renderer.table)

@@ -50,7 +50,7 @@ class MitsubaRenderer:
 
         self.model = model
         self.light_paths = light_paths
-        self.graph = graph
+        self.graph, self.mix = graph, material.mix
         self.table = material.table if graph is None else ParameterTable([*material.table, *graph.table])
         self.start = material.start if graph is None else np.concatenate([material.start, graph.table.pack({})])
         self.counter = PassCounter()

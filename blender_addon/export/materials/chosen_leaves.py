@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a fit of a mix changes beside the chosen leaf: values of other leaves and Mix factors, by name or all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import bpy
+
+from ...graph_values.mix_values import MixValue, mix_values, ways_of, why_no_mix_values
+from ...graph_values.place import read
+from ...graph_values.table import GraphValueError, named, one_word, plain_name
+from ..findings import ExportError, Findings
+from ..material_model import Material
+from ..nodes.target_shader import TargetShader, fits_all_leaves, target_shader
+
+
+def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple[list[str], dict[str, Any]]:
+    """The values of a mix that `fit` names beside its fitted leaf, and the fit without them.
+
+    The fitted leaf's own values may be named after its node, too.
+
+    Raises
+    ------
+    ExportError
+        If one is named that the mix does not have, or that no fit can change.
+    """
+    wanted = fit.get("parameters", "all")
+    target = None if obj is None else target_shader(obj.active_material)
+    if target is None or not target.is_mixed or isinstance(wanted, str):
+        return [], fit
+    label = one_word(target.node.label or target.node.name)
+    own = {plain_name(f"{label}/{target.own_name(name)}"): name for name in target.places}
+    wanted = [own.get(plain_name(name), name) for name in wanted]
+    inside = [name for name in wanted if "/" in name]
+    problem = why_no_mix_values(target)
+    if inside and problem is not None:
+        raise ExportError(f"{', '.join(inside)} cannot be fitted: {problem}.")
+    try:
+        found = named(mix_values(target), inside)
+    except GraphValueError as error:
+        raise ExportError(str(error)) from error
+    return [value.name for value in found], fit | {"parameters": [name for name in wanted if "/" not in name]}
+
+
+def chosen_mix_values(
+    obj: bpy.types.Object, target: TargetShader, names: Sequence[str], fit: dict[str, Any], findings: Findings
+) -> list[MixValue]:
+    """The values of the target's mix of these names, or those that *All* takes of all its shaders."""
+    by_all = fit.get("parameters", "all") == "all" and fits_all_leaves(obj.active_material) and target.is_mixed
+    if not names and not by_all:
+        return []
+    problem = why_no_mix_values(target)
+    if problem is not None:
+        findings.note(f"Of the mix '{target.name}' alone is fitted: {problem}.")
+        return []
+    return [value for value in mix_values(target) if (value.by_default if by_all else value.name in names)]
+
+
+def with_mix_values(material: Material, target: TargetShader, chosen: Sequence[MixValue]) -> Material:
+    """The material with what is free of its mix."""
+    if not chosen:
+        return material
+    tree = (target.groups[0] if target.groups else target.node).id_data
+    free = [value for value in chosen if value.factor is not None]
+    factors = [value.factor for value in free if value.factor is not None]
+    leaves = [
+        replace(
+            leaf,
+            free={value.socket: value.name for value in chosen if value.leaf == number},
+            ways=tuple(ways_of(target.others[number], factors)),
+        )
+        for number, leaf in enumerate(material.leaves)
+    ]
+    return replace(
+        material,
+        factors=tuple({"name": value.name, "value": read(tree, value.place)} for value in free),
+        ways=tuple(ways_of(target.leaf, factors)),
+        leaves=tuple(leaves),
+    )

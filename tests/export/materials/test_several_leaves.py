@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several shaders of a mix at once, and its factors: pictures at other values than those exported, against Cycles."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from blender_addon.result.write_back import apply_values, revert_values  # noqa: E402
+from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
+from mfo_backend.job.folder.request import read_request  # noqa: E402
+from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
+
+from .test_mixed_targets import BLUE, DIFFUSE, GLOSSY, METAL, PLASTIC, RED, SHEEN, add, material_of, mix, noise  # noqa: E402
+from .test_node_graphs import ball, lit_scene  # noqa: E402
+
+# a mix, and other values for it
+CASES: dict[str, tuple[Any, dict[str, Any]]] = {
+    "factor and glossy": (
+        mix(0.4, DIFFUSE, GLOSSY),
+        {"Mix Shader/Factor": 0.7, "Glossy BSDF/Color": (0.1, 0.6, 0.3), "Glossy BSDF/Roughness": 0.55},
+    ),
+    "two of a kind below a mask": (
+        mix(noise, SHEEN, mix(0.3, PLASTIC, METAL)),
+        {"Mix Shader.001/Factor": 0.8, "Principled BSDF.001/Roughness": 0.6, "Principled BSDF.001/Base Color": BLUE},
+    ),
+    "added, three, a black side": (
+        add(mix(0.6, DIFFUSE, None), mix(0.2, GLOSSY, mix(0.7, SHEEN, PLASTIC))),
+        {"Mix Shader/Factor": 0.2, "Mix Shader.001/Factor": 0.6, "Principled BSDF/Base Color": RED},
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def addon() -> Iterator[None]:
+    """The package, registered: a material keeps what is fitted of it, and what it was."""
+    import blender_addon
+
+    blender_addon.register()
+    yield
+    blender_addon.unregister()
+
+
+def named(request: dict[str, Any]) -> list[str]:
+    """The names of what is free beside the fitted leaf."""
+    target = request["materials"]["target_bsdf"]
+    return [f["name"] for f in target.get("factors", ())] + [
+        name for leaf in target["leaves"] for name in leaf.get("free", {}).values()
+    ]
+
+
+def loaded(report: Any) -> Any:
+    """The renderer of an exported job, with its values free."""
+    from mfo_backend.render.pictures.renderer import load_renderer
+
+    path = report.folder / "request.json"
+    data = json.loads(path.read_text())
+    path.write_text(json.dumps(data | {"reference": {"path": "scene.xml", "encoding": "linear"}}))
+    folder = JobFolder.open(report.folder)
+    request = read_request(folder)
+    return load_renderer(
+        folder.root / request.scene, request.target.shape_id, model="blender_principled",
+        parameters=request.fit.parameters, materials=request_materials(folder, request),
+        light_paths=request.light_paths,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_pictures_at_other_values_are_cycles(
+    addon: None, scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str
+) -> None:
+    """By recorded paths and by the path tracer that judges; derivatives are those of the pictures."""
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    lit_scene(scene)
+    build, others = CASES[name]
+    material = material_of(build)
+    material.mfo.leaf = "*"
+    target = ball(material)
+    report = export(target, reference=None, fit={"parameters": "all"})
+    assert set(others) <= set(named(report.request))
+    renderer = loaded(report)
+    table = renderer.table
+    assert set(named(report.request)) <= set(table.names)
+    recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    paths = recorded.record(renderer.start, grid=4, seed=0, near=False)
+    groups = paths.pixel_groups(paths.interior)
+    vector = table.pack(table.unpack(renderer.start) | others)
+    found = np.asarray(recorded.evaluator(paths, groups)(vector))
+    picture = renderer.image(vector, seed=0, spp=64).reshape(-1, 3)[groups.pixels]
+    notes = apply_values(material, others, report.folder, leaf="/".join(report.request["target"]["node"]))
+    assert notes == []
+    truth = render_cycles().reshape(-1, 3)[groups.pixels]
+    for shown, most in ((found[:, :, 0], 0.03), (picture, 0.08)):  # in narrow highlights, at 16 and 64 rays a pixel
+        assert abs(shown.mean() / truth.mean() - 1.0) < 0.003
+        assert np.sqrt(np.mean((shown - truth) ** 2)) / truth.mean() < most
+    step = 1e-3
+    for j in range(table.length):
+        ahead = vector.copy()
+        ahead[j] += step if vector[j] + step < table.upper[j] else -step
+        change = np.asarray(recorded.pictures(paths, groups)(ahead))[:, :, 0] - found[:, :, 0]
+        slope = found[:, :, 1 + j] * (ahead[j] - vector[j])
+        assert np.abs(change - slope).max() < 0.05 * np.abs(change).max() + 2e-6, table.names
+    revert_values(material)
+    np.testing.assert_allclose(loaded(export(target, fit={"parameters": "all"})).start, renderer.start, atol=1e-6)
