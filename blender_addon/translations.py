@@ -170,6 +170,7 @@ _GERMAN = {
 }
 _GERMAN_OPERATORS = {
     "Add Another Picture": "Weiteres Bild hinzufügen",
+    "All": "Alle",
     "Add Picture": "Bild hinzufügen",
     "Remove Picture": "Bild entfernen",
     "Set Up Camera": "Kamera aufstellen",

@@ -11,34 +11,32 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import bpy
-import tomllib
 
 from ..graph_values.place import holder_of, is_there
 from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
 from ..versions import PRINCIPLED
-from .files.job_folder import GENERATOR, MORE_PICTURES, new_job_folder, share_files
+from .files.job_folder import MORE_PICTURES, new_job_folder, share_files
 from .findings import ExportError, Findings
-from .material_model import Material, Socket
-from .materials.chosen_leaves import chosen_mix_values, named_mix_values, with_mix_values
+from .material_model import Material
+from .materials.chosen_leaves import chosen_mix_values, name_shares, named_mix_values, with_mix_values
 from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, shown
-from .reference.reference import Reference, read_reference
-from .reference.reference_view import SCENE, output_view
+from .reference.reference import read_reference
+from .reference.reference_view import SCENE
+from .request import parameter_of, request_of_picture
 from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
-from .scene.scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
-from .scene.scene_file import SceneFiles, scene_files
+from .scene.scene_data import TARGET_BSDF
+from .scene.scene_file import scene_files
 
-SCHEMA_VERSION = 1
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
-MOST_UNKNOWN = 0.5  # share of a mix that a shader without an exact model may have
 
 _LOOK_SECONDS = 0.01  # between two looks at a second Blender that is waited for
 
@@ -225,10 +223,10 @@ def partial_export(
         if probe is not None:
             described = data.materials[TARGET_BSDF]
             data.materials[TARGET_BSDF], graph = yield from evaluate_graph(probe, context, obj, described)
-        _name_shares(data.materials[TARGET_BSDF], findings)
+        name_shares(data.materials[TARGET_BSDF], findings)
         files = scene_files(data, findings)
         tell(0.5)
-        request = _request(context, obj, data, files, picture, fit, findings)
+        request = request_of_picture(context, obj, data, files, picture, fit, findings)
         if graph is not None:
             request["graph"] = graph.request() | more
         files.write(folder)
@@ -287,129 +285,3 @@ def _fit_of(target: TargetShader, material: Material, fit: dict[str, Any], *, al
             f"A {label} has {listed} alone, and none of them is left to fit: choose one that has no link."
         )
     return fit | {"parameters": chosen}
-
-
-def _name_shares(material: Material, findings: Findings) -> None:
-    """Say how much of a mix each leaf is.
-
-    Raises
-    ------
-    ExportError
-        If what has no model is most of it.
-    """
-    leaves = (material, *material.leaves)
-    if len(leaves) < 2:
-        return
-    listed = ", ".join(f"'{'/'.join(leaf.node)}' {100.0 * float(leaf.weight.value):.0f} %" for leaf in leaves)
-    findings.note(f"Shares of the target's shaders: {listed}; {_said_of(material)}.", explains=False)
-    for leaf in material.leaves:
-        if leaf.is_nearest and float(leaf.weight.value) > MOST_UNKNOWN:
-            raise ExportError(
-                f"'{leaf.name}' is {100.0 * float(leaf.weight.value):.0f} % of material '{material.name}', and the fit "
-                "has no model of it: its values cannot be told from the others'. Unlink it, or fit another material."
-            )
-
-
-def _said_of(material: Material) -> str:
-    """What is fitted of a mix."""
-    others = sum(bool(leaf.free) for leaf in material.leaves)
-    if not (others or material.factors):
-        return "the first is fitted"
-    of = [f"{others} more"] if others else []
-    of += ["Mix factors"] if material.factors else []
-    return f"the first is fitted, and {' and '.join(of)}"
-
-
-def parameter_of(name: str) -> str:
-    """A socket's name as that of a parameter."""
-    return name.strip().lower().replace(" ", "_")
-
-
-def _labels(material: Material) -> dict[str, str]:
-    """What the target's node calls values of the fit, by their names there; none of a Principled BSDF."""
-    if not material.labels:
-        return {}
-    own = (name for name, socket in material.sockets.items() if not socket.linked or name in material.labels)
-    return {parameter_of(name): material.labels.get(name, name) for name in own}
-
-
-def _request(
-    context: bpy.types.Context,
-    obj: bpy.types.Object,
-    data: SceneData,
-    files: SceneFiles,
-    picture: Reference | None,
-    fit: dict[str, Any],
-    findings: Findings,
-) -> dict[str, Any]:
-    view, _device = output_view(context.scene)
-    request: dict[str, Any] = {
-        "schema_version": SCHEMA_VERSION,
-        "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},
-        "scene": "scene.xml",
-        "target": {
-            "shape_id": TARGET_SHAPE,
-            "bsdf_id": TARGET_BSDF,
-            "object": obj.name,
-            "material": data.materials[TARGET_BSDF].name,
-            "slot": obj.active_material_index,
-            "node": list(data.materials[TARGET_BSDF].node),
-            "labels": _labels(data.materials[TARGET_BSDF]),
-        },
-        "image": {
-            "width": data.camera.width,
-            "height": data.camera.height,
-            "film_transparent": data.settings.film_transparent,
-        },
-    }
-    if picture is not None:
-        request["reference"] = {"path": picture.name, "encoding": picture.encoding}
-    request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
-    if picture is not None and picture.view is not None:
-        request["view"]["lut"] = picture.view.request()
-    request["light_paths"] = data.settings.light_paths
-    if data.settings.exposure > 0.0:
-        request["film_exposure"] = data.settings.exposure
-    request["materials"] = {
-        identifier: _material(material, files)
-        for identifier, material in data.materials.items()
-        if material.model == "principled"
-    }
-    request["fit"] = dict(fit)
-    request["notes"] = list(findings.notes)
-    request["left_out"] = list(findings.left_out)
-    return request
-
-
-def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
-    described: dict[str, Any] = {
-        "name": material.name,
-        "distribution": material.distribution,
-        "subsurface_method": material.subsurface_method,
-        "sockets": {name: _socket(socket, files) for name, socket in material.sockets.items()},
-    }
-    shader = {"null": "transparent", "emission": "emission"}.get(material.model, material.shader)
-    if shader != "principled":
-        described["shader"] = shader
-    if material.is_mixed:
-        described["weight"] = _socket(material.weight, files)
-    extra = {"free": dict(material.free), "factors": list(material.factors), "ways": list(material.ways)}
-    described |= {name: value for name, value in extra.items() if value}
-    if material.leaves:
-        described["leaves"] = [_material(leaf, files) for leaf in material.leaves]
-    return described
-
-
-def _socket(socket: Socket, files: SceneFiles) -> dict[str, Any]:
-    value = socket.value
-    described = {"value": list(value) if isinstance(value, (list, tuple)) else value, "linked": socket.linked}
-    if socket.texture is not None:
-        described["texture"] = files.texture(socket.texture)
-    if socket.seen is not None:
-        described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
-    return described
-
-
-def _version() -> str:
-    manifest = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
-    return tomllib.loads(manifest.read_text("utf-8"))["version"]

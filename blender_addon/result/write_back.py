@@ -11,7 +11,15 @@ from typing import Any
 import bpy
 
 from ..export.materials.principled_mapping import mitsuba_to_sockets
-from ..export.nodes.target_shader import TargetShader, fitted_leaves, make_own, target_shader, why_no_target
+from ..export.nodes.target_shader import (
+    ALL_LEAVES,
+    TargetShader,
+    fitted_leaves,
+    leaf_name,
+    make_own,
+    target_shader,
+    why_no_target,
+)
 from ..graph_values.mix_values import MixValue, mix_values
 from ..graph_values.own_groups import make_groups_own
 from ..graph_values.place import INPUT, TINTS, Place, as_held, held, hold, holder_of, is_there
@@ -118,7 +126,7 @@ def apply_values(
     notes += _make_own(material, changes, target.name)
     slots = _slots(material, target.name)
     for name, value in changes.items():
-        slot, key = slots[name], _key(target, name)
+        slot, key = slots[name], slots[name].key
         if key not in kept.originals:
             keep_value(kept.originals, key, slot.kept)
         if moved.get(name) == DRIVER:
@@ -197,6 +205,15 @@ def _key(target: TargetShader, name: str) -> str:
     return f"{target.name}{OF_LEAF}{name}" if target.is_mixed else name
 
 
+def _key_inside(target: TargetShader, value: GraphValue | MixValue) -> str:
+    """The same of a value beside the sockets; that of another leaf has one whichever leaf is fitted."""
+    if not isinstance(value, MixValue):
+        return _key(target, value.name)
+    if value.factor is not None:
+        return f"{ALL_LEAVES}{OF_LEAF}{value.name}"
+    return f"{leaf_name(target.others[value.leaf])}{OF_LEAF}{value.socket}"
+
+
 def _leaf_of(key: str) -> str | None:
     leaf, found, _ = key.rpartition(OF_LEAF)
     return leaf if found else None
@@ -233,12 +250,13 @@ def _make_own(material: bpy.types.Material, names: Collection[str], leaf: str | 
 
 @dataclass(frozen=True)
 class _Slot:
-    """Where a value goes: a socket of the target's shader, or a place inside its nodes."""
+    """Where a value goes: a socket of the target's shader, or a place inside its nodes; and what it is kept under."""
 
     tree: bpy.types.NodeTree
     place: Place
     label: str
     is_linked: bool
+    key: str
 
     @property
     def holder(self) -> tuple[Any, str]:
@@ -303,9 +321,9 @@ def _slots(material: bpy.types.Material, leaf: str | None) -> dict[str, _Slot]:
     for name, found in target.places.items():
         path = (*(group.name for group in found.groups), found.socket.node.name)
         place = Place(path, INPUT, found.socket.identifier)
-        slots[name] = _Slot(tree, place, target.own_name(name), found.socket.is_linked)
+        slots[name] = _Slot(tree, place, target.own_name(name), found.socket.is_linked, _key(target, name))
     for value in _inside(target):
-        slots[value.name] = _Slot(tree, value.place, value.name, False)
+        slots[value.name] = _Slot(tree, value.place, value.name, False, _key_inside(target, value))
     return slots
 
 

@@ -3,8 +3,10 @@
 
     python -m studies.graphs ROWS.jsonl --size 96 --seeds 1
     python -m studies.graphs ROWS.jsonl --size 96 --seeds 1 --series values
+    python -m studies.graphs ROWS.jsonl --size 96 --seeds 1 --series mixes
 
-The first fits values of the shader's sockets, the second such inside the nodes, 4 to 9 numbers a graph (`values.py`).
+The first fits values of the shader's sockets, the second such inside the nodes, 4 to 9 numbers a graph (`values.py`),
+the third those of several shaders of a mix and its factors (`mixes.py`).
 Truth and start are drawn at random. Each row has the FLIP over the target, in Cycles, of the start, of the result and
 of another render of the truth (the floor), the largest error of each value, its deviation, and the seconds. Rows that
 are in the file already are not made again. Needs the bpy module.
@@ -33,10 +35,11 @@ from mfo_backend.types.image import Encoding, Image, Pixels
 
 from ..verdicts.summary import DEVIATIONS, OFF
 from .materials import GRAPHS
+from .mixes import MIXES, DrawnMix, put_mix
 from .values import FITTED, SOCKETS, Drawn
 
 LIGHTS = ("lamp", "probe")
-SERIES = ("sockets", "values")
+SERIES = ("sockets", "values", "mixes")
 NODE_SERVER = (sys.executable, "-m", "blender_addon.probe.server")
 SAMPLES = {"lamp": 128, "probe": 256}
 
@@ -77,7 +80,10 @@ def build_scene(graph: str, light: str, size: int) -> Any:
     material = bpy.data.materials.new(graph)
     target.data.materials.append(material)
     node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    GRAPHS[graph](material.node_tree, node)
+    if graph in MIXES:
+        put_mix(graph, target)
+    else:
+        GRAPHS[graph](material.node_tree, node)
     return target, node
 
 
@@ -91,8 +97,14 @@ def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, 
 
     target, node = build_scene(graph, light, size)
     draw = random.Random(f"{graph} {light} {seed}")
-    names = FITTED[graph] if series == "values" else [name for name in SOCKETS if not node.inputs[name].is_linked]
-    drawn = Drawn(target, node, names)
+    drawn: Drawn | DrawnMix
+    if series == "mixes":
+        drawn = DrawnMix(graph, target)
+    elif series == "values":
+        drawn = Drawn(target, node, FITTED[graph])
+    else:
+        drawn = Drawn(target, node, [name for name in SOCKETS if not node.inputs[name].is_linked])
+    names = drawn.names
     truth = drawn.draw(draw)
     start = drawn.draw(draw, near=truth)
     drawn.put(truth)
@@ -111,13 +123,13 @@ def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, 
             return {**known, "failed": done.sentence}
         seconds = time.monotonic() - began
         result = read_job_result(job)
-        apply_values(target.active_material, result_to_sockets(result), job)
+        apply_values(target.active_material, result_to_sockets(result), job, leaf=result.leaf or None)
         after = _cycles(SAMPLES[light], 4)
         mask = bpy.data.images.load(str(job / "pictures" / "counted.png"))
         counted = np.array(mask.pixels).reshape(size, size, -1)[::-1, :, 0] > 0.5  # Blender's rows begin below
     flips = {name: _flip(floor, other, counted) for name, other in
              (("before", before), ("after", after), ("floor", reference))}  # fmt: skip
-    of = list(zip(names, parameters, strict=True))
+    of = [(name, _key_of(name, key, result)) for name, key in zip(names, parameters, strict=True)]
     sure = {name: result.certainty.get(key, "") for name, key in of}
     spread = {name: drawn.share(name, result.spread[key], truth[name]) for name, key in of if key in result.spread}
     return {
@@ -131,6 +143,15 @@ def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, 
 def is_wrong(made: dict[str, Any], name: str) -> bool:
     """Whether a value of a row is off by more than a fiftieth of its range and by more than three deviations."""
     return made["wrong"][name] > max(OFF, DEVIATIONS * made["spread"].get(name, 0.0))
+
+
+def _key_of(name: str, key: str, result: Any) -> str:
+    """What a result calls a value: those of a mix's fitted leaf have plain names."""
+    own = f"{result.leaf}/"
+    if not result.leaf or not name.startswith(own):
+        return key
+    plain = {label: parameter for parameter, label in result.labels.items()}
+    return plain.get(name.removeprefix(own), name.removeprefix(own).lower().replace(" ", "_"))
 
 
 def _cycles(samples: int, seed: int) -> Pixels:
@@ -157,8 +178,8 @@ def main() -> None:
     """Make the rows that are missing."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("rows", type=Path, help="file to append to, one JSON object a line")
-    parser.add_argument("--series", choices=SERIES, default=SERIES[0], help="values of sockets, or inside the nodes")
-    parser.add_argument("--graphs", nargs="+", choices=GRAPHS, default=None)
+    parser.add_argument("--series", choices=SERIES, default=SERIES[0], help="what is fitted")
+    parser.add_argument("--graphs", nargs="+", choices=[*GRAPHS, *MIXES], default=None)
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
     parser.add_argument("--seeds", type=int, default=1, help="scenes for each graph and light")
     parser.add_argument("--size", type=int, default=96, help="pixels along each side")
@@ -169,7 +190,8 @@ def main() -> None:
     lines = chosen.rows.read_text("utf-8").splitlines() if chosen.rows.is_file() else []
     keys = ("series", "graph", "light", "seed", "size")
     known = {tuple({"series": SERIES[0], **json.loads(line)}[key] for key in keys) for line in lines}
-    graphs = chosen.graphs or [name for name in GRAPHS if chosen.series == SERIES[0] or name in FITTED]
+    all_graphs = {"sockets": GRAPHS, "values": FITTED, "mixes": MIXES}[chosen.series]
+    graphs = chosen.graphs or list(all_graphs)
     for seed in range(chosen.seeds):
         for light in chosen.lights:
             for graph in graphs:

@@ -41,7 +41,7 @@ def test_sockets_are_those_of_the_model(addon: object) -> None:
 
 
 def test_schema_versions_agree(addon: object) -> None:
-    from blender_addon.export import job as export
+    from blender_addon.export import request as export
     from mfo_backend.job.folder import request
     from mfo_backend.job.output import result
 

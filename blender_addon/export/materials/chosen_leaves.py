@@ -16,6 +16,8 @@ from ..findings import ExportError, Findings
 from ..material_model import Material
 from ..nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 
+MOST_UNKNOWN = 0.5  # share of a mix that a shader without an exact model may have
+
 
 def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple[list[str], dict[str, Any]]:
     """The values of a mix that `fit` names beside its fitted leaf, and the fit without them.
@@ -80,3 +82,34 @@ def with_mix_values(material: Material, target: TargetShader, chosen: Sequence[M
         ways=tuple(ways_of(target.leaf, factors)),
         leaves=tuple(leaves),
     )
+
+
+def name_shares(material: Material, findings: Findings) -> None:
+    """Say how much of a mix each leaf is.
+
+    Raises
+    ------
+    ExportError
+        If what has no model is most of it.
+    """
+    leaves = (material, *material.leaves)
+    if len(leaves) < 2:
+        return
+    listed = ", ".join(f"'{'/'.join(leaf.node)}' {100.0 * float(leaf.weight.value):.0f} %" for leaf in leaves)
+    findings.note(f"Shares of the target's shaders: {listed}; {_said_of(material)}.", explains=False)
+    for leaf in material.leaves:
+        if leaf.is_nearest and float(leaf.weight.value) > MOST_UNKNOWN:
+            raise ExportError(
+                f"'{leaf.name}' is {100.0 * float(leaf.weight.value):.0f} % of material '{material.name}', and the fit "
+                "has no model of it: its values cannot be told from the others'. Unlink it, or fit another material."
+            )
+
+
+def _said_of(material: Material) -> str:
+    """What is fitted of a mix."""
+    others = sum(bool(leaf.free) for leaf in material.leaves)
+    if not (others or material.factors):
+        return "the first is fitted"
+    of = [f"{others} more"] if others else []
+    of += ["Mix factors"] if material.factors else []
+    return f"the first is fitted, and {' and '.join(of)}"

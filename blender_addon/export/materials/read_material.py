@@ -35,7 +35,15 @@ from ..nodes.shader_graph import (
     source_of,
     surface_of,
 )
-from ..nodes.target_shader import DIRECTIONS, Place, TargetShader, leaf_name, target_shader, why_no_target
+from ..nodes.target_shader import (
+    DIRECTIONS,
+    Place,
+    TargetShader,
+    fits_all_leaves,
+    leaf_name,
+    target_shader,
+    why_no_target,
+)
 from .leaf_sockets import distribution_of, other_sockets
 
 SKIPPED_SOCKETS = ("Weight",)
@@ -89,7 +97,8 @@ def read_target(
     if target.is_mixed:
         found.weight = _read_weight(material, target.leaf, findings)
         found.leaves = tuple(_read_held(material, leaf, findings) for leaf in target.others)
-        note_leaves(material.name, target, findings)
+        if not fits_all_leaves(material):
+            note_leaves(material.name, target, findings)
     return found
 
 
@@ -97,7 +106,7 @@ def note_leaves(material: str, target: TargetShader, findings: Findings) -> None
     """Say which leaf of a mix is fitted, and how the others may be."""
     others = ", ".join(f"'{leaf_name(leaf)}' ({leaf.node.bl_label})" for leaf in target.others)
     if others:
-        said = f"Material '{material}' mixes shaders: '{target.name}' is fitted, and held are {others}."
+        said = f"Material '{material}' mixes shaders: '{target.name}' is fitted; of {others} what is chosen."
         findings.note(said, explains=False)
 
 

@@ -111,8 +111,9 @@ def target_shader(material: bpy.types.Material | None, leaf: str | None = None) 
     """The shader that is fitted of those that Cycles shows, through groups, mixes and reroutes, or None.
 
     `leaf` is its name; without one it is the leaf that the user chose for the material, or else that of the largest
-    share.
+    share, as with `ALL_LEAVES`.
     """
+    leaf = "" if leaf == ALL_LEAVES else leaf
     try:
         leaves = closure_leaves(material)
     except ClosureError:

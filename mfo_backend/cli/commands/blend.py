@@ -67,7 +67,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
         default="",
         metavar="NAME",
         help="of a material that mixes shaders the node to fit, after the groups it lies in (Group/Glossy BSDF; "
-        "default: the one that covers most of the picture)",
+        "all: every one that reflects, and Mix factors; default: the one that covers most of the picture)",
     )
     # its name until the scene's view became the default
     parser.add_argument(

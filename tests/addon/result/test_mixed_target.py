@@ -93,6 +93,86 @@ def test_values_go_to_the_leaf_and_back(mixed: SimpleNamespace) -> None:
     assert principled["Roughness"].default_value == own
 
 
+def test_several_leaves_and_the_factor_go_back_at_once(mixed: SimpleNamespace) -> None:
+    """Whichever leaf has the plain names: a value is kept once."""
+    from blender_addon.result.write_back import apply_values, revert_values, toggle_values
+
+    mix, glossy, principled = mixed.mix.inputs, mixed.glossy.inputs, mixed.principled.inputs
+
+    def now() -> tuple[float, ...]:
+        color = tuple(glossy["Color"].default_value)[:3]
+        return (mix[0].default_value, glossy["Roughness"].default_value, principled["Roughness"].default_value, *color)
+
+    before, factor = now(), f"Mix Shader/{mix[0].name}"
+    values = {
+        factor: 0.625, "Roughness": 0.75, "Glossy BSDF/Roughness": 0.25, "Glossy BSDF/Color": (0.5, 0.25, 0.125),
+    }  # fmt: skip
+    assert apply_values(mixed.material, values, JOB, leaf="Principled BSDF") == []
+    assert now() == pytest.approx((0.625, 0.25, 0.75, 0.5, 0.25, 0.125), abs=1e-6)
+    values = {factor: 0.5, "Roughness": 0.375, "Principled BSDF/Roughness": 0.125}
+    assert apply_values(mixed.material, values, JOB, leaf="Glossy BSDF") == []
+    assert now() == pytest.approx((0.5, 0.375, 0.125, 0.5, 0.25, 0.125), abs=1e-6)
+    toggle_values(mixed.material)
+    assert now() == before
+    toggle_values(mixed.material)
+    assert now() == pytest.approx((0.5, 0.375, 0.125, 0.5, 0.25, 0.125), abs=1e-6)
+    assert revert_values(mixed.material) == []
+    assert now() == before
+
+
+def exported(scene: SimpleNamespace, mixed: SimpleNamespace, parameters: str, **options: str) -> dict:
+    mixed.bpy.ops.mfo.fit(
+        reference=scene.reference, job_folder=scene.job, parameters=parameters, max_iterations=3, **options
+    )
+    return json.loads((Path(scene.job) / "request.json").read_text("utf-8"))
+
+
+def test_all_shaders_of_a_mix_are_asked_for(scene: SimpleNamespace, mixed: SimpleNamespace) -> None:
+    mixed.principled.inputs["Sheen Weight"].default_value = 0.5
+    request = exported(scene, mixed, "all", shader="all")
+    assert mixed.material.mfo.leaf == "*"
+    material = request["materials"]["target_bsdf"]
+    assert request["target"]["node"] == ["Principled BSDF"]  # of the larger share
+    assert material["factors"] == [{"name": f"Mix Shader/{mixed.mix.inputs[0].name}", "value": pytest.approx(0.3)}]
+    (other,) = material["leaves"]
+    assert set(other["free"].values()) >= {"Glossy BSDF/Color", "Glossy BSDF/Roughness"}
+    assert material["ways"] == [{"share": pytest.approx(1 / 0.7), "first": [0], "second": []}]
+    assert other["ways"] == [{"share": pytest.approx(1 / 0.3), "first": [], "second": [0]}]
+    assert "and 1 more and Mix factors" in " ".join(request["notes"])
+
+
+def test_values_of_a_mix_are_chosen_by_name(scene: SimpleNamespace, mixed: SimpleNamespace) -> None:
+    """Those of the fitted leaf by its name, too; a mix of which nothing else is asked for has nothing else free."""
+    request = exported(scene, mixed, "Principled BSDF/Base Color, glossy bsdf/roughness", shader="Principled BSDF")
+    material = request["materials"]["target_bsdf"]
+    assert request["fit"]["parameters"] in (["Base Color"], ["base_color"])
+    assert [leaf["free"] for leaf in material["leaves"]] == [{"Roughness": "Glossy BSDF/Roughness"}]
+    assert "factors" not in material
+    request = exported(scene, mixed, "Roughness")
+    material = request["materials"]["target_bsdf"]
+    assert not {"free", "factors", "ways"} & {key for leaf in (material, *material["leaves"]) for key in leaf}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [("Glossy BSDF/Rougness", "nearest is 'Glossy BSDF/Roughness'"), ("Mix Shader/Blend", "nearest is 'Mix Shader/F")],
+)
+def test_an_unknown_value_of_a_mix_is_one_sentence(
+    scene: SimpleNamespace, mixed: SimpleNamespace, parameters: str, said: str
+) -> None:
+    with pytest.raises(RuntimeError, match=said):
+        exported(scene, mixed, parameters)
+
+
+def test_what_lets_light_through_keeps_others_held(scene: SimpleNamespace, mixed: SimpleNamespace) -> None:
+    glass = mixed.tree.nodes.new("ShaderNodeBsdfGlass")
+    mixed.tree.links.new(glass.outputs[0], mixed.mix.inputs[2])
+    with pytest.raises(RuntimeError, match="cannot be fitted: 'Glass BSDF' lets light through"):
+        exported(scene, mixed, "Glass BSDF/Roughness", shader="Principled BSDF")
+    notes = exported(scene, mixed, "all", shader="all")["notes"]
+    assert any("'Principled BSDF' alone is fitted: 'Glass BSDF' lets light through" in note for note in notes)
+
+
 def test_a_wrong_leaf_is_one_sentence(mixed: SimpleNamespace) -> None:
     ops = mixed.bpy.ops.mfo
     with pytest.raises(

@@ -7,6 +7,7 @@ import copy
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -144,6 +145,56 @@ def test_most_keys_have_a_default() -> None:
 def test_a_wrong_value_is_one_sentence(request_data: dict, path: str, value: object, words: list[str]) -> None:
     with pytest.raises(BadInputError) as caught:
         request_from_json(changed(request_data, path, value))
+    assert_one_sentence(caught.value)
+    for word in words:
+        assert word in str(caught.value)
+
+
+MIX = {
+    "name": "Glaze", "sockets": {}, "weight": {"value": 0.6},
+    "factors": [{"name": "Mix Shader/Factor", "value": 0.4}], "ways": [{"share": 1.6667, "first": [0], "second": []}],
+    "leaves": [{
+        "name": "Glossy", "sockets": {"Roughness": {"value": 0.5}, "Base Color": {"value": 0.1, "linked": True}},
+        "weight": {"value": 0.4}, "free": {"Roughness": "Glossy BSDF/Roughness"},
+        "ways": [{"share": 2.5, "first": [], "second": [0]}],
+    }],
+}  # fmt: skip
+
+
+def test_what_is_free_of_a_mix_goes_there_and_back(request_data: dict) -> None:
+    request_data["materials"] = {"glaze": MIX}
+    request = request_from_json(request_data)
+    assert request_from_json(request_to_json(request)) == request
+    (leaf,) = request.materials["glaze"].leaves
+    assert leaf.free == {"Roughness": "Glossy BSDF/Roughness"}
+    assert (leaf.ways[0].share, leaf.ways[0].second) == (2.5, (0,))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("factors", [{"name": "Factor", "value": 0.4}], ["'Factor' must be a node's name"]),
+        ("factors", [{"name": "a/b", "value": 1.5}], ["value is 1.5"]),
+        ("factors", [{"name": "Glossy BSDF/Roughness", "value": 0.5}], ["given twice"]),
+        ("factors", [], ["name the factor 0"]),
+        ("ways", [{"share": -1.0}], ["share is -1.0"]),
+        ("ways", [{"share": 1.0, "first": [True]}], ["first is [True]"]),
+        ("ways", [{"share": 1.0, "first": [1]}], ["name the factor 1"]),
+        ("leaves/0/free", {"Base Color": "Glossy BSDF/Color"}, ["'Base Color' is none"]),
+        ("leaves/0/free", {"Wetness": "Glossy BSDF/Wetness"}, ["'Wetness' is none"]),
+        ("leaves/0/free", {"Roughness": 3}, ["names by sockets"]),
+    ],
+)
+def test_a_wrong_mix_is_one_sentence(request_data: dict, path: str, value: object, words: list[str]) -> None:
+    mix = copy.deepcopy(MIX)
+    *way, last = path.split("/")
+    place: Any = mix
+    for step in way:
+        place = place[int(step) if step.isdigit() else step]
+    place[last] = value
+    request_data["materials"] = {"glaze": mix}
+    with pytest.raises(BadInputError) as caught:
+        request_from_json(request_data)
     assert_one_sentence(caught.value)
     for word in words:
         assert word in str(caught.value)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""request.json of one picture: what the backend reads of the scene beside its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import tomllib
+
+from .files.job_folder import GENERATOR
+from .findings import Findings
+from .material_model import Material, Socket
+from .materials.node_graph import FOLDER as GRAPH_FOLDER
+from .reference.reference import Reference
+from .reference.reference_view import output_view
+from .scene.scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
+from .scene.scene_file import SceneFiles
+
+SCHEMA_VERSION = 1
+
+
+def parameter_of(name: str) -> str:
+    """A socket's name as that of a parameter."""
+    return name.strip().lower().replace(" ", "_")
+
+
+def _labels(material: Material) -> dict[str, str]:
+    """What the target's node calls values of the fit, by their names there; none of a Principled BSDF."""
+    if not material.labels:
+        return {}
+    own = (name for name, socket in material.sockets.items() if not socket.linked or name in material.labels)
+    return {parameter_of(name): material.labels.get(name, name) for name in own}
+
+
+def request_of_picture(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    data: SceneData,
+    files: SceneFiles,
+    picture: Reference | None,
+    fit: dict[str, Any],
+    findings: Findings,
+) -> dict[str, Any]:
+    """The content of request.json, all but what a graph adds."""
+    view, _device = output_view(context.scene)
+    request: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},
+        "scene": "scene.xml",
+        "target": {
+            "shape_id": TARGET_SHAPE,
+            "bsdf_id": TARGET_BSDF,
+            "object": obj.name,
+            "material": data.materials[TARGET_BSDF].name,
+            "slot": obj.active_material_index,
+            "node": list(data.materials[TARGET_BSDF].node),
+            "labels": _labels(data.materials[TARGET_BSDF]),
+        },
+        "image": {
+            "width": data.camera.width,
+            "height": data.camera.height,
+            "film_transparent": data.settings.film_transparent,
+        },
+    }
+    if picture is not None:
+        request["reference"] = {"path": picture.name, "encoding": picture.encoding}
+    request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
+    if picture is not None and picture.view is not None:
+        request["view"]["lut"] = picture.view.request()
+    request["light_paths"] = data.settings.light_paths
+    if data.settings.exposure > 0.0:
+        request["film_exposure"] = data.settings.exposure
+    request["materials"] = {
+        identifier: _material(material, files)
+        for identifier, material in data.materials.items()
+        if material.model == "principled"
+    }
+    request["fit"] = dict(fit)
+    request["notes"] = list(findings.notes)
+    request["left_out"] = list(findings.left_out)
+    return request
+
+
+def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
+    described: dict[str, Any] = {
+        "name": material.name,
+        "distribution": material.distribution,
+        "subsurface_method": material.subsurface_method,
+        "sockets": {name: _socket(socket, files) for name, socket in material.sockets.items()},
+    }
+    shader = {"null": "transparent", "emission": "emission"}.get(material.model, material.shader)
+    if shader != "principled":
+        described["shader"] = shader
+    if material.is_mixed:
+        described["weight"] = _socket(material.weight, files)
+    extra = {"free": dict(material.free), "factors": list(material.factors), "ways": list(material.ways)}
+    described |= {name: value for name, value in extra.items() if value}
+    if material.leaves:
+        described["leaves"] = [_material(leaf, files) for leaf in material.leaves]
+    return described
+
+
+def _socket(socket: Socket, files: SceneFiles) -> dict[str, Any]:
+    value = socket.value
+    described = {"value": list(value) if isinstance(value, (list, tuple)) else value, "linked": socket.linked}
+    if socket.texture is not None:
+        described["texture"] = files.texture(socket.texture)
+    if socket.seen is not None:
+        described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
+    return described
+
+
+def _version() -> str:
+    manifest = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
+    return tomllib.loads(manifest.read_text("utf-8"))["version"]

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The series *mixes*: fits of several shaders of a mix at once, 5 to 9 numbers, from random starts."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+Build = Callable[[Any], Any]  # a tree to the output socket of its surface
+
+LIMITS = {"Factor": (0.1, 0.9), "Fac": (0.1, 0.9), "Color": (0.05, 0.9), "Base Color": (0.05, 0.9)}
+LIMITS |= {"Metallic": (0.0, 1.0), "Roughness": (0.15, 0.8)}
+
+
+def _shader(kind: str, **values: float) -> Build:
+    def build(tree: Any) -> Any:
+        node = tree.nodes.new(f"ShaderNode{kind}")
+        for name, value in values.items():
+            node.inputs[name].default_value = value
+        return node.outputs[0]
+
+    return build
+
+
+def _noise(tree: Any) -> Any:
+    node, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+    low, high = ramp.color_ramp.elements
+    low.position, high.position = 0.45, 0.55
+    tree.links.new(node.outputs[0], ramp.inputs[0])
+    return ramp.outputs[0]
+
+
+def _fresnel(tree: Any) -> Any:
+    return tree.nodes.new("ShaderNodeFresnel").outputs[0]
+
+
+def _mix(factor: Build | None, first: Build, second: Build) -> Build:
+    def build(tree: Any) -> Any:
+        node = tree.nodes.new("ShaderNodeMixShader")
+        for number, side in ((0, factor), (1, first), (2, second)):
+            if side is not None:
+                tree.links.new(side(tree), node.inputs[number])
+        return node.outputs[0]
+
+    return build
+
+
+_DIFFUSE, _GLOSSY = _shader("BsdfDiffuse"), _shader("BsdfAnisotropic")
+_PLASTIC, _METAL = _shader("BsdfPrincipled"), _shader("BsdfPrincipled", Metallic=1.0)
+_SHEEN = _shader("BsdfSheen")
+
+# what is fitted of each mix; values that are not are the same in truth and start
+MIXES: dict[str, tuple[Build, tuple[str, ...]]] = {
+    "two colours": (
+        _mix(None, _DIFFUSE, _GLOSSY), ("Diffuse BSDF/Color", "Glossy BSDF/Color", "Glossy BSDF/Roughness"),
+    ),
+    "factor": (_mix(None, _DIFFUSE, _GLOSSY), ("Mix Shader/Factor", "Diffuse BSDF/Color", "Glossy BSDF/Roughness")),
+    "two by a mask": (
+        _mix(_noise, _PLASTIC, _METAL),
+        ("Principled BSDF/Base Color", "Principled BSDF/Roughness", "Principled BSDF.001/Base Color",
+         "Principled BSDF.001/Roughness"),
+    ),
+    "fresnel": (
+        _mix(_fresnel, _DIFFUSE, _GLOSSY), ("Diffuse BSDF/Color", "Glossy BSDF/Color", "Glossy BSDF/Roughness"),
+    ),
+    "coated": (
+        _mix(None, _PLASTIC, _GLOSSY),
+        ("Mix Shader/Factor", "Principled BSDF/Base Color", "Principled BSDF/Roughness", "Glossy BSDF/Roughness"),
+    ),
+    "three": (
+        _mix(_noise, _DIFFUSE, _mix(None, _GLOSSY, _SHEEN)),
+        ("Mix Shader.001/Factor", "Diffuse BSDF/Color", "Glossy BSDF/Roughness", "Sheen BSDF/Color"),
+    ),
+}  # fmt: skip
+
+
+def put_mix(name: str, target: Any) -> None:
+    """Give the target's material the shaders of a mix."""
+    tree = target.active_material.node_tree
+    output = tree.get_output_node("CYCLES")
+    tree.nodes.remove(output.inputs["Surface"].links[0].from_node)
+    tree.links.new(MIXES[name][0](tree), output.inputs["Surface"])
+
+
+class DrawnMix:
+    """The values that are fitted of a mix, drawn at random and put where they are."""
+
+    def __init__(self, name: str, target: Any) -> None:
+        self._tree, self.names = target.active_material.node_tree, MIXES[name][1]
+
+    def draw(self, seed: random.Random, *, near: dict[str, Any] | None = None) -> dict[str, Any]:
+        """Values by name, evenly from their ranges."""
+        return {name: self._one(name, seed) for name in self.names}
+
+    def put(self, values: dict[str, Any]) -> None:
+        """Set them."""
+        for name, value in values.items():
+            self._socket(name).default_value = (*value, 1.0) if isinstance(value, tuple) else value
+
+    def errors(self, truth: dict[str, Any]) -> dict[str, float]:
+        """The largest difference of each value's numbers from the truth."""
+        here = {name: np.ravel(self._socket(name).default_value)[: np.size(value)] for name, value in truth.items()}
+        return {name: float(np.abs(here[name] - np.ravel(value)).max()) for name, value in truth.items()}
+
+    def share(self, name: str, deviation: float, truth: Any) -> float:
+        """A standard deviation of a value in the unit of its `errors`."""
+        return deviation
+
+    def _one(self, name: str, seed: random.Random) -> Any:
+        low, high = LIMITS[name.rpartition("/")[2]]
+        return tuple(seed.uniform(low, high) for _ in range(3)) if "Color" in name else seed.uniform(low, high)
+
+    def _socket(self, name: str) -> Any:
+        node, _, value = name.rpartition("/")
+        return self._tree.nodes[node].inputs[value]
