@@ -19,7 +19,7 @@ from .backend_python import EXTENSION_ROOT
 from .process_group import KILL, TERMINATE, signal_group
 from .progress_lines import Event
 
-RESULT, PARTIAL = "result.json", "partial.json"
+RESULT, PARTIAL, COPY = "result.json", "partial.json", "graph/scene.blend"
 
 CANCEL_GRACE = 5.0  # seconds from the cancel command to SIGTERM; the backend promises to need one
 TERMINATE_GRACE = 3.0  # seconds from SIGTERM to SIGKILL
@@ -144,6 +144,8 @@ class JobProcess:
 
     def _end(self) -> None:
         self.backend.release()
+        with contextlib.suppress(OSError):  # a whole .blend, which only a running fit has a use for
+            (self.folder / COPY).unlink()
         self.outcome = self._judge(self.backend.process.returncode)
 
     def _judge(self, code: int) -> Outcome:

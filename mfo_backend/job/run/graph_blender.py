@@ -37,6 +37,10 @@ _NO_BLENDER = (
     "Values inside nodes ({names}) stayed as they were: no Blender was given that evaluates the nodes, or the preset "
     "fits the values of sockets alone."
 )
+_NO_COPY = (
+    "Values inside nodes ({names}) stayed as they were: the copy of the file that they are evaluated in is gone, as "
+    "once a job has a result. Export the job anew."
+)
 _PREFIX = "mfo_nodes_"
 
 
@@ -186,6 +190,11 @@ def evaluated_graph(
         if not request.fit.parameters:
             raise BadInputError(f"{names} are inside nodes, and need a Blender: run the fit there, or by `mfo blend`.")
         yield None, (_NO_BLENDER.format(names=names),)
+        return
+    if not (folder.root / COPY).exists():
+        if not request.fit.parameters:
+            raise BadInputError(_NO_COPY.format(names=", ".join(value.name for value in asked.values)))
+        yield None, (_NO_COPY.format(names=", ".join(value.name for value in asked.values)),)
         return
     copy = folder.file(COPY, what="request.json: graph.values, and the copy of the file")
     linked = [name for name, socket in request.materials[request.target.bsdf_id].sockets.items() if socket.graph]

@@ -16,6 +16,7 @@ from ...types.errors import BadInputError, MfoError
 from ...types.event import BestValues, Event, Progress
 from ...types.image import Image
 from ...types.status import Status
+from ..folder.graph_request import COPY
 from ..folder.job_folder import JobFolder, unwritable
 from ..folder.request import Request, read_request
 from ..output.progress import EventWriter
@@ -104,6 +105,7 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
     stop.loaded()
     write_outputs([JobPicture(folder, request, reference, view), *more], outcome, notes=said)
     folder.cancel.unlink(missing_ok=True)  # it has been answered
+    (folder.root / COPY).unlink(missing_ok=True)  # a whole .blend: with the result its end has come
     return outcome.result.status, outcome.result.message
 
 

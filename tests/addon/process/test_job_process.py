@@ -252,6 +252,26 @@ def test_the_best_values_of_a_dead_worker_become_its_result(
     assert (int(result.read_text()) if result.exists() else None) == kept
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "say(event='finished', status='stale', sentence='ok')",
+        "say(event='failed', status='failed', sentence='A bug.'); sys.exit(1)",
+        "say(event='failed', status='cancelled', sentence='Cancelled before.'); sys.exit(4)",
+        "os.kill(os.getpid(), signal.SIGKILL)",
+    ],
+    ids=["done", "failed", "cancelled", "killed"],
+)
+def test_the_copy_of_the_file_goes_with_the_fit(start: Start, tmp_path: Path, body: str) -> None:
+    """It is a whole .blend, for values inside nodes; what else nodes gave stays."""
+    graph = tmp_path / "Jöb folder" / "graph"
+    graph.mkdir(parents=True)
+    for name in ("scene.blend", "positions.npy"):
+        (graph / name).write_bytes(b"a file")
+    drain(start(body))
+    assert [path.name for path in graph.iterdir()] == ["positions.npy"]
+
+
 def test_a_worker_that_hangs_after_its_last_event_is_ended(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job_process, "CANCEL_GRACE", 0.2)
     process = start("say(event='finished', status='stale', sentence='ok'); time.sleep(60)")

@@ -10,12 +10,14 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mfo_backend.job.folder.graph_request import graph_from_json, graph_to_json
+from mfo_backend.job.folder.job_folder import JobFolder
 from mfo_backend.job.run import graph_blender
 from mfo_backend.job.run.graph_blender import GraphBlender
 from mfo_backend.types.errors import BadInputError, MfoError
@@ -132,3 +134,19 @@ def test_a_blender_that_does_not_answer_is_said(
 def test_a_program_that_is_not_there() -> None:
     with pytest.raises(MfoError, match="could not be started"):
         ask((os.path.join("nowhere", "blender"),))
+
+
+def test_a_job_whose_copy_is_gone_says_so(tmp_path: Path) -> None:
+    """As it is once the job has a result: other values are fitted still."""
+    graph = graph_from_json(ENTRY, "request.json")
+    for parameters in (("roughness",), ()):
+        request: Any = SimpleNamespace(graph=graph, fit=SimpleNamespace(preset="fast", parameters=parameters))
+        found = graph_blender.evaluated_graph(JobFolder(tmp_path), request, server("pass"))
+        if not parameters:
+            with pytest.raises(BadInputError, match="copy of the file that"), found:
+                pass
+            continue
+        with found as (pictures, notes):
+            assert pictures is None
+            assert "Color Ramp/Stop 0, Noise Texture/Scale" in notes[0]
+            assert "Export the job anew" in notes[0]

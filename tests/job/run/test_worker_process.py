@@ -109,6 +109,19 @@ def test_a_finished_job_leaves_pictures_report_and_result(start_worker, job: Pat
     assert not [path for path in job.rglob("*") if path.suffix == ".tmp"]
 
 
+@pytest.mark.parametrize("is_cancelled", [False, True])
+def test_the_copy_of_the_file_goes_with_the_result(start_worker, job: Path, is_cancelled: bool) -> None:
+    (job / "graph").mkdir()
+    (job / "graph" / "scene.blend").write_bytes(b"a whole .blend")
+    child = start_worker("--progress", "json", plan=ENDLESS if is_cancelled else {})
+    wait_for_event(child, "progress")
+    assert is_cancelled <= (job / "graph" / "scene.blend").exists()  # while it runs
+    if is_cancelled:
+        (job / "cancel").touch()
+    child.communicate(timeout=60)
+    assert list((job / "graph").iterdir()) == []
+
+
 def test_a_second_run_in_the_folder_replaces_the_first(start_worker, job: Path) -> None:
     start_worker("--progress", "none").communicate(timeout=60)
     (job / "cancel").touch()
