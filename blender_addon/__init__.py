@@ -11,6 +11,7 @@ from . import panel, properties, translations
 from .backend import backend_state, preferences_page
 from .check import preflight
 from .operators import CLASSES as OPERATORS
+from .operators import part
 from .panel import menu
 from .process import waiting_backend
 from .result import comparison, previews
@@ -24,6 +25,7 @@ def register() -> None:
     """Add the classes and properties of the extension to Blender."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    part.define_steps()
     properties.attach()
     previews.register()
     menu.register()

@@ -103,9 +103,21 @@ def _pictures(chosen: argparse.Namespace) -> Any:
         return chosen.reference.absolute()
     try:
         given = [json.loads(text) for text in chosen.picture]
-        return [PictureSetup(**{**one, "reference": Path(one["reference"]).absolute()}) for one in given]
+        parts = [_part(one["reference"], one.pop("part", {})) for one in given]
+        return [PictureSetup(**one | {"reference": part}) for one, part in zip(given, parts, strict=True)]
     except (ValueError, TypeError, KeyError) as error:
         raise HeadlessError(f"--picture is no JSON object with the fields of a PictureSetup ({error}).") from error
+
+
+def _part(reference: str | Path, part: dict[str, Any]) -> Any:
+    """A picture, of which a part counts where one is given."""
+    from .export.reference.counted_part import WHOLE, CountedPart
+
+    path = Path(reference).absolute()
+    if not part:
+        return path
+    mask = Path(part["mask"]).absolute() if part.get("mask") else None
+    return CountedPart(path, tuple(part.get("crop", WHOLE)), mask, part.get("alpha", False))
 
 
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from .picture_part import MFO_PG_part, has_pixels
 from .result import comparison, overlay
 from .versions import RELATIVE_PATH
 
@@ -72,10 +73,6 @@ PRESET_ITEMS = (
 _RANGES = {"ior": (1.0, 3.0), "coat_ior": (1.0, 3.0), "thin_film_ior": (1.0, 3.0), "thin_film_thickness": (0.0, 1000.0)}
 
 
-def _has_pixels(_self: object, image: bpy.types.Image) -> bool:
-    return image.source in {"FILE", "GENERATED"} and not image.name.startswith("Material Fit ")
-
-
 def _is_camera(_self: object, item: bpy.types.Object) -> bool:
     return item.type == "CAMERA"
 
@@ -84,6 +81,7 @@ class MFO_PG_picture(bpy.types.PropertyGroup):
     """One of several pictures of a material: its file, and what of the scene it shows."""
 
     use: BoolProperty(name="Use", description="Fit this picture, too", default=True)
+    part: PointerProperty(type=MFO_PG_part)
     path: StringProperty(
         name="Picture",
         description="Picture of the same material, of any size",
@@ -134,10 +132,10 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         name="Reference",
         description="Image of this file to reproduce",
         type=bpy.types.Image,
-        poll=_has_pixels,
+        poll=has_pixels,
     )
     pictures: CollectionProperty(type=MFO_PG_picture)  # those after the first one
-    first_picture: PointerProperty(type=MFO_PG_picture)  # what the first one shows, where there are others
+    first_picture: PointerProperty(type=MFO_PG_picture)  # what of the first one counts, and what it shows among others
     overlay_opacity: FloatProperty(
         name="Opacity",
         description="How much of the reference is seen over the camera's view",
@@ -304,6 +302,7 @@ class MFO_PG_material(bpy.types.PropertyGroup):
 
 CLASSES = (
     MFO_PG_bound,
+    MFO_PG_part,
     MFO_PG_picture,
     MFO_PG_settings,
     MFO_PG_message,

@@ -11,6 +11,24 @@ import bpy
 
 # fmt: off
 _GERMAN = {
+    "Bottom": "Unten",
+    "Draw a rectangle over the camera's view: what lies outside has no part in the fit": "Ein Rechteck über der Kameraansicht ziehen: was außerhalb liegt, hat keinen Anteil an der Anpassung",
+    "Image that lies over the picture: what is white in it counts, what is black or transparent does not": "Bild, das über dem Bild liegt: was darin weiß ist, zählt, was schwarz oder durchsichtig ist, nicht",
+    "Left": "Links",
+    "Left edge of what counts, in per cent of the picture": "Linker Rand dessen, was zählt, in Prozent des Bildes",
+    "Let all of the picture count again; a painted mask stays in the file": "Wieder das ganze Bild zählen lassen; eine gemalte Maske bleibt in der Datei",
+    "Let the rectangle of the render region be the part of the reference that counts, and turn the region off": "Das Rechteck des Renderbereichs den Teil der Referenz sein lassen, der zählt, und den Bereich ausschalten",
+    "Look through the camera, with the reference over the view": "Durch die Kamera schauen, mit der Referenz über der Ansicht",
+    "Lower edge of what counts, in per cent of the picture from above": "Unterer Rand dessen, was zählt, in Prozent des Bildes von oben",
+    "Make a white mask of the picture's size and open it for painting: paint black what does not count": "Eine weiße Maske in der Größe des Bildes anlegen und zum Malen öffnen: schwarz malen, was nicht zählt",
+    "Mask": "Maske",
+    "Part That Counts": "Teil, der zählt",
+    "Right": "Rechts",
+    "Right edge of what counts, in per cent of the picture": "Rechter Rand dessen, was zählt, in Prozent des Bildes",
+    "Top": "Oben",
+    "Upper edge of what counts, in per cent of the picture from above": "Oberer Rand dessen, was zählt, in Prozent des Bildes von oben",
+    "Use Alpha": "Alpha verwenden",
+    "What is transparent in the picture itself does not count": "Was im Bild selbst durchsichtig ist, zählt nicht",
     "Add the camera that the fit proposes, make it the scene's, and list its picture, which is to be made yet": "Die vorgeschlagene Kamera anlegen, zur Kamera der Szene machen und ihr Bild in die Liste nehmen, das noch zu machen ist",
     "Camera": "Kamera",
     "Camera that the picture was made with": "Kamera, mit der das Bild gemacht wurde",
@@ -169,6 +187,11 @@ _GERMAN = {
     "linked": "verbunden",
 }
 _GERMAN_OPERATORS = {
+    "Draw What Counts": "Zeichnen, was zählt",
+    "Only This Region Counts": "Nur dieser Bereich zählt",
+    "Paint a Mask": "Maske malen",
+    "Show the Reference": "Die Referenz zeigen",
+    "Whole Picture": "Ganzes Bild",
     "Add Another Picture": "Weiteres Bild hinzufügen",
     "All": "Alle",
     "Add Picture": "Bild hinzufügen",

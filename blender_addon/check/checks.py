@@ -19,6 +19,7 @@ from ..export.images.picture_header import read_header
 from ..export.materials.read_material import read_target
 from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import TargetShader, fits_all_leaves, target_shader
+from ..export.reference.counted_part import CountedPart
 from ..export.reference.reference import (
     DISPLAY_SUFFIXES,
     LINEAR_SUFFIXES,
@@ -228,7 +229,34 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
             words = f"display colours under the view {output_view(scene)[0].view_transform}"
             words = f"taken as rendered in this scene, {words}" if mixed_by(scene) else words
     said = [Finding(IGNORED, " ".join(found.turned), (Fix("upright"),))] if found.turned else []
-    return problems or [*said, Finding(FINE, f"Reference: {found.words}, {words}.")]
+    problems += _part(scene, found)
+    return problems or [*said, *_part_words(scene), Finding(FINE, f"Reference: {found.words}, {words}.")]
+
+
+def _part(scene: bpy.types.Scene, found: _Picture) -> list[Finding]:
+    """What keeps the part of the picture that counts from being used."""
+    part = scene.mfo.first_picture.part
+    if part.is_whole:
+        return []
+    try:
+        with without_pixels():
+            CountedPart(Path(found.name), part.crop, part.mask, part.use_alpha).check()
+    except ExportError as problem:
+        return [Finding(STOPS, str(problem), (Fix("whole_picture"),))]
+    return []
+
+
+def _part_words(scene: bpy.types.Scene) -> list[Finding]:
+    """That not all of the picture counts, and what is made of a mask of another size."""
+    part = scene.mfo.first_picture.part
+    if part.is_whole:
+        return []
+    size = picture_size(scene.render)
+    if part.mask is not None and all(part.mask.size) and tuple(part.mask.size) != size:
+        mask, picture = (f"{width}x{height}" for width, height in (part.mask.size, size))
+        said = f"The mask '{part.mask.name}' is {mask} and the picture {picture}: it is scaled to that."
+        return [Finding(IGNORED, said, (Fix("whole_picture"),))]
+    return [Finding(FINE, "Only a part of the picture counts.", (Fix("whole_picture"),))]
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from .materials.node_graph import evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, shown
-from .reference.reference import read_reference
+from .reference.reference import Picture, read_reference
 from .reference.reference_view import SCENE
 from .request import parameter_of, request_of_picture
 from .scene.read_scene import finish_scene, read_scene
@@ -60,7 +60,7 @@ def export_job(
     obj: bpy.types.Object,
     folder: Path,
     *,
-    reference: Path | bpy.types.Image | Sequence[PictureSetup] | None,
+    reference: Picture | Sequence[PictureSetup] | None,
     fit: dict[str, Any],
     reference_view: str = SCENE,
     upright: bool = False,
@@ -119,7 +119,7 @@ def export_steps(
     context: bpy.types.Context,
     obj: bpy.types.Object,
     folder: Path,
-    reference: Path | bpy.types.Image | None,
+    reference: Picture | None,
     fit: dict[str, Any],
     reference_view: str,
     upright: bool,
@@ -168,7 +168,7 @@ def partial_export(
     context: bpy.types.Context,
     obj: bpy.types.Object,
     folder: Path,
-    reference: Path | bpy.types.Image | None,
+    reference: Picture | None,
     fit: dict[str, Any],
     reference_view: str,
     upright: bool,
@@ -232,7 +232,7 @@ def partial_export(
         files.write(folder)
         tell(0.9)
         if picture is not None:
-            picture.write(folder)
+            request["reference"] = picture.write(folder)
         if graph is not None:
             graph.write(folder)
         if values:

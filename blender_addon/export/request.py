@@ -43,7 +43,7 @@ def request_of_picture(
     fit: dict[str, Any],
     findings: Findings,
 ) -> dict[str, Any]:
-    """The content of request.json, all but what a graph adds."""
+    """The content of request.json, all but what a graph and the reference add."""
     view, _device = output_view(context.scene)
     request: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -64,8 +64,6 @@ def request_of_picture(
             "film_transparent": data.settings.film_transparent,
         },
     }
-    if picture is not None:
-        request["reference"] = {"path": picture.name, "encoding": picture.encoding}
     request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
     if picture is not None and picture.view is not None:
         request["view"]["lut"] = picture.view.request()

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user or a script can do: set up the backend, check, fit, cancel, apply, revert, go back, look at pictures."""
+"""What a user or a script can do: set up the backend, choose pictures, check, fit, apply, revert, go back, compare."""
 
-from . import apply, backend, check, cycles, fit, history, more_pictures, pictures, reference
+from . import apply, backend, check, cycles, fit, history, more_pictures, part, pictures, reference
 
 CLASSES = (
     *reference.CLASSES,
+    *part.CLASSES,
     *more_pictures.CLASSES,
     *check.CLASSES,
     *fit.CLASSES,

@@ -16,7 +16,9 @@ from ..backend.preferences import chosen_python, new_job_folder
 from ..export.job import ExportError, Steps, drained, export_job, export_steps
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
+from ..export.reference.counted_part import CountedPart
 from ..export.reference.picture_setup import PictureSetup
+from ..export.reference.reference import Picture
 from ..export.reference.reference_view import REFERENCE_VIEWS
 from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
@@ -209,15 +211,22 @@ def choose_shader(material: bpy.types.Material, wanted: str) -> None:
         raise FitError(str(error)) from error
 
 
-def _reference(settings: bpy.types.PropertyGroup, given: str) -> Path | bpy.types.Image:
+def _reference(settings: bpy.types.PropertyGroup, given: str) -> Picture:
+    """The picture that a script gives, or the scene's with what of it counts."""
     if not given and settings.reference_source == "IMAGE":
         if settings.reference_image is None:
             raise FitError("No reference is chosen: choose an image of this file, or a picture on disk.")
-        return settings.reference_image
+        return counted_part(settings.reference_image, settings.first_picture.part)
     path = given or settings.reference_path
     if not path:
         raise FitError("No reference is chosen: give the picture whose material is to be recovered.")
-    return Path(bpy.path.abspath(path))
+    picture = Path(bpy.path.abspath(path))
+    return picture if given else counted_part(picture, settings.first_picture.part)
+
+
+def counted_part(picture: Path | bpy.types.Image, part: bpy.types.PropertyGroup) -> Picture:
+    """The picture, of which not all counts where that is set."""
+    return picture if part.is_whole else CountedPart(picture, part.crop, part.mask, part.use_alpha)
 
 
 def _chosen_inside(obj: bpy.types.Object, settings: bpy.types.PropertyGroup, model: str) -> list[str]:
@@ -228,7 +237,7 @@ def _chosen_inside(obj: bpy.types.Object, settings: bpy.types.PropertyGroup, mod
     return [value.name for value in inside_values(target) if value.name in settings.node_values]
 
 
-def _pictures(settings: bpy.types.PropertyGroup, first: Path | bpy.types.Image) -> list[PictureSetup]:
+def _pictures(settings: bpy.types.PropertyGroup, first: Picture) -> list[PictureSetup]:
     """All pictures of the list that are used, with what each shows."""
     found = []
     for number, entry in enumerate((settings.first_picture, *settings.pictures), 1):
@@ -236,7 +245,7 @@ def _pictures(settings: bpy.types.PropertyGroup, first: Path | bpy.types.Image) 
             continue
         if number > 1 and not entry.path:
             raise FitError(f"Picture {number} has no file: choose it, or do not use this picture.")
-        reference = first if number == 1 else Path(bpy.path.abspath(entry.path))
+        reference = first if number == 1 else counted_part(Path(bpy.path.abspath(entry.path)), entry.part)
         camera = entry.camera.name if entry.camera is not None else ""
         found.append(PictureSetup(reference, number, entry.frame, camera, exposure=entry.exposure))
     if not found:

@@ -10,6 +10,7 @@ from ..check.checks import asks_view
 from ..result import overlay
 from ..running import running_job
 from .layout import letters
+from .part import draw_part
 
 _LETTERS_OF_A_ROW = 27  # of a line that holds both answers uncut; a narrower side bar has one below the other
 
@@ -32,6 +33,7 @@ class Reference:
             column.prop(settings, "reference_path", text="")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
+        draw_part(column, context)
         _draw_more_pictures(column, settings)
         shown = overlay.is_shown(context.scene.camera)
         row = layout.row(align=True)

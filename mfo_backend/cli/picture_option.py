@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ..job.folder.picture_part import PicturePart, part_to_json
 from ..types.errors import BadInputError
 
 KEYS = ("frame", "camera", "scene", "layer", "exposure")
@@ -30,6 +31,7 @@ class PictureOption:
     scene: str = ""
     view_layer: str = ""
     exposure: float = 0.0
+    part: Mapping[str, Any] = field(default_factory=dict)  # what of it counts, as request.json says it
 
     def fields(self) -> dict[str, Any]:
         """The fields as JSON."""
@@ -75,6 +77,21 @@ def picture_options(texts: Sequence[str], left_out: Sequence[int]) -> list[Pictu
     if not kept:
         raise BadInputError("--leave-out leaves no picture: leave one in at least.")
     return kept
+
+
+def with_part(pictures: Sequence[PictureOption], part: PicturePart) -> list[PictureOption]:
+    """The pictures with a part of them that counts.
+
+    Raises
+    ------
+    BadInputError
+        If it is one of several pictures, each of which would need its own.
+    """
+    if part.is_whole:
+        return list(pictures)
+    if len(pictures) > 1:
+        raise BadInputError("--crop, --mask and --alpha are for one picture: leave them out, or give one --reference.")
+    return [replace(picture, part=part_to_json(part)) for picture in pictures]
 
 
 def is_plain(pictures: Sequence[PictureOption]) -> bool:

@@ -18,6 +18,7 @@ _MAGMA = np.array(
         [254, 165, 113], [254, 195, 135], [253, 224, 162], [252, 253, 191],
     ]
 )  # fmt: skip
+NOT_COUNTED = 0.35  # grey of pixels that have no part in a comparison: no colour of the palette
 _SMALLEST_SIDE = 256  # smaller maps are enlarged by whole numbers, so that the text beside them can be read
 _BAR_WIDTH, _GAP, _LABEL_WIDTH, _TITLE_HEIGHT = 14, 8, 52, 20
 _TICKS = 5
@@ -28,6 +29,12 @@ def magma(values: NDArray[np.floating]) -> Pixels:
     nodes = np.linspace(0, 1, len(_MAGMA))
     clipped = np.clip(np.nan_to_num(values), 0, 1)
     return np.stack([np.interp(clipped, nodes, _MAGMA[:, c] / 255) for c in range(3)], axis=-1).astype(np.float32)
+
+
+def magma_counted(values: NDArray[np.floating], counts: NDArray[np.bool_] | None) -> Pixels:
+    """`magma` of a map (height, width), with the grey `NOT_COUNTED` where `counts` is False; None counts everywhere."""
+    colours = magma(values)
+    return colours if counts is None else np.where(counts[..., None], colours, np.float32(NOT_COUNTED))
 
 
 def draw_map(values: NDArray[np.floating], *, maximum: float, title: str) -> Pixels:

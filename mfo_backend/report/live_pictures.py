@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..metrics.display.tone_mapping import View
-from ..metrics.flip.block_means import block_means
+from ..metrics.flip.block_means import block_means, full_blocks
 from ..metrics.flip.flip_error import flip_error
 from ..types.image import Encoding, Image, Pixels
-from .difference_map import magma
+from .difference_map import magma_counted
 from .picture import displayed, png_bytes
 
 LARGEST_SIDE = 256  # pixels; a panel shows no more
@@ -22,6 +22,8 @@ class LivePictures:
     def __init__(self, reference: Image, view: View) -> None:
         self._view = view
         self._reference = _small(reference, LARGEST_MAP)
+        side = _side(reference, LARGEST_MAP)
+        self._counts = None if reference.counts is None else full_blocks(reference.counts, side)
 
     def current(self, pixels: Pixels) -> bytes:
         """The picture under the view, LARGEST_SIDE wide or high at most."""
@@ -30,11 +32,15 @@ class LivePictures:
     def difference(self, pixels: Pixels) -> bytes:
         """The FLIP map of pictures averaged to LARGEST_MAP; for the eye, its mean is not the FLIP of the picture."""
         test = _small(Image(np.nan_to_num(pixels), Encoding.LINEAR), LARGEST_MAP)
-        return png_bytes(magma(flip_error(self._reference, test, display=self._view).map))
+        return png_bytes(magma_counted(flip_error(self._reference, test, display=self._view).map, self._counts))
 
 
 def _small(image: Image, largest: int) -> Image:
     """Means over square blocks, so that no side is above `largest`; what does not fill a block is left out."""
+    return block_means(image, _side(image, largest))
+
+
+def _side(image: Image, largest: int) -> int:
+    """Pixels along each side of a block; a strip thinner than that stays as it is."""
     side = -(-max(image.height, image.width) // largest)
-    # a strip thinner than a block stays as it is
-    return image if side > min(image.height, image.width) else block_means(image, side)
+    return 1 if side > min(image.height, image.width) else side

@@ -25,13 +25,15 @@ class Encoding(Enum):
 class Image:
     """An RGB picture: `pixels` is float32 (height, width, 3); `alpha` is float32 (height, width) or None.
 
-    `notes` are sentences on what was done to the numbers of its file, or not done, that a user should know.
+    `notes` are sentences on what was done to the numbers of its file, or not done, that a user should know. `counts`
+    is True (height, width) where a reference shows what it should, None where all of it does.
     """
 
     pixels: Pixels
     encoding: Encoding
     alpha: Pixels | None = None
     notes: tuple[str, ...] = ()
+    counts: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.dtype != np.float32:
@@ -40,6 +42,8 @@ class Image:
             )
         if self.alpha is not None and self.alpha.shape != self.pixels.shape[:2]:
             raise ValueError(f"alpha has shape {self.alpha.shape}; needed is {self.pixels.shape[:2]}")
+        if self.counts is not None and self.counts.shape != self.pixels.shape[:2]:
+            raise ValueError(f"counts has shape {self.counts.shape}; needed is {self.pixels.shape[:2]}")
 
     @property
     def height(self) -> int:

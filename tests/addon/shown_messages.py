@@ -37,7 +37,7 @@ def shown_messages() -> set[tuple[str, str]]:
 
 
 def _of_class(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
-    is_operator = any(_name(base) == "Operator" for base in node.bases)
+    is_operator = any(_name(base) in ("Operator", "Macro") for base in node.bases)
     for statement in node.body:
         if isinstance(statement, ast.Assign) and _name(statement.targets[0]) == "bl_label":
             yield from _texts("Operator" if is_operator else "*", statement.value)

@@ -12,9 +12,10 @@ import pytest
 
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.metrics.flip.flip_error import flip_error
-from mfo_backend.scene.image_file import read_image
+from mfo_backend.report.difference_map import NOT_COUNTED
+from mfo_backend.scene.image_file import read_image, write_exr, write_png
 
-from .conftest import Done, Scene, run_bpy, run_mfo
+from .conftest import SIZE, Done, Scene, run_bpy, run_mfo
 
 Blend = Callable[..., Done]
 SHOW = """
@@ -113,3 +114,30 @@ def test_demo_judges_in_cycles(tmp_path: Path) -> None:
     pictures = [read_image(tmp_path / "demo" / f"{name}.exr") for name in ("reference", "after")]
     assert flip_error(*pictures, display=DisplayView()).mean == pytest.approx(done.answer["flip_after"], abs=1e-6)
     assert np.isfinite(pictures[1].pixels).all()
+
+
+def test_what_the_mask_leaves_out_has_no_part_in_the_fit(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+    """Something is in front of a quarter of the picture: under the mask the result is that of the whole picture."""
+    picture = read_image(scene.exr).pixels.copy()
+    covered = np.zeros(picture.shape[:2], bool)
+    covered[SIZE // 2 :, SIZE // 2 :] = True
+    picture[covered] = (0.05, 0.6, 0.1)
+    write_exr(tmp_path / "covered.exr", picture)
+    write_png(tmp_path / "mask.png", (~covered).astype(np.float32))
+    options = ("--preset", "fast", "--json")
+    blind = blend(tmp_path / "covered.exr", "--out", tmp_path / "blind", *options).answer
+    assert blind["verdict"] == "different"
+    seeing = blend(tmp_path / "covered.exr", "--mask", tmp_path / "mask.png", "--out", tmp_path / "job", *options)
+    assert seeing.code == 0, seeing.stderr
+    assert seeing.answer["errors"]["flip"][1] < 0.06  # as above
+    assert seeing.answer["difference"]["target"]["shared_at_least"] < 0.01
+    assert any("75 % of the reference's pixels count (mask)" in note for note in seeing.answer["notes"])
+    shown = read_image(tmp_path / "job" / "pictures" / "difference.png").pixels
+    assert np.allclose(shown[covered], NOT_COUNTED, atol=1 / 255)
+    assert not np.allclose(shown[~covered], NOT_COUNTED, atol=1 / 255)
+
+
+def test_a_mask_beside_the_object_is_refused(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+    done = blend(scene.exr, "--crop", "0,0,4,4", "--out", tmp_path / "job")
+    assert done.code == 2
+    assert "shows nothing of the target" in done.sentence

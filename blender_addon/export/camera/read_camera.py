@@ -64,7 +64,9 @@ def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
     render = scene.render
     if render.use_border:
         findings.error(
-            "Render Region is on, so the picture shows a part of the frame: turn Render Region off.", Fix("whole_frame")
+            "Render Region is on, so the picture shows a part of the frame: turn Render Region off.",
+            Fix("whole_frame"),
+            Fix("region_counts"),
         )
     if render.use_multiview:
         findings.error("Stereoscopy is on: turn it off to fit a single picture.", Fix("one_eye"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Display pictures as 8-bit RGB PNG (PNG specification, second edition)."""
+"""Display pictures as 8-bit PNG (PNG specification, second edition)."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write `pixels`, uint8 (height, width, 3), first row at the top.
+    """Write `pixels`, uint8 (height, width, 3), or 4 with alpha, first row at the top.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    height, width, _ = pixels.shape
+    height, width, channels = pixels.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1)], axis=1)
     chunks = [
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 6 if channels == 4 else 2, 0, 0, 0)),
         (b"sRGB", b"\0"),
         (b"IDAT", zlib.compress(rows.tobytes(), 6)),
         (b"IEND", b""),

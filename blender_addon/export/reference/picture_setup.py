@@ -15,6 +15,8 @@ from ...versions import cycles_settings
 from ..camera.read_camera import picture_size
 from ..findings import ExportError
 from ..images.picture_header import read_header
+from .counted_part import picture_of
+from .reference import Picture
 
 MOST_PICTURES = 32  # as the backend's `job.folder.request`
 _MOST_EXPOSURE = 32.0  # stops, as Blender's own view exposure
@@ -32,7 +34,7 @@ class PictureSetup:
         Stops that the picture is brighter than a render of the scene.
     """
 
-    reference: Path | bpy.types.Image
+    reference: Picture
     number: int = 1
     frame: int | None = None
     camera: str = ""
@@ -154,8 +156,9 @@ def _camera(scene: bpy.types.Scene, setup: PictureSetup) -> bpy.types.Object | N
     return camera
 
 
-def _size(reference: Path | bpy.types.Image) -> tuple[int, int] | None:
+def _size(picture: Picture) -> tuple[int, int] | None:
     """Width and height of a picture, None where they are not known without reading it."""
+    reference = picture_of(picture)
     if isinstance(reference, bpy.types.Image):
         return (reference.size[0], reference.size[1]) if all(reference.size) else None
     path = Path(bpy.path.abspath(str(reference)))

@@ -6,7 +6,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import bpy
 import numpy as np
@@ -17,6 +17,7 @@ from ..files.png_file import write_png
 from ..findings import ExportError, Fix
 from ..images.image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from ..images.picture_header import PictureHeader, read_header
+from .counted_part import CountedPart
 from .reference_colour import file_notes, image_notes
 from .reference_view import SCENE, needs_table, view_note
 from .turned_picture import turn_notes, turned
@@ -26,13 +27,15 @@ LINEAR_SUFFIXES = (".exr", ".hdr")
 LINEAR_FORMATS = ("OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR")  # other float images are 16-bit display pictures
 DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 
+Picture: TypeAlias = Path | bpy.types.Image | CountedPart  # what may be given as a reference
+
 
 @dataclass(frozen=True)
 class Reference:
     """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8).
 
     `view` is the view of a display picture where no formula has it; `notes` say what was taken for granted. `space` and
-    `primaries` are what the file of linear `pixels` says of their colours.
+    `primaries` are what the file of linear `pixels` says of their colours. `part` says what of it counts.
     """
 
     name: str
@@ -43,9 +46,10 @@ class Reference:
     notes: tuple[str, ...] = ()
     space: str = ""
     primaries: tuple[float, ...] = REC709
+    part: CountedPart | None = None
 
-    def write(self, folder: Path) -> None:
-        """Put the picture into `folder`.
+    def write(self, folder: Path) -> dict[str, Any]:
+        """Put the picture into `folder`; returns the object `reference` of request.json.
 
         Raises
         ------
@@ -61,20 +65,24 @@ class Reference:
             write_exr(folder / self.name, pixels, space=self.space, primaries=self.primaries)
         else:
             write_png(folder / self.name, np.asarray(self.pixels, dtype=np.uint8))
+        part = self.part.write(folder) if self.part is not None else {}
+        return {"path": self.name, "encoding": self.encoding, **part}
 
 
 def read_reference(
-    reference: Path | bpy.types.Image | None,
+    reference: Picture | None,
     scene: bpy.types.Scene,
     size: tuple[int, int],
     *,
     made: str = SCENE,
     upright: bool = False,
+    alpha: bool = False,
 ) -> Reference | None:
     """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
 
     `made` is one of `REFERENCE_VIEWS`. A display picture that was rendered in this scene comes with a table of the
     scene's view where no formula undoes that. `upright` turns a picture as its EXIF data say; else it is as stored.
+    `alpha` keeps the alpha channel of one that is written anew.
 
     Raises
     ------
@@ -83,9 +91,13 @@ def read_reference(
     """
     if reference is None:
         return None
+    if isinstance(reference, CountedPart):
+        reference.check()
+        found = read_reference(reference.picture, scene, size, made=made, upright=upright, alpha=reference.alpha)
+        return replace(found, part=reference) if found is not None else None
     stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
     if isinstance(reference, bpy.types.Image):
-        found = _from_image(reference, scene, size, stretched, made)
+        found = _from_image(reference, scene, size, stretched, made, alpha=alpha)
         return replace(found, notes=(*found.notes, *image_notes(reference)))
     path = Path(bpy.path.abspath(str(reference)))
     if not path.is_file():
@@ -104,7 +116,7 @@ def read_reference(
         try:
             if suffix == ".exr":
                 image.colorspace_settings.name = "Non-Color"  # the numbers as they are, with what the file says of them
-            found = _from_image(image, scene, size, stretched, made, turn)
+            found = _from_image(image, scene, size, stretched, made, turn, alpha=alpha)
         finally:
             bpy.data.images.remove(image)
         if suffix == ".exr" and header is not None:
@@ -158,10 +170,17 @@ def rendered_size(scene: bpy.types.Scene) -> tuple[int, int]:
 
 
 def _from_image(
-    image: bpy.types.Image, scene: bpy.types.Scene, size: tuple[int, int], stretched: bool, made: str, turn: int = 1
+    image: bpy.types.Image,
+    scene: bpy.types.Scene,
+    size: tuple[int, int],
+    stretched: bool,
+    made: str,
+    turn: int = 1,
+    *,
+    alpha: bool,
 ) -> Reference:
     try:
-        pixels = np.ascontiguousarray(read_pixels(image)[:, :, :3])
+        pixels = np.ascontiguousarray(read_pixels(image)[:, :, : 4 if alpha else 3])
     except UnreadableImageError as problem:
         raise ExportError(f"The reference '{image.name}' {problem}.") from None
     pixels = turned(pixels, turn)
@@ -172,6 +191,7 @@ def _from_image(
     if not holds_display_colours(image):
         return Reference("reference.exr", "linear", pixels=pixels)
     encoded = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055)
+    encoded[:, :, 3:] = pixels[:, :, 3:]
     levels = np.rint(encoded.clip(0.0, 1.0) * 255.0).astype(np.uint8)
     return Reference("reference.png", "srgb", pixels=levels, **_view(scene, image.name, made))
 

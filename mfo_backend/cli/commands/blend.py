@@ -20,7 +20,8 @@ from ...types.status import Status
 from ...types.verdict import Verdict
 from ..blender_host import BlenderHost, find_blender_host
 from ..fit_options import add_fit_options, fit_from_options
-from ..picture_option import HELP, PictureOption, is_plain, picture_options
+from ..part_options import add_part_options, part_from_options
+from ..picture_option import HELP, PictureOption, is_plain, picture_options, with_part
 from ..result_text import result_text
 from ..run_folder import run_folder
 from .run import leave
@@ -73,6 +74,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument(
         "--bake-view", dest="reference_view", action="store_const", const="scene", help=argparse.SUPPRESS
     )
+    add_part_options(parser)
     add_fit_options(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="job folder (default: a new temporary one)")
     parser.add_argument("--apply", action="store_true", help="put the recovered values on the material and save")
@@ -102,7 +104,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.save_as and not arguments.apply:
         raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
     options = fit_from_options(arguments)
-    pictures = picture_options(arguments.reference, arguments.leave_out)
+    given = picture_options(arguments.reference, arguments.leave_out)
+    pictures = with_part(given, part_from_options(arguments))
     FitSettings.from_request(options)  # a wrong option is known before Blender is started
     host = find_blender_host(arguments.blender)
     stream = take_stdout() if arguments.json else None

@@ -14,6 +14,7 @@ from ...job.run.fit_scene import Fitter, fit_scene
 from ...metrics.display.tone_mapping import DisplayView
 from ..fit_options import add_fit_options, fit_from_options
 from ..main import report_error
+from ..part_options import add_part_options, part_from_options
 from ..result_text import result_text
 from ..run_folder import run_folder
 from .run import leave
@@ -29,6 +30,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("scene", type=Path, metavar="SCENE.xml", help="Mitsuba 3 scene")
     parser.add_argument("--target", required=True, metavar="SHAPE_ID", help="id of the shape with the material")
     parser.add_argument("--reference", required=True, type=Path, metavar="REF", help="EXR, HDR, PNG, JPEG or TIFF")
+    add_part_options(parser)
     add_fit_options(parser)
     parser.add_argument("--exposure", type=float, metavar="EV", help="of the view a display reference was made with")
     parser.add_argument("--gamma", type=float, help="of that view (default: 1)")
@@ -50,7 +52,8 @@ def work(arguments: argparse.Namespace, fitter: Fitter) -> int:
         view = DisplayView(arguments.exposure or 0.0, 1.0 if arguments.gamma is None else arguments.gamma)
     folder = arguments.out or _free_folder(arguments.scene)
     is_new = not folder.exists()
-    make_job(arguments.scene, arguments.target, arguments.reference, settings, folder, view=view)
+    part = part_from_options(arguments)
+    make_job(arguments.scene, arguments.target, arguments.reference, settings, folder, view=view, part=part)
     stream = take_stdout() if arguments.json else None
     done = run_folder(folder, fitter, is_new=is_new, trusted=True)  # the user's own scene, named on the command line
     if done.result is None:

@@ -10,6 +10,7 @@ import argparse
 import json
 from pathlib import Path
 
+from ...fit.judge.region import fill_outside
 from ...job.folder.atomic_file import write_atomically
 from ...job.folder.job_folder import JobFolder
 from ...job.folder.request import read_request
@@ -18,7 +19,7 @@ from ...job.run.run_job import read_reference
 from ...metrics.compare import compare_images
 from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside
 from ...metrics.pixels.pixel_check import check_mask, check_pair
-from ...report.difference_map import magma
+from ...report.difference_map import magma_counted
 from ...report.picture import displayed, mask_from_png, png_bytes
 from ...scene.image_file import read_image
 
@@ -54,12 +55,18 @@ def run(arguments: argparse.Namespace) -> int:
         check_mask(counted, reference.pixels.shape[:2])
         side = block_side(counted)
         mask = full_blocks(counted, side)
+    counts = reference.counts
+    if counts is not None:  # what looks at neighbours finds no difference there
+        reference = fill_outside(reference, picture.pixels, counts, view.display)
+        counts = full_blocks(counts, side)
     seen = means_beside(reference.encoding, picture, side, view)
     comparison = compare_images(block_means(reference, side), seen, mask=mask, display=view)
     folder.pictures.mkdir(exist_ok=True)
     name = Path(arguments.name).name
     write_atomically(folder.pictures / f"{name}.png", png_bytes(displayed(picture, view)))
-    write_atomically(folder.pictures / f"{name}_difference.png", png_bytes(magma(comparison.maps["flip"])))
+    write_atomically(
+        folder.pictures / f"{name}_difference.png", png_bytes(magma_counted(comparison.maps["flip"], counts))
+    )
     if arguments.json:
         print(json.dumps({"status": "ok", "metrics": comparison.metrics, "notes": [*picture.notes, *comparison.notes]}))
         return 0

@@ -32,7 +32,7 @@ class FitTask:
     view
         What a display shows: `display` for a display-encoded reference, else an exposure chosen for the picture.
     mask, counted
-        Pixels, True (height, width), that see the target, and those that the settings' region holds.
+        Pixels, True (height, width), that see the target and count in the reference, and those of the settings' region.
     light
         The reference as scene-linear radiance, float32 (height, width, 3), not negative.
     clipped
@@ -89,8 +89,7 @@ def check_task(
         see the target.
     """
     began = time.monotonic()
-    mask = renderer.target_mask()
-    check_reference(reference, mask)
+    mask = check_reference(reference, renderer.target_mask())
     check_finite(reference.pixels, "The reference")
     if reference.encoding is Encoding.SRGB:
         view = display or DisplayView()
@@ -103,7 +102,7 @@ def check_task(
         display=display,
         view=view,
         mask=mask,
-        counted=counted_pixels(mask, settings),
+        counted=counted_pixels(reference, mask, settings),
         light=linear_pixels(reference, view),
         clipped=clipped_pixels(reference, view),
         listener=listener,

@@ -37,7 +37,7 @@ class PictureJudge:
         *,
         blurred: bool,
     ) -> None:
-        counted = counted_pixels(mask, settings)
+        counted = counted_pixels(reference, mask, settings)
         side = block_side(counted)
         self._smaller: _Smaller | None = None
         if side > 1:

@@ -52,6 +52,8 @@ def judge(reference: Image, result: Pixels, mask: Mask, view: View, *, noted: bo
     blocks = math.ceil(max(mask.shape) / AROUND_BLOCKS)
     surroundings = _light_means(reference, result, view, mask, blocks)
     near = widened(mask, BESIDE)
+    if reference.counts is not None:
+        near = near | ~reference.counts
     outside = block_sums(near[..., None].astype(np.float64), blocks)[..., 0] == 0.0
     around = None if _is_cut_out(reference, near) else beyond_noise(*surroundings, outside, NEXT)
     differs = around is not None and around.shared_at_least > AROUND_SHARED

@@ -62,7 +62,8 @@ class SheetJudge:
         reference = self.task.reference
         own = self.sheet.picture if reference.encoding is Encoding.LINEAR else self.sheet.cut
         for number in range(len(self.sheet)):
-            target = Image(np.ascontiguousarray(own(reference.pixels, number)), reference.encoding)
+            counts = None if reference.counts is None else self.sheet.cut(reference.counts, number)
+            target = Image(np.ascontiguousarray(own(reference.pixels, number)), reference.encoding, counts=counts)
             mask, counted = (
                 np.ascontiguousarray(self.sheet.cut(m, number)) for m in (self.task.mask, self.task.counted)
             )

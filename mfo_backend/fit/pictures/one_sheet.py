@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...metrics.display.baked_view import BakedView
 from ...metrics.display.colour import luminance
@@ -47,10 +48,10 @@ def one_sheet(
     BadInputError
         With the picture's number: if it does not fit to its scene or is seen through another view than the others.
     """
-    masks = [renderer.target_mask() for renderer in renderers]
-    for label, reference, mask in zip(labels, references, masks, strict=True):
+    masks = []
+    for label, reference, renderer in zip(labels, references, renderers, strict=True):
         try:
-            check_reference(reference, mask)
+            masks.append(check_reference(reference, renderer.target_mask()))
             check_finite(reference.pixels, "The reference")
         except BadInputError as error:
             raise BadInputError(f"Picture {label}: {error}") from error
@@ -59,7 +60,8 @@ def one_sheet(
         gains = [light[0] / level if level > 0.0 else 1.0 for level in light]
         renderer = SheetRenderer(renderers, gains, labels)
         pixels = renderer.sheet.radiance([reference.pixels for reference in references])
-        return SheetTask(renderer, Image(pixels.astype(np.float32), Encoding.LINEAR), None)
+        counts = _counts(renderer, references)
+        return SheetTask(renderer, Image(pixels.astype(np.float32), Encoding.LINEAR, counts=counts), None)
     of_display = [n for n, reference in enumerate(references) if reference.encoding is Encoding.SRGB]
     display, notes = views[of_display[0]], []
     gains = [_gain(views[n] if n in of_display else display, display, labels[n]) for n in range(len(references))]
@@ -70,7 +72,16 @@ def one_sheet(
             reference = replace(reference, pixels=display.display(np.maximum(reference.pixels, 0.0)).astype(np.float32))
         shown.append(reference.pixels)
     renderer = SheetRenderer(renderers, gains, labels)
-    return SheetTask(renderer, Image(renderer.sheet.put(shown), Encoding.SRGB), display, tuple(notes))
+    sheet = Image(renderer.sheet.put(shown), Encoding.SRGB, counts=_counts(renderer, references))
+    return SheetTask(renderer, sheet, display, tuple(notes))
+
+
+def _counts(renderer: SheetRenderer, references: Sequence[Image]) -> NDArray[np.bool_] | None:
+    """What counts on the sheet; None where all of every picture does."""
+    if all(reference.counts is None for reference in references):
+        return None
+    whole = [np.ones((r.height, r.width), np.bool_) if r.counts is None else r.counts for r in references]
+    return renderer.sheet.put(whole)
 
 
 def _gain(view: View, common: View, label: str) -> float:

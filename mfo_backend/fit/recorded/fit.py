@@ -80,7 +80,10 @@ class RecordedRoute:
         self._measure = named[-1] if named else task.measure
         self._finishing = finishing_residuals(settings, task.reference.encoding, task.light, task.mask, task.view)
         several = isinstance(renderer, SheetRenderer)
-        self._scene = RecordedSheet(renderer) if several else RecordedScene(renderer, int(task.mask.sum()))
+        counts = task.reference.counts
+        self._scene = (
+            RecordedSheet(renderer, counts) if several else RecordedScene(renderer, int(task.mask.sum()), counts=counts)
+        )
         self.stages = (*STAGES, *self._finishing, *(["flip"] if settings.preset == "best" else []))
         self.verification = Verification(
             renderer,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from ... import __version__
@@ -13,7 +14,8 @@ from ...metrics.display.tone_mapping import DisplayView
 from ...scene.image_file import check_reference, read_image
 from ...scene.scene_xml import find_target, read_scene
 from ...types.errors import BadInputError
-from .job_folder import unwritable
+from .job_folder import JobFolder, unwritable
+from .picture_part import PicturePart, with_part
 from .request import Request, Target, request_to_json
 from .scene_files import film_size, pack_scene
 
@@ -26,8 +28,11 @@ def make_job(
     folder: Path,
     *,
     view: DisplayView | None = None,
+    part: PicturePart | None = None,
 ) -> Request:
     """Write a job into `folder`, which must be new or empty; on an error it is as it was before.
+
+    The mask of the `part` of the reference that counts is a file of the user's, which is copied.
 
     Raises
     ------
@@ -40,6 +45,11 @@ def make_job(
     width, height = film_size(root)
     check_reference(image, width, height)
     settings.stage_names(image.encoding)
+    part = part or PicturePart()
+    copied = replace(part, mask=f"mask{Path(part.mask).suffix.lower()}") if part.mask else part
+    with_part(image, replace(part, mask=""), JobFolder(folder))
+    if part.mask:
+        read_image(part.mask)
     request = Request(
         scene="scene.xml",
         target=Target(shape_id=shape_id, bsdf_id=target.bsdf_id),
@@ -47,6 +57,7 @@ def make_job(
         height=height,
         reference=f"reference{reference.suffix.lower()}",
         encoding=image.encoding,
+        part=copied,
         view=view,
         fit=settings,
         generator={"name": "mfo fit", "version": __version__},
@@ -56,6 +67,8 @@ def make_job(
         folder.mkdir(parents=True, exist_ok=True)
         pack_scene(scene, folder)
         shutil.copyfile(reference, folder / request.reference)
+        if part.mask:
+            shutil.copyfile(part.mask, folder / copied.mask)
         (folder / "request.json").write_text(json.dumps(request_to_json(request), indent=1), "utf-8")
     except OSError as error:
         _clear(folder, is_new)

@@ -19,6 +19,7 @@ from .graph_files import check_graph_files
 from .graph_request import NodeGraph, graph_from_json, graph_to_json
 from .job_folder import JobFolder
 from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
+from .picture_part import PicturePart, part_from_json, part_to_json
 from .scene_files import check_scene_files
 
 SCHEMA_VERSION = 1
@@ -129,6 +130,7 @@ class Request:
     height: int
     reference: str
     encoding: Encoding
+    part: PicturePart = field(default_factory=PicturePart)  # what of the reference counts
     film_transparent: bool = False
     view: DisplayView | None = None
     view_table: ViewTable | None = None
@@ -168,6 +170,8 @@ def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = Fals
     request = replace(request, more_pictures=more)
     folder.file(request.scene, what=f"{WHERE}: scene")
     folder.file(request.reference, what=f"{WHERE}: reference.path")
+    if request.part.mask:
+        folder.file(request.part.mask, what=f"{WHERE}: reference.mask")
     if request.view_table is not None:
         folder.file(request.view_table.path, what=f"{WHERE}: view.lut.path")
     check_scene_files(folder, request.scene, trusted=trusted)
@@ -197,7 +201,9 @@ def request_from_json(data: Any) -> Request:
         )
     top = CheckedObject(data, WHERE, _KEYS)
     image = CheckedObject(top.raw("image"), f"{WHERE}: image", ("width", "height", "film_transparent"))
-    reference = CheckedObject(top.raw("reference"), f"{WHERE}: reference", ("path", "encoding"))
+    reference = CheckedObject(
+        top.raw("reference"), f"{WHERE}: reference", ("path", "encoding", "crop", "mask", "alpha")
+    )
     return Request(
         scene=top.text("scene"),
         target=_target(top.raw("target")),
@@ -206,6 +212,7 @@ def request_from_json(data: Any) -> Request:
         film_transparent=image.boolean("film_transparent", False),
         reference=reference.text("path"),
         encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
+        part=part_from_json(reference),
         view=_view(top.raw("view", None)),
         view_table=_view_table(top.raw("view", None)),
         light_paths=_light_paths(top.raw("light_paths", None)),
@@ -267,7 +274,11 @@ def request_to_json(request: Request) -> dict[str, Any]:
             "height": request.height,
             "film_transparent": request.film_transparent,
         },
-        "reference": {"path": request.reference, "encoding": request.encoding.value},
+        "reference": {
+            "path": request.reference,
+            "encoding": request.encoding.value,
+            **part_to_json(request.part),
+        },
         "view": view,
         "light_paths": asdict(request.light_paths) if request.light_paths is not None else None,
         "film_exposure": request.film_exposure,

@@ -6,11 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from ...metrics.flip.block_means import block_means, block_side, means_beside
+from ...fit.judge.region import fill_outside
+from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside
 from ...metrics.flip.flip_error import flip_error
 from ...metrics.pixels.side_by_side import side_by_side
 from ...report.curve_picture import curve_png
-from ...report.difference_map import magma
+from ...report.difference_map import magma_counted
 from ...report.html_report import ReportContent, report_html
 from ...report.picture import displayed, displayed_linear, mask_png, png_bytes
 from ...scene.image_file import write_exr
@@ -68,12 +69,16 @@ def _write_pictures(picture: JobPicture, seen: SeenPicture) -> dict[str, bytes]:
     folder, reference, view = picture.folder, picture.reference, picture.view
     side = block_side(seen.counted)  # as `fit.picture_errors`
     result = means_beside(reference.encoding, Image(seen.result, Encoding.LINEAR), side, view)
-    difference = flip_error(block_means(reference, side), result, display=view)
+    seen_reference = reference
+    if reference.counts is not None:
+        seen_reference = fill_outside(reference, seen.result, reference.counts, view.display)
+    difference = flip_error(block_means(seen_reference, side), result, display=view)
+    counts = None if reference.counts is None else full_blocks(reference.counts, side)
     shown = {
         "reference": lambda: displayed(reference, view),
         "start": lambda: displayed_linear(seen.start, view),
         "result": lambda: displayed_linear(seen.result, view),
-        "difference": lambda: magma(difference.map),
+        "difference": lambda: magma_counted(difference.map, counts),
     }
     files = side_by_side(lambda picture: png_bytes(picture()), list(shown.values()))
     pictures = dict(zip(shown, files, strict=True))

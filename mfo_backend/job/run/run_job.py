@@ -18,6 +18,7 @@ from ...types.image import Image
 from ...types.status import Status
 from ..folder.graph_request import COPY
 from ..folder.job_folder import JobFolder, unwritable
+from ..folder.picture_part import with_part
 from ..folder.request import Request, read_request
 from ..output.progress import EventWriter
 from ..output.result import write_partial
@@ -134,7 +135,9 @@ def read_reference(folder: JobFolder, request: Request) -> tuple[Image, tuple[st
     """
     path = folder.file(request.reference, what="request.json: reference.path")
     image = read_image(path, (request.width, request.height))
-    return check_reference(replace(image, encoding=request.encoding), request.width, request.height)
+    image, notes = check_reference(replace(image, encoding=request.encoding), request.width, request.height)
+    image, said = with_part(image, request.part, folder)
+    return image, (*notes, *said)
 
 
 def _fail(events: EventWriter, status: Status, sentence: str) -> Status:

@@ -63,9 +63,10 @@ class SceneNeeds:
 
 
 class RecordedScene:
-    """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target.
+    """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target and count.
 
-    `part` is the part of all lanes and rays that its recordings may have, where there are those of other pictures, too.
+    Nothing is recorded of pixels where `counts` is False, (height, width); None counts everywhere. `part` is the part
+    of all lanes and rays that its recordings may have, where there are those of other pictures, too.
 
     Raises
     ------
@@ -73,12 +74,18 @@ class RecordedScene:
         If the material has textures or a lobe that recorded paths cannot hold.
     """
 
-    def __init__(self, renderer: MitsubaRenderer, covered: int, part: float = 1.0) -> None:
+    def __init__(
+        self,
+        renderer: MitsubaRenderer,
+        covered: int,
+        part: float = 1.0,
+        counts: NDArray[np.bool_] | None = None,
+    ) -> None:
         self._integrator = renderer.scene.integrator()
         if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self.renderer = renderer
-        self._covered, self._part = covered, part
+        self._covered, self._part, self._counts = covered, part, counts
         self._taken = 0  # bytes for the rays of the largest recording so far
         self.model = recorded_model(renderer.model, renderer.shape.bsdf(), renderer.mix)
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
@@ -250,9 +257,10 @@ class RecordedScene:
 
     @cached_property
     def _near_target(self) -> NDArray[np.bool_]:
-        """Pixels that may see the target: those that do and their neighbours in reach of the pixel filter."""
+        """Pixels that count and may see the target: those that do, and neighbours in reach of the pixel filter."""
         reach = math.ceil(self.renderer.scene.sensors()[0].film().rfilter().radius() + 0.5)
-        return widened(self.renderer.target_mask(), reach)
+        near = widened(self.renderer.target_mask(), reach)
+        return near if self._counts is None else near & self._counts
 
     def pictures(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage:
         """The function from a vector to the image of the groups alone, background included, without derivatives.

@@ -29,7 +29,7 @@ _SCENES_APART = 0x9E3779B1  # between the seeds of two pictures' recordings
 
 
 class RecordedSheet:
-    """What `RecordedScene` is for one picture, for all pictures of a sheet.
+    """What `RecordedScene` is for one picture, for all pictures of a sheet; `counts` is over its pixels.
 
     All of them together have the lanes and the rays of one, so they take about the time and the memory of one.
 
@@ -41,13 +41,15 @@ class RecordedSheet:
 
     graph = None  # values inside nodes are fitted to one picture alone
 
-    def __init__(self, renderer: SheetRenderer) -> None:
+    def __init__(self, renderer: SheetRenderer, counts: NDArray[np.bool_] | None = None) -> None:
         self.renderer = renderer
-        covered = [int(r.target_mask().sum()) for r in renderer.renderers]
+        count = len(renderer.renderers)
+        parts = [None if counts is None else renderer.sheet.cut(counts, number) for number in range(count)]
+        masks = [r.target_mask() for r in renderer.renderers]
+        covered = [int((m if of is None else m & of).sum()) for m, of in zip(masks, parts, strict=True)]
         self._parts = [count / sum(covered) for count in covered]
         self._scenes = [
-            RecordedScene(r, count, part)
-            for r, count, part in zip(renderer.renderers, covered, self._parts, strict=True)
+            RecordedScene(*each) for each in zip(renderer.renderers, covered, self._parts, parts, strict=True)
         ]
         if any(scene.varies for scene in self._scenes):
             raise UnrecordableError("Values inside of a node graph are fitted to one picture.")

@@ -133,3 +133,13 @@ def test_worse_than_the_start_is_what_looks_farther_from_the_reference():
     assert is_worse(reference, near, far, MASK, VIEW)
     assert not is_worse(reference, far, near, MASK, VIEW)
     assert not is_worse(reference, near, noisy(scene(ball=0.58), 0.15, 3), MASK, VIEW)
+
+
+def test_what_does_not_count_has_no_part_in_the_verdict():
+    occluded = np.where((COLUMNS > 50)[..., None], np.float32(0.9), scene())
+    assert verdict_of(occluded, scene()).verdict is Verdict.DIFFERENT
+    counts = COLUMNS <= 50
+    found = judge(Image(occluded, Encoding.LINEAR, counts=counts), scene(), MASK & counts, VIEW)
+    assert found is not None
+    assert found.verdict is Verdict.SAME
+    assert found.around is not None  # what counts beside the target is still looked at

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What of the reference counts: a rectangle, a mask, the picture's own alpha; folded until it is asked for."""
+
+from __future__ import annotations
+
+import bpy
+
+from .layout import letters
+
+_LETTERS_OF_A_ROW = 27  # of a line that holds two edges uncut
+
+
+def draw_part(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the settings of the first picture's part."""
+    part = context.scene.mfo.first_picture.part
+    header, body = layout.panel("mfo_part", default_closed=True)
+    header.label(text="Part That Counts", icon="BLANK1" if part.is_whole else "SELECT_SET")
+    if not part.is_whole:
+        header.operator("mfo.whole_picture", text="", icon="X", emboss=False)
+    if body is None:
+        return
+    drawn = body.column()
+    drawn.operator_context = "INVOKE_REGION_WIN"  # the rectangle is drawn in the view, not in the sidebar
+    drawn.operator("mfo.draw_part", icon="SELECT_SET")
+    column = body.column(align=True)
+    for names in (("left", "right"), ("top", "bottom")):
+        row = column.column(align=True) if letters(context) < _LETTERS_OF_A_ROW else column.row(align=True)
+        for name in names:
+            row.prop(part, name, slider=True)
+    row = body.row(align=True)
+    row.prop(part, "mask", text="")
+    row.operator("mfo.paint_mask", text="", icon="BRUSH_DATA")
+    body.prop(part, "use_alpha")
