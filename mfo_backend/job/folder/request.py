@@ -21,6 +21,7 @@ from .job_folder import JobFolder
 from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
 from .picture_part import PicturePart, part_from_json, part_to_json
 from .scene_files import check_scene_files
+from .view_request import ViewTable, table_from_json, view_from_json
 
 SCHEMA_VERSION = 1
 MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
@@ -92,16 +93,6 @@ class Material:
         yield from self.sockets.items()
         for leaf in self.leaves:
             yield from ((f"{name} of {leaf.name}", socket) for name, socket in leaf.all_sockets)
-
-
-@dataclass(frozen=True)
-class ViewTable:
-    """The file of a view's table; `metrics.baked_view.BakedView` has what it holds."""
-
-    path: str
-    size: int
-    log2_min: float
-    log2_max: float
 
 
 @dataclass(frozen=True)
@@ -213,8 +204,8 @@ def request_from_json(data: Any) -> Request:
         reference=reference.text("path"),
         encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
         part=part_from_json(reference),
-        view=_view(top.raw("view", None)),
-        view_table=_view_table(top.raw("view", None)),
+        view=view_from_json(top.raw("view", None), WHERE),
+        view_table=table_from_json(top.raw("view", None), WHERE),
         light_paths=_light_paths(top.raw("light_paths", None)),
         film_exposure=top.number("film_exposure", 1e-6, 1e6, 1.0),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
@@ -372,26 +363,6 @@ def _fit(data: Any) -> FitSettings:
     if not isinstance(data, Mapping):
         raise BadInputError(f"{WHERE}: fit is {shown(data)}: it must be a JSON object.")
     return FitSettings.from_request(data)
-
-
-def _view(data: Any) -> DisplayView | None:
-    if data is None:
-        return None
-    view = CheckedObject(data, f"{WHERE}: view", ("exposure_ev", "gamma", "lut"))
-    # Blender allows -32 to 32 stops and a gamma of 0 to 5, of which 0 is a black picture
-    return DisplayView(view.number("exposure_ev", -32.0, 32.0, 0.0), view.number("gamma", 0.01, 5.0, 1.0))
-
-
-def _view_table(data: Any) -> ViewTable | None:
-    if not isinstance(data, Mapping) or data.get("lut") is None:
-        return None
-    table = CheckedObject(data["lut"], f"{WHERE}: view.lut", ("path", "size", "log2_min", "log2_max"))
-    return ViewTable(
-        path=table.text("path"),
-        size=table.integer("size", 3, 128),
-        log2_min=table.number("log2_min", -64.0, 64.0),
-        log2_max=table.number("log2_max", -64.0, 64.0),
-    )
 
 
 def _light_paths(data: Any) -> LightPaths | None:

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The object `view` of request.json: what a display picture was seen through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...metrics.display.tone_mapping import DisplayView
+from .checked_object import CheckedObject
+
+
+@dataclass(frozen=True)
+class ViewTable:
+    """The file of a view's table; `metrics.baked_view.BakedView` has what it holds."""
+
+    path: str
+    size: int
+    log2_min: float
+    log2_max: float
+
+
+def view_from_json(data: Any, where: str) -> DisplayView | None:
+    """Exposure and gamma of the object `view`; None without it."""
+    if data is None:
+        return None
+    view = CheckedObject(data, f"{where}: view", ("exposure_ev", "gamma", "lut"))
+    # Blender allows -32 to 32 stops and a gamma of 0 to 5, of which 0 is a black picture
+    return DisplayView(view.number("exposure_ev", -32.0, 32.0, 0.0), view.number("gamma", 0.01, 5.0, 1.0))
+
+
+def table_from_json(data: Any, where: str) -> ViewTable | None:
+    """The `lut` of the object `view`; None without it."""
+    if not isinstance(data, Mapping) or data.get("lut") is None:
+        return None
+    table = CheckedObject(data["lut"], f"{where}: view.lut", ("path", "size", "log2_min", "log2_max"))
+    return ViewTable(
+        path=table.text("path"),
+        size=table.integer("size", 3, 128),
+        log2_min=table.number("log2_min", -64.0, 64.0),
+        log2_max=table.number("log2_max", -64.0, 64.0),
+    )
