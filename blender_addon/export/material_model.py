@@ -84,6 +84,16 @@ class Material:
         return bool(self.leaves) or self.weight.linked or self.weight.value != 1.0
 
     @property
+    def passes_light(self) -> bool:
+        """Whether light comes through it, or through one of its leaves."""
+        if self.model == "null" or self.shader in ("glass", "refraction", "translucent"):
+            return True
+        alpha, glass = self.sockets.get("Alpha"), self.sockets.get("Transmission Weight")
+        is_cut = alpha is not None and (alpha.linked or alpha.value != 1.0) and self.model == "principled"
+        is_glass = glass is not None and (glass.linked or glass.value != 0.0)
+        return is_cut or is_glass or any(leaf.passes_light for leaf in self.leaves)
+
+    @property
     def asks_graph(self) -> bool:
         """Whether Cycles has to evaluate nodes for it."""
         own = any(socket.by_graph for socket in (self.weight, *self.sockets.values()))

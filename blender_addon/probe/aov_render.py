@@ -24,6 +24,7 @@ MARGIN = 2.0  # pixels around the target: as far as a pixel filter looks
 # bytes of one render's AOVs, 16 for each value and subpixel; larger ones are made at a smaller scale
 MOST_BYTES = 2 * 10**9
 BYTES_PER_VALUE = 16
+LEAST_TRANSPARENT = 16  # surfaces that a ray may pass: those before the target, and its own
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,9 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
             put(cycles, name, False)
         for name, value in (("samples", samples), ("max_bounces", 0), ("seed", 0), ("time_limit", 0.0)):
             put(cycles, name, value)
+        # what lets a ray pass is counted, and does not end the outputs
+        put(cycles, "transparent_max_bounces", max(cycles.transparent_max_bounces, LEAST_TRANSPARENT))
+        put(layer, "pass_alpha_threshold", 0.5)
         put(cycles, "pixel_filter_type", "BOX")
         put(scene, "world", None)
         put(scene.camera.data.dof, "use_dof", False)

@@ -20,6 +20,7 @@ from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
 from .aov_render import Frame, frame_of, render_outputs, world_to_frame
 from .closure_tree import ClosureTree, Leaf
+from .depths import at_depth, peeled
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
 from .server import ProbeRequestError
 
@@ -48,10 +49,11 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
 
     Requested are `scene`, `layer`, `object`, `slot`, for each of the `leaves` of its shaders the `node` (a path of
     names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples` of
-    each subpixel and the `folder` for the files. Answered are for each of the `leaves` the `sockets` by name and the
-    `weight`, each a `file` and its `mean` over the target, the file `positions`, and `camera`, the (3, 4) matrix from
-    the world to columns and rows of the files. Colours are linear Rec.709, directions unit vectors of the world or
-    zero.
+    each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the second
+    what it would see were that away, and so on; files have one below the other. Answered are for each of the `leaves`
+    the `sockets` by name and the `weight`, each a `file` and its `mean` over what the camera sees, the file
+    `positions`, and `camera`, the (3, 4) matrix from the world to columns and rows of the files. Colours are linear
+    Rec.709, directions unit vectors of the world or zero.
 
     Raises
     ------
@@ -60,19 +62,22 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """
     target = Target.of(request)
     scene, obj, material = target.scene, target.obj, target.material
-    copy = own_copy(material)
+    copy, depths = own_copy(material), int(request.get("depths", 1))
     try:
         outputs = _leaf_outputs(copy.node_tree, request["leaves"])
         make_opaque(copy, ours=True)
         wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
-        frame = frame_of(scene, obj, request["scale"], len(wanted))
+        at_depths = peeled(copy.node_tree, wanted, depths)
+        frame = frame_of(scene, obj, request["scale"], len(at_depths))
         widen_bumps(copy.node_tree, frame.scale)
-        found = target.outputs(copy, wanted, frame, request["samples"])
+        rendered = target.outputs(copy, at_depths, frame, request["samples"])
     finally:
         remove_copy(copy)
+    found = {name: np.concatenate([rendered[at_depth(name, k)] for k in range(depths)]) for name, _ in wanted}
     mask = found[MASK]
     seen = mask[..., 0] > SEEN
-    if not seen.any():
+    first = seen & (np.arange(len(seen)) < len(seen) // depths)[:, None]
+    if not first.any():
         raise ProbeRequestError(NOT_SEEN.format(obj=obj.name, material=material.name))
     folder = Path(request["folder"])
     leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
@@ -80,7 +85,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         values = cleaned(found[each.name] / np.maximum(mask, SEEN), seen, each.socket or "", each.kind)
         file = f"socket_{number:02d}.npy"
         np.save(folder / file, values)
-        said = {"file": file, "mean": values[seen].mean(axis=0, dtype=np.float64).tolist()}
+        said = {"file": file, "mean": values[first].mean(axis=0, dtype=np.float64).tolist()}
         if each.socket is None:
             leaves[each.leaf]["weight"] = said
         else:

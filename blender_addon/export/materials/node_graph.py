@@ -22,6 +22,8 @@ FOLDER = "graph"
 # Subpixels along a pixel, and samples of each. Pictures of the truth differ from Cycles' by a FLIP of 0.062 at one
 # subpixel and 0.013 at four, under a strong bump
 SCALE, SAMPLES = 4, 4
+# Times that a ray meets a target which lets light through, and finds what nodes give: of the far side, too
+DEPTHS = 4
 
 
 @dataclass(frozen=True)
@@ -31,10 +33,12 @@ class NodeGraph:
     camera: list[list[float]]
     positions: Path
     files: tuple[Path, ...]
+    depths: int = 1
 
     def request(self) -> dict[str, Any]:
         """The entry of request.json."""
-        return {"camera": self.camera, "positions": f"{FOLDER}/{self.positions.name}"}
+        entry = {"camera": self.camera, "positions": f"{FOLDER}/{self.positions.name}"}
+        return entry | {"depths": self.depths} if self.depths > 1 else entry
 
     def write(self, folder: Path) -> None:
         """Move the files into a job folder."""
@@ -93,12 +97,17 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object
 
 
 def _send(
-    probe: Probe, context: bpy.types.Context, obj: bpy.types.Object, leaves: list[dict[str, Any]], scale: int
+    probe: Probe,
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    leaves: list[dict[str, Any]],
+    scale: int,
+    depths: int = 1,
 ) -> None:
     probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=obj.active_material_index,
-        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(probe.folder),
+        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(probe.folder), depths=depths,
     )  # fmt: skip
 
 
@@ -126,7 +135,8 @@ def evaluate_graph(
         }
         for leaf in leaves
     ]
-    _send(probe, context, obj, asked, SCALE)
+    depths = DEPTHS if material.passes_light else 1
+    _send(probe, context, obj, asked, SCALE, depths)
     while not probe.is_answered():
         yield
     answer = probe.receive()
@@ -145,7 +155,7 @@ def evaluate_graph(
         return replace(leaf, sockets=sockets, weight=weight)
 
     fitted, *held = map(evaluated, leaves, answer["leaves"])
-    return replace(fitted, leaves=tuple(held)), NodeGraph(answer["camera"], files[0], tuple(files))
+    return replace(fitted, leaves=tuple(held)), NodeGraph(answer["camera"], files[0], tuple(files), depths)
 
 
 def _own_name(leaf: Material, name: str) -> str:

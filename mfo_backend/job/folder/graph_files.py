@@ -17,8 +17,8 @@ LARGEST_SIDE = 4 * 16384  # subpixels
 _VALUES = np.dtype("<f4")
 
 
-def check_graph_files(folder: JobFolder, positions: str | None, sockets: Mapping[str, str]) -> None:
-    """Check the file of `positions` and those of the values by socket.
+def check_graph_files(folder: JobFolder, positions: str | None, depths: int, sockets: Mapping[str, str]) -> None:
+    """Check the file of `positions`, which holds so many `depths`, and those of the values by socket.
 
     Raises
     ------
@@ -34,6 +34,8 @@ def check_graph_files(folder: JobFolder, positions: str | None, sockets: Mapping
     size = _size(folder.file(positions, what="request.json: graph.positions"))
     if size[2] != 3:
         raise BadInputError(f"{positions} has {size[2]} numbers for a position: it must have 3.")
+    if size[0] % depths:
+        raise BadInputError(f"{positions} has {size[0]} rows, which are no {depths} pictures of one height.")
     for name, file in sockets.items():
         found = _size(folder.file(file, what=f"request.json: graph of {name}"))
         if found[:2] != size[:2]:
@@ -47,7 +49,7 @@ def locate_files(folder: JobFolder, graph: Any, name: str, socket: dict[str, Any
     if socket.get("graph") and graph is not None:
         socket["graph"] = str(folder.file(socket["graph"], what=f"request.json: graph of {name}"))
         socket["positions"] = str(folder.file(graph.positions, what="request.json: graph.positions"))
-        socket["camera"] = graph.camera
+        socket["camera"], socket["depths"] = graph.camera, graph.depths
 
 
 def _size(path: Path) -> tuple[int, int, int]:

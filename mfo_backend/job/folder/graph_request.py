@@ -15,6 +15,7 @@ from .checked_object import CheckedObject, is_number
 COPY = "graph/scene.blend"  # of the file, which a Blender evaluates while values inside its nodes are fitted
 LARGEST = 1e6  # of a bound
 MOST_VALUES = 256
+MOST_DEPTHS = 32
 _EVALUATE = ("scene", "layer", "object", "slot", "node", "sockets")
 
 
@@ -23,12 +24,14 @@ class NodeGraph:
     """How the target's `graph` files are seen: the (3, 4) matrix from the world to column, row and 1, and the file of
     world positions.
 
+    Files have so many `depths` one below the other: what the camera sees, what it would see were that away, and so on.
     `values` are those of the nodes that are fitted, beside the sockets; `evaluate` says where the material is in the
     copy of the file, for the Blender that evaluates it, with what its shader calls the sockets.
     """
 
     camera: tuple[tuple[float, ...], ...]
     positions: str
+    depths: int = 1
     values: tuple[NodeValue, ...] = ()
     evaluate: Mapping[str, Any] | None = None
 
@@ -43,7 +46,7 @@ def graph_from_json(data: Any, where: str) -> NodeGraph | None:
     """
     if data is None:
         return None
-    graph = CheckedObject(data, f"{where}: graph", ("camera", "positions", "values", "evaluate"))
+    graph = CheckedObject(data, f"{where}: graph", ("camera", "positions", "depths", "values", "evaluate"))
     rows = graph.raw("camera")
     if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
         raise graph.wrong("camera", "three rows of four numbers")
@@ -61,7 +64,8 @@ def graph_from_json(data: Any, where: str) -> NodeGraph | None:
         if unknown:
             raise BadInputError(f"{where}: graph.evaluate.sockets has no {sorted(unknown)[0]!r}: add it.")
     camera = tuple(tuple(float(number) for number in row) for row in rows)
-    return NodeGraph(camera, graph.text("positions"), values, evaluate)
+    depths = graph.integer("depths", 1, MOST_DEPTHS, 1)
+    return NodeGraph(camera, graph.text("positions"), depths, values, evaluate)
 
 
 def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
@@ -69,7 +73,7 @@ def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
     if graph is None:
         return None
     data = asdict(graph)
-    return data if graph.values else {key: data[key] for key in ("camera", "positions")}
+    return data if graph.values else {key: data[key] for key in ("camera", "positions", "depths")}
 
 
 def _value(data: Any, where: str) -> NodeValue:

@@ -172,7 +172,8 @@ def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = Fals
                 folder.file(socket.texture, what=f"{WHERE}: materials.{bsdf_id}.sockets.{name}.texture")
     named = request.materials.get(request.target.bsdf_id)
     held = {name: socket.graph for name, socket in named.all_sockets if socket.graph} if named else {}
-    check_graph_files(folder, request.graph.positions if request.graph else None, held)
+    positions, depths = (request.graph.positions, request.graph.depths) if request.graph else (None, 1)
+    check_graph_files(folder, positions, depths, held)
     return request
 
 

@@ -54,8 +54,8 @@ _GRAPH_AVERAGES = (
     "The model 'mitsuba_principled' takes the averages of what nodes give ({names}), and leaves their normals out."
 )
 _GRAPH_UNSEEN = (
-    "What nodes give ({names}) is known where the camera sees the target first: light that meets it elsewhere, behind "
-    "glass or in a mirror, finds the averages."
+    "What nodes give ({names}) is known where a ray of the camera meets the target, behind each other up to {depths} "
+    "times: what other things hide has the averages."
 )
 _GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
 
@@ -324,7 +324,7 @@ def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     if not any("whole light paths" in note for note in result.notes):
         return ()
     flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
-    return (_GRAPH_UNSEEN.format(names=names), *flat)
+    return (_GRAPH_UNSEEN.format(names=names, depths=1 if request.graph is None else request.graph.depths), *flat)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

@@ -4,7 +4,7 @@
 Choose the variant before importing this. Properties are `filename` and `positions`, .npy files of float32
 (height, width, 1 or 3) for the same subpixels, world positions NaN where the camera does not see the surface, further
 `camera`, the (3, 4) matrix from the world to column, row and 1 as twelve numbers, and `outside`, the value of points
-that the camera does not see.
+that the camera does not see. The files may hold several `depths`, as of `seen_surface.SeenSurface`.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
@@ -33,9 +33,9 @@ class ProjectiveTexture(mi.Texture):
     def __init__(self, props: mi.Properties) -> None:
         mi.Texture.__init__(self, props)
         camera = np.array([float(number) for number in str(props["camera"]).split(",")]).reshape(3, 4)
-        self.surface = _surface(str(props["positions"]), camera)
+        self.surface = _surface(str(props["positions"]), camera, int(props.get("depths", 1)))
         values = np.load(str(props["filename"]), allow_pickle=False)
-        if values.ndim != 3 or values.shape[:2] != (self.surface.height, self.surface.width):
+        if values.ndim != 3 or values.shape[:2] != (self.surface.rows, self.surface.width):
             raise RuntimeError(f"{props['filename']} has the shape {values.shape}: it does not fit its positions")
         self.size = values.shape[2]
         outside = props.get("outside", 0.0)
@@ -46,11 +46,11 @@ class ProjectiveTexture(mi.Texture):
     @property
     def picture(self) -> NDArray[np.float32]:
         """The values as an array (height, width, 1 or 3)."""
-        return self.values.numpy().reshape(self.surface.height, self.surface.width, self.size)
+        return self.values.numpy().reshape(self.surface.rows, self.surface.width, self.size)
 
     def show(self, picture: NDArray[np.float32]) -> None:
         """Take other values (height, width, 1 or 3) of the same subpixels."""
-        if picture.shape != (self.surface.height, self.surface.width, self.size):
+        if picture.shape != (self.surface.rows, self.surface.width, self.size):
             raise ValueError(f"a picture of {picture.shape} does not fit {self}")
         self.values = own_memory(picture, mi.Float)
         dr.eval(self.values)
@@ -84,11 +84,11 @@ class ProjectiveTexture(mi.Texture):
 _surfaces: WeakValueDictionary[tuple[Any, ...], SeenSurface] = WeakValueDictionary()
 
 
-def _surface(path: str, camera: NDArray[np.float64]) -> SeenSurface:
-    key = (mi.variant(), path, Path(path).stat().st_mtime_ns, camera.tobytes())
+def _surface(path: str, camera: NDArray[np.float64], depths: int) -> SeenSurface:
+    key = (mi.variant(), path, Path(path).stat().st_mtime_ns, camera.tobytes(), depths)
     surface = _surfaces.get(key)
     if surface is None:
-        surface = _surfaces[key] = SeenSurface(np.load(path, allow_pickle=False), camera)
+        surface = _surfaces[key] = SeenSurface(np.load(path, allow_pickle=False), camera, depths)
     return surface
 
 

@@ -23,17 +23,26 @@ NEAR_NEIGHBOURS, NEAR_EXTENT = 2.0, 1e-3
 
 
 class SeenSurface:
-    """Which subpixel shows a point, for all textures of one surface."""
+    """Which subpixel shows a point, for all textures of one surface.
 
-    def __init__(self, positions: NDArray[np.float32], camera: NDArray[np.float64]) -> None:
-        self.height, self.width = positions.shape[:2]
+    Of several `depths` there is one picture below the other: what the camera sees, what it would see were that away,
+    and so on.
+    """
+
+    def __init__(self, positions: NDArray[np.float32], camera: NDArray[np.float64], depths: int = 1) -> None:
+        self.rows, self.width = positions.shape[:2]
+        self.depths, self.height = depths, self.rows // depths
+        pictures = positions.reshape(depths, self.height, self.width, 3)
         seen = np.isfinite(positions).all(axis=2)
-        source = _filled(seen)
+        own = [_filled(each) for each in seen.reshape(depths, self.height, self.width)]
+        offsets = np.arange(depths) * self.height * self.width
+        source = np.concatenate([np.where(each < 0, -1, each + o) for each, o in zip(own, offsets, strict=True)])
         self._source = own_memory(np.where(source < 0, NOWHERE, source), mi.UInt32)
         known = np.where(seen[..., None], positions, 0.0).reshape(-1, 3)[np.maximum(source, 0).ravel()]
         self._positions = own_memory(known, mi.Float)
         extent = np.ptp(positions[seen], axis=0) if seen.any() else np.zeros(3)
-        reach = NEAR_NEIGHBOURS * _steps(positions) + NEAR_EXTENT * float(np.linalg.norm(extent))
+        steps = np.concatenate([_steps(each) for each in pictures])
+        reach = NEAR_NEIGHBOURS * steps + NEAR_EXTENT * float(np.linalg.norm(extent))
         self._reach = own_memory(reach.ravel()[np.maximum(source, 0).ravel()], mi.Float)
         self._camera = [[dr.opaque(mi.Float, float(v)) for v in row] for row in camera]
         dr.eval(self._source, self._positions, self._reach)
@@ -41,7 +50,7 @@ class SeenSurface:
     def row_of(self, point: mi.Point3f) -> mi.UInt32:
         """The subpixel that holds the point's value, or the number of them where the camera does not see it."""
         index, seen = self.find(point, mi.Bool(True))
-        return dr.select(seen, index, dr.opaque(mi.UInt32, self.height * self.width))
+        return dr.select(seen, index, dr.opaque(mi.UInt32, self.rows * self.width))
 
     def find(self, point: mi.Point3f, active: Any) -> tuple[mi.UInt32, mi.Bool]:
         """The subpixel that holds the point's value, and whether the camera sees the point."""
@@ -50,12 +59,20 @@ class SeenSurface:
         column, row = dr.floor(column * inverse), dr.floor(row * inverse)
         width, height = dr.opaque(mi.Float, self.width), dr.opaque(mi.Float, self.height)
         inside = active & (w > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        index = mi.UInt32(dr.select(inside, row, 0)) * mi.UInt32(width) + mi.UInt32(dr.select(inside, column, 0))
-        source = dr.gather(mi.UInt32, self._source, index, inside)
-        inside &= source != NOWHERE
-        found = dr.gather(mi.Point3f, self._positions, index, inside)
-        inside &= dr.norm(found - point) <= dr.gather(mi.Float, self._reach, index, inside)
-        return source, inside
+        first = mi.UInt32(dr.select(inside, row, 0)) * mi.UInt32(width) + mi.UInt32(dr.select(inside, column, 0))
+        source, seen = self._at(first, point, inside)
+        for depth in range(1, self.depths):
+            below = dr.opaque(mi.UInt32, depth * self.height * self.width)
+            here, is_here = self._at(first + below, point, inside & ~seen)
+            source, seen = dr.select(is_here, here, source), seen | is_here
+        return source, seen
+
+    def _at(self, index: mi.UInt32, point: mi.Point3f, active: Any) -> tuple[mi.UInt32, mi.Bool]:
+        """The same at one depth, where `index` is the subpixel that the point projects to."""
+        source = dr.gather(mi.UInt32, self._source, index, active)
+        known = active & (source != NOWHERE)
+        found = dr.gather(mi.Point3f, self._positions, index, known)
+        return source, known & (dr.norm(found - point) <= dr.gather(mi.Float, self._reach, index, known))
 
 
 def _filled(seen: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -168,6 +168,7 @@ def projective(content: Mapping[str, Any], outside: Any) -> dict[str, Any]:
         "positions": str(content["positions"]),
         "camera": ",".join(repr(float(number)) for row in content["camera"] for number in row),
         "outside": outside,
+        "depths": int(content.get("depths", 1)),
     }
 
 

@@ -183,6 +183,7 @@ def _projective(name: str, properties: Mapping[str, Any]) -> Element:
     texture = ElementTree.Element("texture", type="projective", name=name)
     for key in ("filename", "positions", "camera"):
         ElementTree.SubElement(texture, "string", name=key, value=properties[key])
+    ElementTree.SubElement(texture, "integer", name="depths", value=str(properties["depths"]))
     outside = properties["outside"]
     if isinstance(outside, Sequence):
         ElementTree.SubElement(texture, "rgb", name="outside", value=", ".join(repr(float(v)) for v in outside))

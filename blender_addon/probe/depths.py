@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What lies behind what the camera sees first: outputs for each time that a ray meets the target, in one render."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+
+from ..versions import active_output
+from .graph_copy import nodes_of
+
+LIGHT_PATH, DEPTH = "ShaderNodeLightPath", "Transparent Depth"
+
+
+def at_depth(name: str, depth: int) -> str:
+    """The name of an output at a depth; the first keeps its own."""
+    return f"{name} depth {depth}" if depth else name
+
+
+def peeled(tree: bpy.types.NodeTree, outputs: Sequence[tuple[str, bool]], depths: int) -> list[tuple[str, bool]]:
+    """Let the outputs of a copied tree, and of its groups, tell so many depths apart; returns all of them.
+
+    Until the last the surface lets the ray pass. Outputs of surfaces that do so add up, hence each counts at its own
+    depth alone.
+    """
+    if depths == 1:
+        return list(outputs)
+    for node in list(nodes_of(tree)):
+        if node.bl_idname == "ShaderNodeOutputAOV":
+            for depth in range(depths):
+                _put_output(node, depth)
+            node.id_data.nodes.remove(node)
+    output, path = active_output(tree), tree.nodes.new(LIGHT_PATH)
+    assert output is not None  # the surface is linked to it
+    surface = output.inputs["Surface"].links[0].from_socket
+    mix, is_last = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeMath")
+    is_last.operation = "GREATER_THAN"
+    is_last.inputs[1].default_value = depths - 1.5
+    tree.links.new(path.outputs[DEPTH], is_last.inputs[0])
+    tree.links.new(is_last.outputs[0], mix.inputs[0])
+    tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
+    tree.links.new(surface, mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    return [(at_depth(name, depth), is_color) for name, is_color in outputs for depth in range(depths)]
+
+
+def _put_output(node: bpy.types.Node, depth: int) -> None:
+    """An output like `node` that is 0 at all depths but one."""
+    tree = node.id_data
+    is_color = node.inputs["Color"].is_linked
+    source = node.inputs["Color" if is_color else "Value"].links[0].from_socket
+    path, is_here = tree.nodes.new(LIGHT_PATH), tree.nodes.new("ShaderNodeMath")
+    is_here.operation = "COMPARE"
+    is_here.inputs[1].default_value, is_here.inputs[2].default_value = depth, 0.5
+    tree.links.new(path.outputs[DEPTH], is_here.inputs[0])
+    scaled = tree.nodes.new("ShaderNodeVectorMath" if is_color else "ShaderNodeMath")
+    scaled.operation = "SCALE" if is_color else "MULTIPLY"
+    tree.links.new(source, scaled.inputs[0])
+    tree.links.new(is_here.outputs[0], scaled.inputs["Scale"] if is_color else scaled.inputs[1])
+    made = tree.nodes.new("ShaderNodeOutputAOV")
+    made.aov_name = at_depth(node.aov_name, depth)
+    tree.links.new(scaled.outputs[0], made.inputs["Color" if is_color else "Value"])
