@@ -51,22 +51,16 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def export(chosen: argparse.Namespace) -> dict[str, Any]:
-    """Write the job folder of an object's active material."""
+    """Write the job folder of an object's active material, or of several materials."""
     bpy = _open(chosen.file)
     from .export.job import ExportError, export_job
     from .export.nodes.closure_leaves import ClosureError
     from .export.nodes.target_shader import leaf_called
     from .result.local_copy import unwritable
 
-    obj = bpy.context.scene.objects.get(chosen.object)
-    if obj is None:
-        names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
-        elsewhere = [scene.name for scene in bpy.data.scenes if chosen.object in scene.objects]
-        where = f"it is in the scene {elsewhere[0]!r}, which is not the active one" if elsewhere else ""
-        raise HeadlessError(
-            f"{chosen.file} has no object {chosen.object!r} in its scene {bpy.context.scene.name!r}: "
-            f"{where or f'its mesh objects are: {names}'}."
-        )
+    fitted = _fitted_slots(bpy, chosen)
+    several, obj = len(fitted) > 1, fitted[0].object
+    obj.active_material_index = fitted[0].slot  # of the open copy of the file, which is not saved
     try:
         fit = json.loads(chosen.fit)
     except ValueError as error:
@@ -78,8 +72,9 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
             obj.active_material.mfo.leaf = leaf_called(obj.active_material, chosen.shader)
         except ClosureError as error:
             raise HeadlessError(str(error)) from error
-    if chosen.will_apply and not chosen.make_local and unwritable(obj.active_material):
-        raise HeadlessError(unwritable(obj.active_material))
+    refused = [said for each in fitted if (said := unwritable(each.material))]
+    if chosen.will_apply and refused and (several or not chosen.make_local):
+        raise HeadlessError(refused[0])
     try:
         report = export_job(
             bpy.context,
@@ -89,10 +84,49 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
             fit=fit,
             reference_view=chosen.reference_view,
             upright=chosen.upright,
+            targets=fitted if several else (),
         )
     except ExportError as error:
         raise HeadlessError(str(error)) from error
     return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
+
+
+def _fitted_slots(bpy: Any, chosen: argparse.Namespace) -> list[Any]:
+    """The slots whose materials are fitted: that of --object, or those of each --target."""
+    from .export.fitted_slot import FittedSlot
+
+    if chosen.object is not None:
+        obj = _object(bpy, chosen, chosen.object)
+        return [FittedSlot.active(obj)]
+    found = []
+    for text in chosen.target:
+        try:
+            given = json.loads(text)
+            name, slot, material = given["object"], given.get("slot"), given.get("material")
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise HeadlessError(f"--target is no JSON object with object, slot or material ({error}).") from error
+        obj = _object(bpy, chosen, name)
+        names = [each.material.name if each.material is not None else "none" for each in obj.material_slots]
+        if material is not None and material not in names:
+            raise HeadlessError(f"Object {name!r} has no material {material!r}: it has {', '.join(names) or 'none'}.")
+        if slot is not None and not 1 <= slot <= len(names):
+            raise HeadlessError(f"Object {name!r} has no slot {slot}: it has {len(names)}.")
+        active = obj.active_material_index if slot is None else slot - 1
+        found.append(FittedSlot(obj, active if material is None else names.index(material)))
+    return found
+
+
+def _object(bpy: Any, chosen: argparse.Namespace, name: str) -> Any:
+    obj = bpy.context.scene.objects.get(name)
+    if obj is None:
+        names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
+        elsewhere = [scene.name for scene in bpy.data.scenes if name in scene.objects]
+        where = f"it is in the scene {elsewhere[0]!r}, which is not the active one" if elsewhere else ""
+        raise HeadlessError(
+            f"{chosen.file} has no object {name!r} in its scene {bpy.context.scene.name!r}: "
+            f"{where or f'its mesh objects are: {names}'}."
+        )
+    return obj
 
 
 def _pictures(chosen: argparse.Namespace) -> Any:
@@ -123,34 +157,50 @@ def _part(reference: str | Path, part: dict[str, Any]) -> Any:
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:
     """Put the values of a finished job on its material and save the file under another name.
 
-    A result that does not match its reference is refused without `--force`.
+    A result that does not match its reference is refused without `--force`; of several materials those that match are
+    applied.
     """
     bpy = _open(chosen.file)
-    _refuse_mismatch(chosen)
-    material, _result, values, notes = _put_values(bpy, chosen)
+    results, notes = _results(chosen)
+    if len(results) > 1 and chosen.material:
+        raise HeadlessError("--material names one material, and the job has several: leave it out.")
+    applied = [_put_values(bpy, chosen, folder) for folder in results]
     _save(bpy, chosen.save_as)
-    return {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
+    notes += [note for _, _, _, said in applied for note in said]
+    material, _result, values, _ = applied[0]
+    answer = {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
+    if len(applied) > 1:
+        answer["materials"] = {each.name: sockets for each, _, sockets, _ in applied}
+    return answer
 
 
-def _refuse_mismatch(chosen: argparse.Namespace) -> None:
-    from .result.job_result import JobResultError, must_ask, read_job_result
+def _results(chosen: argparse.Namespace) -> tuple[list[Path], list[str]]:
+    """The folders of the results that are to be applied, and what is left out."""
+    from .result.job_result import JobResultError, must_ask, read_job_result, result_folders
 
+    folder = Path(chosen.job).absolute()
     try:
-        result = read_job_result(Path(chosen.job).absolute())
+        found = {path: read_job_result(path) for path in result_folders(folder)}
     except JobResultError as error:
         raise HeadlessError(str(error)) from error
-    if must_ask(result.verdict) and not chosen.force:
-        raise HeadlessError(f"{result.sentence} Nothing was applied; --force applies it anyway.")
+    refused = [result for result in found.values() if must_ask(result.verdict) and not chosen.force]
+    if len(refused) == len(found):
+        raise HeadlessError(f"{refused[0].sentence} Nothing was applied; --force applies it anyway.")
+    said = [
+        f"Material {one.material_name!r} was left as it is: {one.sentence} --force applies it anyway."
+        for one in refused
+    ]
+    return [path for path, result in found.items() if result not in refused], said
 
 
-def _put_values(bpy: Any, chosen: argparse.Namespace) -> tuple[Any, Any, dict[str, Any], list[str]]:
-    """Apply a job's result; returns the material, the result, its values by socket and what was skipped."""
+def _put_values(bpy: Any, chosen: argparse.Namespace, folder: Path) -> tuple[Any, Any, dict[str, Any], list[str]]:
+    """Apply the result in a folder; returns the material, the result, its values by socket and what was skipped."""
     from .result.job_result import JobResultError, read_job_result
     from .result.local_copy import LocalCopyError, make_local, unwritable
     from .result.write_back import WriteBackError, apply_values, result_to_sockets
 
     try:
-        result = read_job_result(Path(chosen.job).absolute())
+        result = read_job_result(folder)
         name = chosen.material or result.material_name
         obj = bpy.context.scene.objects.get(result.object_name)
         if obj is not None and chosen.make_local and unwritable(obj.active_material):
@@ -171,7 +221,10 @@ def check(chosen: argparse.Namespace) -> dict[str, Any]:
     """Render with the values of a finished job on its material, at the job's resolution and the scene's samples."""
     bpy = _open(chosen.file)
     _watch_parent(chosen.parent)
-    _material, result, _values, _notes = _put_values(bpy, chosen)
+    from .result.job_result import result_folders, whole_job
+
+    folders = result_folders(whole_job(Path(chosen.job).absolute()))  # with what was fitted together
+    result, *_ = [_put_values(bpy, chosen, folder)[1] for folder in folders]
     render, image = bpy.context.scene.render, result.image
     if render.pixel_aspect_x == render.pixel_aspect_y and all(image):
         render.resolution_x, render.resolution_y, render.resolution_percentage = *image, 100
@@ -238,7 +291,9 @@ def _parser() -> argparse.ArgumentParser:
         return command
 
     command = add("export", export)
-    command.add_argument("--object", required=True)
+    target = command.add_mutually_exclusive_group(required=True)
+    target.add_argument("--object", help="whose active material is fitted")
+    target.add_argument("--target", action="append", help="object, and slot (from 1) or material, as JSON; for each")
     reference = command.add_mutually_exclusive_group(required=True)
     reference.add_argument("--reference", type=Path)
     reference.add_argument("--picture", action="append", help="fields of a PictureSetup as JSON; once for each picture")

@@ -102,6 +102,15 @@ class MFO_PG_picture(bpy.types.PropertyGroup):
     )
 
 
+class MFO_PG_target(bpy.types.PropertyGroup):
+    """One of several materials that are fitted together, and the slot it is seen in."""
+
+    use: BoolProperty(name="Fit", description="Fit this material together with the others", default=True)
+    object: PointerProperty(type=bpy.types.Object)
+    material: PointerProperty(type=bpy.types.Material)
+    slot: IntProperty()
+
+
 class MFO_PG_bound(bpy.types.PropertyGroup):
     """Limits of one value during a fit, of every channel of a colour; the parameter's name in `name`."""
 
@@ -136,6 +145,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
     )
     pictures: CollectionProperty(type=MFO_PG_picture)  # those after the first one
     first_picture: PointerProperty(type=MFO_PG_picture)  # what of the first one counts, and what it shows among others
+    targets: CollectionProperty(type=MFO_PG_target)  # materials to be fitted together; empty: the active one alone
     overlay_opacity: FloatProperty(
         name="Opacity",
         description="How much of the reference is seen over the camera's view",
@@ -223,7 +233,7 @@ class MFO_PG_row(bpy.types.PropertyGroup):
     start: StringProperty()
     result: StringProperty()
     certainty: StringProperty()  # level in result.json, empty where unknown
-    words: StringProperty()  # of that level, and the likely range
+    words: StringProperty()  # of that level, and the likely range; of a material its verdict
     sureness: FloatProperty(default=-1.0)  # 0 to 1, negative where unknown
 
 
@@ -261,6 +271,8 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
     messages: CollectionProperty(type=MFO_PG_message)
     values: CollectionProperty(type=MFO_PG_row)
     errors: CollectionProperty(type=MFO_PG_row)
+    materials: CollectionProperty(type=MFO_PG_row)  # those fitted together, with their verdicts
+    shown_material: IntProperty()  # which of them the values and pictures belong to
 
 
 class MFO_PG_socket_value(bpy.types.PropertyGroup):
@@ -304,6 +316,7 @@ CLASSES = (
     MFO_PG_bound,
     MFO_PG_part,
     MFO_PG_picture,
+    MFO_PG_target,
     MFO_PG_settings,
     MFO_PG_message,
     MFO_PG_row,

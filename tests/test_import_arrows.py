@@ -79,6 +79,7 @@ FIT_FLOORS = [
     {"alike", "pictures"},
     {"recorded", "traced", "paper"},
     {"recover_material"},
+    {"materials"},
 ]
 FIT = ROOT / "mfo_backend" / "fit"
 MOST_FILES = 14

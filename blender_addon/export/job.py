@@ -5,37 +5,43 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import bpy
 
 from ..graph_values.place import holder_of, is_there
+from ..graph_values.table import GraphValue
 from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
 from ..versions import PRINCIPLED
-from .files.job_folder import MORE_PICTURES, new_job_folder, share_files
+from .files.job_folder import MORE_PICTURES, TARGETS, link_files, new_job_folder, share_files
 from .findings import ExportError, Findings
+from .fitted_slot import FittedSlot, check_slots
 from .material_model import Material
 from .materials.chosen_leaves import chosen_mix_values, name_shares, named_mix_values, with_mix_values
 from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
-from .materials.node_graph import evaluate_graph, largest_leaf, probe_for
+from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, shown
 from .reference.reference import Picture, read_reference
 from .reference.reference_view import SCENE
-from .request import parameter_of, request_of_picture
+from .request import WholeRequest, parameter_of
 from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
-from .scene.scene_data import TARGET_BSDF
+from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
 from .scene.scene_file import scene_files
 
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
+)
+SEVERAL_OF_BOTH = (
+    "Several pictures and several materials are not fitted together: leave all pictures but one out, or all materials "
+    "but one."
 )
 
 _LOOK_SECONDS = 0.01  # between two looks at a second Blender that is waited for
@@ -64,14 +70,15 @@ def export_job(
     fit: dict[str, Any],
     reference_view: str = SCENE,
     upright: bool = False,
+    targets: Sequence[FittedSlot] = (),
     tell: Callable[[float], None] = lambda _share: None,
 ) -> ExportReport:
     """Write the job folder for fitting the active material slot of `obj`; nothing in the .blend changes.
 
-    `reference` is one picture of the scene as it is, or pictures with what each of them shows. `reference_view` says
-    how a display picture was made: "scene", rendered in this scene, or "standard", a photograph or a render under
-    Standard. `upright` turns a picture as its EXIF data say. `tell` gets the share that is done, of work that a million
-    triangles make some seconds long.
+    With `targets` the materials of those slots are fitted together instead. `reference` is one picture of the scene as
+    it is, or pictures with what each of them shows. `reference_view` says how a display picture was made: "scene",
+    rendered in this scene, or "standard", a photograph or a render under Standard. `upright` turns a picture as its
+    EXIF data say. `tell` gets the share that is done, of work that a million triangles make some seconds long.
 
     Raises
     ------
@@ -79,8 +86,10 @@ def export_job(
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
     if not isinstance(reference, Sequence):
-        return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell))
+        return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
     check_setups(reference)
+    if targets and len(reference) > 1:
+        raise ExportError(SEVERAL_OF_BOTH)
     first: PartialExport | None = None
     notes: list[str] = []
     with new_job_folder(Path(folder)) as partial:
@@ -90,10 +99,19 @@ def export_job(
             here.mkdir(parents=True, exist_ok=True)
             try:
                 with shown(context, setup, obj, own_size=len(reference) > 1) as there:
-                    alone = len(reference) == 1
-                    part = drained(
-                        partial_export(there, obj, here, setup.reference, fit, reference_view, upright, alone=alone)
+                    together = "pictures" if len(reference) > 1 else ""
+                    steps = partial_export(
+                        there,
+                        obj,
+                        here,
+                        setup.reference,
+                        fit,
+                        reference_view,
+                        upright,
+                        together=together,
+                        targets=targets,
                     )
+                    part = drained(steps)
                     part.request["picture"] = setup.request(there)
             except ExportError as error:
                 if len(reference) == 1:
@@ -124,13 +142,16 @@ def export_steps(
     reference_view: str,
     upright: bool,
     tell: Callable[[float], None] = lambda _share: None,
+    targets: Sequence[FittedSlot] = (),
 ) -> Steps[ExportReport]:
     """`export_job` of one picture in steps: it yields while a second Blender works, and needs the same context then.
 
     The scene has been read when it yields first. Closing it ends the second Blender and leaves `folder` as it was.
     """
     with new_job_folder(Path(folder)) as partial:
-        part = yield from partial_export(context, obj, partial, reference, fit, reference_view, upright, tell)
+        part = yield from partial_export(
+            context, obj, partial, reference, fit, reference_view, upright, tell, targets=targets
+        )
         part.write_request(partial)
     return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
 
@@ -147,10 +168,11 @@ def drained(steps: Steps[Found]) -> Found:
 
 @dataclass(frozen=True)
 class PartialExport:
-    """One picture's part of a job, all written but its request."""
+    """One picture's part of a job, all written but its requests: its own, and those of further materials by folder."""
 
     request: dict[str, Any]
     findings: Findings
+    more: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
     @property
     def values(self) -> dict[str, Any]:
@@ -159,9 +181,10 @@ class PartialExport:
         return {name: socket["value"] for name, socket in sockets.items() if not socket["linked"]}
 
     def write_request(self, folder: Path) -> None:
-        """Write request.json."""
-        text = json.dumps(self.request, indent=2, ensure_ascii=False)
-        (folder / "request.json").write_text(text + "\n", encoding="utf-8")
+        """Write request.json, and those of further materials into their folders."""
+        for path, request in {"": self.request, **self.more}.items():
+            text = json.dumps(request, indent=2, ensure_ascii=False)
+            (folder / path / "request.json").write_text(text + "\n", encoding="utf-8")
 
 
 def partial_export(
@@ -174,70 +197,106 @@ def partial_export(
     upright: bool,
     tell: Callable[[float], None] = lambda _share: None,
     *,
-    alone: bool = True,
+    together: str = "",
+    targets: Sequence[FittedSlot] = (),
 ) -> Steps[PartialExport]:
     """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
 
-    `alone` says that it is the only one.
+    `together` says what the fit has several of besides; `targets` are slots whose materials are fitted together.
     """
     findings = Findings()
-    of_mix, fit = named_mix_values(obj, fit)
-    values, fit = chosen_graph_values(obj, fit, findings, alone=alone)
-    with probe_for(obj, always=bool(values)) as probe:
+    fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
+    check_slots(fitted)
+    of_mix, fit = ([], fit) if targets else named_mix_values(obj, fit)
+    values, fit = chosen_graph_values(obj, fit, findings, together="materials" if targets else together)
+    with probe_for(fitted, always=bool(values)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
-        leaf = largest_leaf(probe, context, obj) if probe is not None and by_share else None
+        leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
         with SceneBakes(context) as bakes:
-            data = read_scene(context, obj, findings, bakes, leaf)
+            fitted = [replace(each, leaf=leaf) for each, leaf in zip(fitted, leaves, strict=True)]
+            data = read_scene(context, obj, findings, bakes, leaves[0] if leaves else None, fitted if targets else ())
             findings.raise_first()
             assert data is not None
-            if unwritable(obj.active_material):
-                said = f"The values cannot be applied as it is. {unwritable(obj.active_material)}"
-                findings.note(said, explains=False)
-            target = target_shader(obj.active_material, leaf)
-            assert target is not None
-            data.materials[TARGET_BSDF] = by_graph(data.materials[TARGET_BSDF], target, values, findings)
-            findings.raise_first()
-            chosen = chosen_mix_values(obj, target, of_mix, fit, findings)
-            data.materials[TARGET_BSDF] = with_mix_values(data.materials[TARGET_BSDF], target, chosen)
-            fit = _fit_of(target, data.materials[TARGET_BSDF], fit, alone=not (values or chosen))
-            unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
-            named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
-            tree = obj.active_material.node_tree
-            named |= {v.name: holder_of(tree, v.place) for v in (*values, *chosen) if is_there(tree, v.place)}
-            for said in animation_notes(named, context.scene.frame_current):
-                findings.note(said, explains=False)
+            fits = []
+            for number, each in enumerate(fitted):
+                fits.append(_read_values(data, context, each, number, fit, values, of_mix, findings))
             tell(0.4)
             size = (data.camera.width, data.camera.height)
             picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
-            more = request_of(context, obj, target, values) if values else {}
+            first = target_shader(obj.active_material, leaves[0])
+            inside_request = request_of(context, obj, first, values) if values and first is not None else {}
             if values:
                 write_copy(folder)  # as it was read
             while not bakes.is_ready():
                 yield
             finish_scene(data, findings, bakes)
         findings.raise_first()
-        graph = None
-        if probe is not None:
-            described = data.materials[TARGET_BSDF]
-            data.materials[TARGET_BSDF], graph = yield from evaluate_graph(probe, context, obj, described)
-        name_shares(data.materials[TARGET_BSDF], findings)
+        graphs: list[NodeGraph | None] = [None for _ in fitted]
+        for number, each in enumerate(fitted):
+            described = data.materials[target_bsdf(number)]
+            if probe is not None and (described.asks_graph or (number == 0 and values)):
+                described, graphs[number] = yield from evaluate_graph(probe, context, each, described, number)
+                data.materials[target_bsdf(number)] = described
+            name_shares(described, findings)
         files = scene_files(data, findings)
         tell(0.5)
-        request = request_of_picture(context, obj, data, files, picture, fit, findings)
-        if graph is not None:
-            request["graph"] = graph.request() | more
+        paths = [f"{TARGETS}/{number}" for number in range(1, len(fitted) + 1)] if targets else [""]
+        whole = WholeRequest(context.scene, data, files, picture, findings)
+        requests = {p: whole.of(f, n, fits[n]) for n, (p, f) in enumerate(zip(paths, fitted, strict=True))}
+        if targets:
+            requests[""] = whole.of(fitted[0], 0, fits[0], seen=False) | {"targets": paths}
         files.write(folder)
         tell(0.9)
         if picture is not None:
-            request["reference"] = picture.write(folder)
-        if graph is not None:
-            graph.write(folder)
+            reference_entry = picture.write(folder)
+            for each in requests.values():
+                each["reference"] = reference_entry
+        for path, graph in zip(paths, graphs, strict=True):
+            if path:
+                link_files(folder, folder / path)
+            if graph is not None:
+                requests[path]["graph"] = graph.request() | inside_request
+                graph.write(folder / path)
         if values:
             (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
-    return PartialExport(request, findings)
+    return PartialExport(requests.pop(""), findings, requests)
+
+
+def _read_values(
+    data: SceneData,
+    context: bpy.types.Context,
+    fitted: FittedSlot,
+    number: int,
+    fit: dict[str, Any],
+    values: Sequence[GraphValue],
+    of_mix: Sequence[str],
+    findings: Findings,
+) -> dict[str, Any]:
+    """Let chosen `values` of its graph be evaluated and those `of_mix` be free, say what an apply cannot do.
+
+    Returns the fit of this material.
+    """
+    material, bsdf = fitted.material, target_bsdf(number)
+    target = target_shader(material, fitted.leaf)
+    assert material is not None
+    assert target is not None  # it was read
+    if unwritable(material):
+        findings.note(f"The values cannot be applied as it is. {unwritable(material)}", explains=False)
+    data.materials[bsdf] = by_graph(data.materials[bsdf], target, values, findings)
+    findings.raise_first()
+    chosen = chosen_mix_values(material, target, of_mix, fit, findings)
+    data.materials[bsdf] = with_mix_values(data.materials[bsdf], target, chosen)
+    fit = _fit_of(target, data.materials[bsdf], fit, alone=not (values or chosen))
+    unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
+    named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
+    tree = material.node_tree
+    named |= {v.name: holder_of(tree, v.place) for v in (*values, *chosen) if is_there(tree, v.place)}
+    for said in animation_notes(named, context.scene.frame_current):
+        findings.note(said, explains=False)
+    return fit
 
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,12 @@ import tomllib
 
 from .files.job_folder import GENERATOR
 from .findings import Findings
+from .fitted_slot import FittedSlot
 from .material_model import Material, Socket
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .reference.reference import Reference
 from .reference.reference_view import output_view
-from .scene.scene_data import TARGET_BSDF, TARGET_SHAPE, SceneData
+from .scene.scene_data import SceneData, target_bsdf, target_shape
 from .scene.scene_file import SceneFiles
 
 SCHEMA_VERSION = 1
@@ -34,78 +36,86 @@ def _labels(material: Material) -> dict[str, str]:
     return {parameter_of(name): material.labels.get(name, name) for name in own}
 
 
-def request_of_picture(
-    context: bpy.types.Context,
-    obj: bpy.types.Object,
-    data: SceneData,
-    files: SceneFiles,
-    picture: Reference | None,
-    fit: dict[str, Any],
-    findings: Findings,
-) -> dict[str, Any]:
-    """The content of request.json, all but what a graph and the reference add."""
-    view, _device = output_view(context.scene)
-    request: dict[str, Any] = {
-        "schema_version": SCHEMA_VERSION,
-        "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},
-        "scene": "scene.xml",
-        "target": {
-            "shape_id": TARGET_SHAPE,
-            "bsdf_id": TARGET_BSDF,
-            "object": obj.name,
-            "material": data.materials[TARGET_BSDF].name,
-            "slot": obj.active_material_index,
-            "node": list(data.materials[TARGET_BSDF].node),
-            "labels": _labels(data.materials[TARGET_BSDF]),
-        },
-        "image": {
-            "width": data.camera.width,
-            "height": data.camera.height,
-            "film_transparent": data.settings.film_transparent,
-        },
-    }
-    request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
-    if picture is not None and picture.view is not None:
-        request["view"]["lut"] = picture.view.request()
-    request["light_paths"] = data.settings.light_paths
-    if data.settings.exposure > 0.0:
-        request["film_exposure"] = data.settings.exposure
-    request["materials"] = {
-        identifier: _material(material, files)
-        for identifier, material in data.materials.items()
-        if material.model == "principled"
-    }
-    request["fit"] = dict(fit)
-    request["notes"] = list(findings.notes)
-    request["left_out"] = list(findings.left_out)
-    return request
+@dataclass(frozen=True)
+class WholeRequest:
+    """What an export has read, and what it writes beside request.json."""
+
+    scene: bpy.types.Scene
+    data: SceneData
+    files: SceneFiles
+    picture: Reference | None
+    findings: Findings
+
+    def of(self, fitted: FittedSlot, number: int, fit: dict[str, Any], *, seen: bool = True) -> dict[str, Any]:
+        """The content of request.json, for this one of the fitted materials; a graph and the reference add theirs.
+
+        Only its own sockets have pictures of its nodes, where those are `seen`.
+        """
+        data, picture, bsdf = self.data, self.picture, target_bsdf(number)
+        material = data.materials[bsdf]
+        view, _device = output_view(self.scene)
+        request: dict[str, Any] = {
+            "schema_version": SCHEMA_VERSION,
+            "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},
+            "scene": "scene.xml",
+            "target": {
+                "shape_id": target_shape(number),
+                "bsdf_id": bsdf,
+                "object": fitted.object.name,
+                "material": material.name,
+                "slot": fitted.slot,
+                "node": list(material.node),
+                "labels": _labels(material),
+            },
+            "image": {
+                "width": data.camera.width,
+                "height": data.camera.height,
+                "film_transparent": data.settings.film_transparent,
+            },
+        }
+        request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
+        if picture is not None and picture.view is not None:
+            request["view"]["lut"] = picture.view.request()
+        request["light_paths"] = data.settings.light_paths
+        if data.settings.exposure > 0.0:
+            request["film_exposure"] = data.settings.exposure
+        request["materials"] = {
+            identifier: _material(each, self.files, seen=seen and identifier == bsdf)
+            for identifier, each in data.materials.items()
+            if each.model == "principled"
+        }
+        request["fit"] = dict(fit)
+        request["notes"] = list(self.findings.notes)
+        request["left_out"] = list(self.findings.left_out)
+        return request
 
 
-def _material(material: Material, files: SceneFiles) -> dict[str, Any]:
+def _material(material: Material, files: SceneFiles, *, seen: bool) -> dict[str, Any]:
+    """The entry of a material, with the pictures of its nodes where those are `seen`."""
     described: dict[str, Any] = {
         "name": material.name,
         "distribution": material.distribution,
         "subsurface_method": material.subsurface_method,
-        "sockets": {name: _socket(socket, files) for name, socket in material.sockets.items()},
+        "sockets": {name: _socket(socket, files, seen) for name, socket in material.sockets.items()},
     }
     shader = {"null": "transparent", "emission": "emission"}.get(material.model, material.shader)
     if shader != "principled":
         described["shader"] = shader
     if material.is_mixed:
-        described["weight"] = _socket(material.weight, files)
+        described["weight"] = _socket(material.weight, files, seen)
     extra = {"free": dict(material.free), "factors": list(material.factors), "ways": list(material.ways)}
     described |= {name: value for name, value in extra.items() if value}
     if material.leaves:
-        described["leaves"] = [_material(leaf, files) for leaf in material.leaves]
+        described["leaves"] = [_material(leaf, files, seen=seen) for leaf in material.leaves]
     return described
 
 
-def _socket(socket: Socket, files: SceneFiles) -> dict[str, Any]:
+def _socket(socket: Socket, files: SceneFiles, seen: bool) -> dict[str, Any]:
     value = socket.value
     described = {"value": list(value) if isinstance(value, (list, tuple)) else value, "linked": socket.linked}
     if socket.texture is not None:
         described["texture"] = files.texture(socket.texture)
-    if socket.seen is not None:
+    if seen and socket.seen is not None:
         described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
     return described
 

@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..check.preflight import redraw
 from ..result import shown_result
-from ..result.job_result import JobResult, JobResultError, must_ask, read_job_result
+from ..result.job_result import JobResult, JobResultError, must_ask, read_job_result, result_folders, whole_job
 from ..result.local_copy import unwritable
 from ..result.write_back import (
     WriteBackError,
@@ -75,7 +75,9 @@ class MFO_OT_apply(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """By a button: a result that does not match is applied at the second press."""
         found = shown_result.result
-        if not self.job_folder and found is not None and must_ask(found.verdict):
+        if not self.job_folder and len(shown_result.together) > 1:
+            self.force = was_asked(context, str(whole_job(shown_result.together[0][0].folder)))
+        elif not self.job_folder and found is not None and must_ask(found.verdict):
             if not was_asked(context, str(found.folder)):
                 self.report({"WARNING"}, f"{found.sentence} {PRESS_AGAIN}")
                 return {"CANCELLED"}
@@ -83,38 +85,48 @@ class MFO_OT_apply(bpy.types.Operator):
         return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Find result and material, set the sockets, report what was skipped."""
+        """Find results and materials, set the sockets, report what was skipped."""
         try:
-            result = self._result()
-            if must_ask(result.verdict) and not self.force:
-                raise WriteBackError(f"{result.sentence} Nothing was applied; force=True applies it anyway.")
-            material = self._material(result)
-            notes = apply_values(
-                material,
-                result_to_sockets(result),
-                result.folder,
-                animated=self.animated or context.scene.mfo.animated,
-                leaf=result.leaf or None,
-            )
+            found = self._results()
+            left = [result for result, _ in found if must_ask(result.verdict) and not self.force]
+            if len(left) == len(found):
+                raise WriteBackError(f"{left[0].sentence} Nothing was applied; force=True applies it anyway.")
+            taken = [(result, self._material(result, uid)) for result, uid in found if result not in left]
+            notes = [note for result, material in taken for note in self._put(context, result, material)]
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        for result in left:
+            self.report({"WARNING"}, f"{result.material_name!r} was left as it is: {result.sentence} {PRESS_AGAIN}")
         for note in notes:
             self.report({"WARNING"}, note)
-        self.report({"INFO"}, f"The recovered values are on {material.name!r}.")
+        self.report({"INFO"}, f"The recovered values are on {', '.join(repr(m.name) for _, m in taken)}.")
         return {"FINISHED"}
 
-    def _result(self) -> JobResult:
+    def _put(self, context: bpy.types.Context, result: JobResult, material: bpy.types.Material) -> list[str]:
+        return apply_values(
+            material,
+            result_to_sockets(result),
+            result.folder,
+            animated=self.animated or context.scene.mfo.animated,
+            leaf=result.leaf or None,
+        )
+
+    def _results(self) -> list[tuple[JobResult, int]]:
+        """The results with their materials' session_uid, 0 where that is not known; several were fitted together."""
         if self.job_folder:
-            return read_job_result(Path(bpy.path.abspath(self.job_folder)))
+            folders = result_folders(Path(bpy.path.abspath(self.job_folder)))
+            if len(folders) > 1 and self.material:
+                raise JobResultError("The job has several materials, and one is named: leave the name out.")
+            return [(read_job_result(folder), 0) for folder in folders]
         if shown_result.result is None:
             raise JobResultError("There is no result yet: run a fit, or give the folder of a finished job.")
-        return shown_result.result
+        return list(shown_result.together) or [(shown_result.result, shown_result.material_uid)]
 
-    def _material(self, result: JobResult) -> bpy.types.Material:
+    def _material(self, result: JobResult, uid: int) -> bpy.types.Material:
         name = self.material or result.material_name
-        of_this_session = not self.material and not self.job_folder and shown_result.material_uid
-        found = shown_result.material() if of_this_session else bpy.data.materials.get(name)
+        of_this_session = not self.material and uid
+        found = shown_result.material_of(uid) if of_this_session else bpy.data.materials.get(name)
         if found is None:
             raise WriteBackError(f"Material {name!r} is not in this file (any more): name the one to change.")
         return found

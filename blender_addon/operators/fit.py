@@ -9,6 +9,8 @@ from bpy.props import IntProperty, StringProperty
 
 from ..backend.backend_section import needs_setup
 from ..backend.preferences import idle_seconds
+from ..export.fitted_slot import FittedSlot
+from ..export.job import drained
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..result import shown_result
@@ -23,6 +25,7 @@ from .fit_options import (
     start_or_queue,
     target_of,
 )
+from .materials import ticked_slots
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -50,10 +53,11 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         if not bpy.app.background and needs_setup():
             cls.poll_message_set("The backend is not installed yet: press Install below")
             return False
-        if not bpy.app.background and context.object is None:
+        listed = bool(context.scene.mfo.targets)
+        if not bpy.app.background and context.object is None and not listed:
             cls.poll_message_set("Select the object whose material is to be fitted")
             return False
-        if not bpy.app.background and context.object.active_material is None:
+        if not bpy.app.background and not listed and context.object.active_material is None:
             cls.poll_message_set("The object has no material in its active slot; give it one with a Principled BSDF")
             return False
         return True
@@ -63,11 +67,11 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         try:
             if not bpy.app.background:  # it loads while the job is exported
                 waiting_backend.prepare(python_of(context), idle_seconds(context), own_blender(SERVER, []))
-                steps = self.steps(context, target_of(context, self.object), self.job_folder)
+                steps = self.steps(context, *self._targets(context))
                 if not self.blocks():
                     running_export.start(context, steps, start_or_queue)
                     return {"FINISHED"}
-            fit = self.prepare(context, target_of(context, self.object), self.job_folder)
+            fit = drained(self.steps(context, *self._targets(context)))
             if running_job.current is not None:
                 fit_queue.add(fit)
                 self.report({"INFO"}, f"Material {fit.material_name!r} waits for the fit that runs.")
@@ -90,6 +94,18 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
             return {"CANCELLED"}
         self.report({"INFO"}, f"{outcome.sentence} {_error_summary()}".strip())
         return {"FINISHED"}
+
+    def _targets(self, context: bpy.types.Context) -> tuple[bpy.types.Object, str, list[FittedSlot]]:
+        """The object, the folder, and the ticked slots where several materials are fitted together."""
+        if self.object or not context.scene.mfo.targets:
+            return target_of(context, self.object), self.job_folder, []
+        slots = ticked_slots(context.scene)
+        if not slots:
+            raise FitError("No material of the list is ticked: tick those that are to be fitted, or fit one material.")
+        obj = slots[0].object
+        if len(slots) == 1 and obj.active_material_index == slots[0].slot:
+            return obj, self.job_folder, []
+        return obj, self.job_folder, slots
 
 
 class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):

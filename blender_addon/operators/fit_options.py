@@ -13,6 +13,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.preferences import chosen_python, new_job_folder
+from ..export.fitted_slot import FittedSlot
 from ..export.job import ExportError, Steps, drained, export_job, export_steps
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
@@ -77,12 +78,19 @@ class FitOptions:
         """Export the job folder of the object's active material; raises `FitError` where it cannot be."""
         return drained(self.steps(context, obj, job_folder))
 
-    def steps(self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str) -> Steps[PreparedFit]:
-        """`prepare` in steps, which yields while a second Blender works; the operator is not needed any more then."""
+    def steps(
+        self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str, targets: Sequence[FittedSlot] = ()
+    ) -> Steps[PreparedFit]:
+        """`prepare` in steps, which yields while a second Blender works; the operator is not needed any more then.
+
+        With `targets` the materials of those slots are fitted together instead of the object's active one.
+        """
         settings = context.scene.mfo
-        material = _active_material(obj)
-        if unwritable(material):  # before the fit, since its values could not be applied
-            raise FitError(unwritable(material))
+        materials = [each.material for each in targets if each.material is not None] or [_active_material(obj)]
+        material = materials[0]
+        for each in materials:
+            if unwritable(each):  # before the fit, since its values could not be applied
+                raise FitError(unwritable(each))
         if self.shader:
             choose_shader(material, self.shader)
         reference = _reference(settings, self.reference)
@@ -95,16 +103,21 @@ class FitOptions:
         given = bpy.path.abspath(job_folder)
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
-        name, uid, chosen = material.name, material.session_uid, self._fit(settings, obj)
+        name = f"{len(materials)} materials" if targets else material.name
+        uids, chosen = tuple(each.session_uid for each in materials), self._fit(settings, obj)
         try:
             if isinstance(reference, Sequence):  # each picture changes the scene's frame while it is exported
-                report = export_job(context, obj, folder, reference=reference, fit=chosen, reference_view=made)
+                report = export_job(
+                    context, obj, folder, reference=reference, fit=chosen, reference_view=made, targets=targets
+                )
             else:
-                report = yield from export_steps(context, obj, folder, reference, chosen, made, upright=False)
+                report = yield from export_steps(
+                    context, obj, folder, reference, chosen, made, upright=False, targets=targets
+                )
         except ExportError as error:
             raise FitError(str(error)) from error
         picture = folder / report.request["reference"]["path"]
-        return PreparedFit(python, folder, name, uid, picture, report.notes, is_new)
+        return PreparedFit(python, folder, name, uids, picture, report.notes, is_new)
 
     def _fit(self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> dict[str, Any]:
         model = self.model or settings.model

@@ -27,7 +27,7 @@ class MFO_MT_material_fit(bpy.types.Menu):
                 "mfo.add_picture",
                 "mfo.set_up_next_picture",
             ),
-            ("mfo.fit", "mfo.fit_selected", "mfo.cancel"),
+            ("mfo.fit", "mfo.fit_selected", "mfo.list_materials", "mfo.clear_materials", "mfo.cancel"),
             ("mfo.show_pictures", "mfo.check_in_cycles", "mfo.cancel_cycles", "mfo.open_report", "mfo.open_job"),
             ("mfo.apply", "mfo.toggle", "mfo.revert", "mfo.copy_values"),
             ("mfo.apply_past", "mfo.show_past", "mfo.remove_past"),

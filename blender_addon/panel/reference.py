@@ -77,11 +77,30 @@ def _draw_what_it_shows(
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    if context.scene.mfo.targets:
+        _draw_targets(layout, context)
+        return
     obj = context.object
     if obj is None:
         layout.label(text="Select an object", icon="ERROR")
-        return
-    material = obj.active_material
-    row = layout.row()
-    row.label(text=obj.name, icon="OBJECT_DATA")
-    row.label(text=material.name if material else "No material", icon="MATERIAL" if material else "ERROR")
+    else:
+        material = obj.active_material
+        row = layout.row()
+        row.label(text=obj.name, icon="OBJECT_DATA")
+        row.label(text=material.name if material else "No material", icon="MATERIAL" if material else "ERROR")
+    layout.operator("mfo.list_materials", icon="MATERIAL")
+
+
+def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The materials that the camera sees, each with a box to tick, and the way back to one."""
+    box = layout.box().column(align=True)
+    row = box.row(align=True)
+    row.label(text="Fit together")
+    row.operator("mfo.list_materials", text="", icon="FILE_REFRESH")
+    row.operator("mfo.clear_materials", text="", icon="X")
+    for entry in context.scene.mfo.targets:
+        if entry.object is None or entry.material is None:
+            continue
+        row = box.row(align=True)
+        row.prop(entry, "use", text=entry.material.name)
+        row.label(text=entry.object.name, icon="OBJECT_DATA")

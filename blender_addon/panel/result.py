@@ -47,8 +47,22 @@ class Result:
         row.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         if runtime.has_result:
+            _draw_materials(layout, runtime)
             _draw_values(layout, context, runtime.values)
             _draw_next_picture(layout, context)
+
+
+def _draw_materials(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup) -> None:
+    """The materials that were fitted together, each with its verdict; a press shows its values and pictures."""
+    if not runtime.materials:
+        return
+    column = layout.box().column(align=True)
+    for index, row in enumerate(runtime.materials):
+        line = column.row(align=True)
+        icon = shown_result.VERDICT_ICONS.get(row.words, "BLANK1")
+        shown = index == runtime.shown_material
+        line.operator("mfo.show_material", text=row.name, icon=icon, depress=shown).index = index
+        line.label(text=row.result)
 
 
 def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: bpy.types.bpy_prop_collection) -> None:

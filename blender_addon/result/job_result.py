@@ -89,6 +89,36 @@ def must_ask(verdict: str) -> bool:
     return verdict == "different"
 
 
+def result_folders(folder: Path) -> list[Path]:
+    """The folders with one material's result each: the job's own, or those of the materials fitted together.
+
+    Raises
+    ------
+    JobResultError
+        If a file is missing or damaged.
+    """
+    if not (folder / "result.json").is_file():
+        return [folder]  # reading it says why there is none
+    listed = _read_json(folder / "result.json").get("materials")
+    if not listed:
+        return [folder]
+    try:
+        found = [(folder / str(one["folder"])).resolve() for one in listed]
+    except (KeyError, TypeError) as error:
+        raise JobResultError(f"{folder / 'result.json'} is damaged ({error}): run the fit again.") from error
+    if not all(path.is_relative_to(folder.resolve()) for path in found):
+        raise JobResultError(f"{folder / 'result.json'} names a folder outside of the job: run the fit again.")
+    return found
+
+
+def whole_job(folder: Path) -> Path:
+    """The job that a result belongs to: its own folder, or that of the materials it was fitted together with."""
+    outer = folder.parent.parent
+    if folder.parent.name != "targets" or not (outer / "result.json").is_file():
+        return folder
+    return outer if folder.resolve() in result_folders(outer) else folder
+
+
 def read_job_result(folder: Path) -> JobResult:
     """The result in a job folder together with what its request says about the target.
 

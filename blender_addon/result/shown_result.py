@@ -16,6 +16,7 @@ _KEPT = ("split",)  # settings of the view, not of a fit
 
 result: JobResult | None = None
 material_uid = 0  # session_uid of its material, 0 when it came from another session
+together: list[tuple[JobResult, int]] = []  # results of materials fitted together, with their uids; `result` is one
 
 
 def show(found: JobResult, uid: int) -> None:
@@ -46,10 +47,39 @@ def show(found: JobResult, uid: int) -> None:
         previews.show(name, found.folder / "pictures" / f"{name}.png")
 
 
+def show_all(found: list[tuple[JobResult, int]]) -> None:
+    """Make results of materials fitted together those that are applied, and show the first; errors as of `show`."""
+    together[:] = found if len(found) > 1 else []
+    show(*found[0])
+    _list_together(0)
+
+
+def show_one(index: int) -> None:
+    """Show another one of the results of materials fitted together; errors as of `show`."""
+    runtime = bpy.context.window_manager.mfo_runtime
+    for rows in (runtime.values, runtime.errors, runtime.messages):
+        rows.clear()
+    previews.clear()
+    runtime.sentence = together[index][0].sentence
+    show(*together[index])
+    _list_together(index)
+
+
+def _list_together(shown: int) -> None:
+    runtime = bpy.context.window_manager.mfo_runtime
+    runtime.materials.clear()
+    runtime.shown_material = shown
+    for each, _uid in together:
+        row = runtime.materials.add()
+        row.name, row.words = each.material_name, each.verdict
+        row.start, row.result = (_shown(error) for error in each.errors.get("flip", (0.0, 0.0)))
+
+
 def clear(runtime: bpy.types.PropertyGroup) -> None:
     """Show no result, no messages and no pictures."""
     global result, material_uid
     result, material_uid = None, 0
+    together.clear()
     previews.clear()
     for prop in runtime.bl_rna.properties:
         if prop.type == "COLLECTION":
@@ -60,7 +90,12 @@ def clear(runtime: bpy.types.PropertyGroup) -> None:
 
 def material() -> bpy.types.Material | None:
     """The material of the result under whatever name it has by now, if it was fitted since Blender started."""
-    return next((m for m in bpy.data.materials if m.session_uid == material_uid), None) if material_uid else None
+    return material_of(material_uid)
+
+
+def material_of(uid: int) -> bpy.types.Material | None:
+    """The material with this session_uid; None for 0."""
+    return next((m for m in bpy.data.materials if m.session_uid == uid), None) if uid else None
 
 
 def add_message(runtime: bpy.types.PropertyGroup, text: str, icon: str) -> None:

@@ -12,12 +12,15 @@ LINES = 8  # of fits that ended; the panel shows no more
 
 @dataclass(frozen=True)
 class PreparedFit:
-    """A job folder and who it is for; `is_new`: the folder was made for it, so it may go if the fit never starts."""
+    """A job folder and who it is for; `is_new`: the folder was made for it, so it may go if the fit never starts.
+
+    Of materials that are fitted together `uids` has the session_uid of each, else of the one.
+    """
 
     python: Path
     folder: Path
     material_name: str
-    material_uid: int
+    uids: tuple[int, ...]
     reference: Path
     notes: tuple[str, ...]
     is_new: bool

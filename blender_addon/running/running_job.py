@@ -24,7 +24,7 @@ from ..process import waiting_backend
 from ..process.job_process import JobProcess, Outcome
 from ..process.progress_lines import Event
 from ..result import history, previews, shown_result
-from ..result.job_result import JobResult, JobResultError, read_job_result
+from ..result.job_result import JobResult, JobResultError, read_job_result, result_folders
 from ..result.local_copy import unwritable
 from ..result.shown_result import add_message
 from ..result.write_back import WriteBackError
@@ -242,9 +242,11 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     runtime.progress_text, runtime.detail = "", ""
     try:
         if outcome.status in _ENDED or (job.process.folder / "result.json").is_file():
-            found = read_job_result(job.process.folder)
-            shown_result.show(found, job.fit.material_uid)
-            unrecorded.append((found, job.fit.material_uid))
+            folders = result_folders(job.process.folder)
+            results = [(read_job_result(path), uid) for path, uid in zip(folders, job.fit.uids, strict=False)]
+            shown_result.show_all(results)
+            unrecorded.extend(results)
+            found = results[0][0]
             died = found.partial and found.status == "failed"  # its sentence says so beside what can be applied
             runtime.state = "FAILED" if died else "DONE"
     except (JobResultError, WriteBackError) as error:

@@ -8,7 +8,13 @@ from typing import Any
 
 
 def result_text(result: Mapping[str, Any]) -> str:
-    """Values and image differences before and after, from the content of result.json."""
+    """Values and image differences before and after, from the content of result.json; of each material of several."""
+    if result.get("materials"):
+        parts = [
+            f"{found['material']} on {found['object']}: {found['sentence']}\n{result_text(found)}"
+            for found in result["materials"]
+        ]
+        return "\n\n".join(parts)
     labels = result.get("labels") or {}
     rows = [(result.get("shader") or "", "start", "result", "")]
     for name, value in result["recovered"].items():

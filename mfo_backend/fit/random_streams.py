@@ -60,6 +60,7 @@ class Stream(Enum):
     VERIFY = Span(0x5EED0000, 1, apart=True)
     GAP = Span(0x6A500000, 2, apart=True)
     NEXT_PICTURE = Span(0x2E870000, 1, apart=True)
+    TOGETHER = Span(0x70610000, 1, apart=True)  # looks at several materials between their fits
     PREVIEW = Span(0x3E710000, 1, apart=True)
 
     def seed(self, fit: int, number: int = 0) -> int:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from ..metrics.display.tone_mapping import View
 from ..render.pictures.mitsuba_renderer import MitsubaRenderer
-from ..render.pictures.renderer import Interrupted, Renderer
+from ..render.pictures.renderer import Interrupted, Renderer, Vector
 from ..render.sheet.sheet_renderer import SheetRenderer
 from ..types.errors import UnrecordableError
 from ..types.event import Listener, Preview, Started
@@ -68,6 +68,8 @@ def recover_material(
     plan: RecordedPlan | None = None,
     hand_over: bool = True,
     noted: bool = False,
+    begin: Vector | None = None,
+    judged: bool = True,
 ) -> FitOutcome:
     """Recover the renderer's parameters from a picture of the same scene.
 
@@ -89,6 +91,10 @@ def recover_material(
         Whether the preset `paper` may stand in for another one.
     noted
         Whether the export has left something out, which may be why a result does not match.
+    begin
+        Values of an earlier fit to go on from, where light is sampled, instead of the search for a start.
+    judged
+        False leaves the verdict to the caller, who has other pictures for it.
 
     Raises
     ------
@@ -101,9 +107,9 @@ def recover_material(
     """
     task = check_task(renderer, reference, settings, display, listener, should_stop)
     reasons: list[str] = []
-    for make, why in _ways(task, plan, hand_over=hand_over):
+    for make, why in _ways(task, plan, begin, hand_over=hand_over):
         try:
-            return _fit_along(make(), task, reasons, why, noted=noted)
+            return _fit_along(make(), task, reasons, why, noted=noted, judged=judged)
         except UnrecordableError as error:
             reasons.append(str(error))
     if task.sheet is not None:
@@ -111,7 +117,7 @@ def recover_material(
     raise UnrecordableError(" ".join(reasons))
 
 
-def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Iterator[_Way]:
+def _ways(task: FitTask, plan: RecordedPlan | None, begin: Vector | None, *, hand_over: bool) -> Iterator[_Way]:
     """The routes by their order."""
     renderer, settings = task.renderer, task.settings
     several = renderer if settings.preset != "paper" and isinstance(renderer, SheetRenderer) else None
@@ -121,7 +127,7 @@ def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Itera
         yield lambda: RecordedRoute(task, several, plan), lambda stages: ""
         return
     if ours is not None:
-        yield lambda: RecordedRoute(task, ours, plan), lambda stages: ""
+        yield lambda: RecordedRoute(task, ours, plan, begin), lambda stages: ""
         if ours.graph is not None:  # no other way has the slopes of values inside nodes
             return
         if settings.losses is None:
@@ -139,7 +145,9 @@ def _ways(task: FitTask, plan: RecordedPlan | None, *, hand_over: bool) -> Itera
         )
 
 
-def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says, *, noted: bool) -> FitOutcome:
+def _fit_along(
+    route: Route, task: FitTask, reasons: Sequence[str], says: _Says, *, noted: bool, judged: bool
+) -> FitOutcome:
     """Fit, verify the ends by new random numbers, choose the best, and make the result.
 
     `reasons` say why the routes before this one could not do it.
@@ -169,6 +177,8 @@ def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says,
         began=task.began,
         notes=[" ".join([*reasons, says(route.stages)])] if reasons else [],
     )
+    if not judged:
+        return FitOutcome(result, first.image, end.image, task.counted)
     return _judged(task, result, first, end, each, noted=noted)
 
 

@@ -31,7 +31,8 @@ _VERDICT_TONES = {Verdict.SAME: "good", Verdict.CLOSE: "warn", Verdict.DIFFERENT
 class ReportContent:
     """What a report shows; `pictures` are PNG files by the names reference, start, result and difference.
 
-    Of a fit of several pictures `more_pictures` has those of each, by what it is called.
+    Of a fit of several pictures `more_pictures` has those of each, by what it is called. Of a fit of several
+    `materials` there are the folder below this report and the result of each, by what it is called.
     """
 
     title: str
@@ -41,6 +42,7 @@ class ReportContent:
     more_pictures: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
     notes: Sequence[str] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
+    materials: Mapping[str, tuple[str, FitResult]] = field(default_factory=dict)
 
 
 def report_html(content: ReportContent) -> str:
@@ -49,6 +51,7 @@ def report_html(content: ReportContent) -> str:
     result = content.result
     sections = [
         _section("Pictures", _all_pictures(content)),
+        _section("Materials", _materials(content.materials)),
         _section("Values", _value_table(result)),
         _section("Loss over time", _plot(result)),
         _section("Stages", _stage_table(result)),
@@ -123,6 +126,16 @@ def _all_pictures(content: ReportContent) -> str:
             f'<h3>{escape(label)}</h3><p class="soft">{said} {flip}</p><div class="pictures">{_pictures(files)}</div>'
         )
     return "".join(parts)
+
+
+def _materials(materials: Mapping[str, tuple[str, FitResult]]) -> str:
+    """Verdict, error and values of each of several materials, with the way to its own report."""
+    return "".join(
+        f'<h3>{escape(label)}</h3>{_headline(result)}<p class="soft">mean FLIP {result.errors["flip"][0]:.3f} → '
+        f'{result.errors["flip"][1]:.3f}. <a href="{escape(folder)}/index.html">Pictures, course and notes</a></p>'
+        f"{_value_table(result)}"
+        for label, (folder, result) in materials.items()
+    )
 
 
 def _pictures(pictures: Mapping[str, bytes]) -> str:

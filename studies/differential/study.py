@@ -107,7 +107,7 @@ def _cycles(rig: Rig, folder: Path, seed: int) -> Picture:
 def _ours(job: Path, samples: int) -> tuple[Picture, Picture]:
     from mfo_backend.job.folder.job_folder import JobFolder
     from mfo_backend.job.folder.request import read_request
-    from mfo_backend.job.run.fit_scene import request_materials
+    from mfo_backend.job.run.job_scene import request_materials
     from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
     from mfo_backend.render.pictures.renderer import load_renderer
 

@@ -76,7 +76,7 @@ def render_job(job: Path, spp: int) -> tuple[Array, Array]:
     """Two renders of a job's scene with Blender's model, half of `spp` each."""
     from mfo_backend.job.folder.job_folder import JobFolder
     from mfo_backend.job.folder.request import read_request
-    from mfo_backend.job.run.fit_scene import request_materials
+    from mfo_backend.job.run.job_scene import request_materials
     from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
     from mfo_backend.render.pictures.renderer import load_renderer
 

@@ -130,6 +130,7 @@ def main(arguments: list[str]) -> int:
         "Cancelled; the best values so far were kept." if partial else "The result looks the same as the reference."
     )
     write_result(folder, "result", status, sentence, request, partial=partial)
+    write_materials(folder, status, control.get("different", []))
     say(event="finished", status=status, sentence=sentence, result="result.json")
     return 4 if partial else 0
 
@@ -159,6 +160,25 @@ def write_result(folder: Path, name: str, status: str, sentence: str, request: d
     }  # fmt: skip
     (folder / f"{name}.tmp").write_text(json.dumps(result))
     os.replace(folder / f"{name}.tmp", folder / f"{name}.json")
+
+
+def write_materials(folder: Path, status: str, different: list[str]) -> None:
+    """The results of a job's several materials, of which those named `different` do not match."""
+    job = json.loads((folder / "request.json").read_text("utf-8"))
+    materials = []
+    for path in job.get("targets", []):
+        request = json.loads((folder / path / "request.json").read_text("utf-8"))
+        name = request["target"]["material"]
+        write_result(folder / path, "result", status, f"{name} is found.", request, partial=False)
+        file = folder / path / "result.json"
+        result = json.loads(file.read_text())
+        if name in different:
+            result["verdict"] = "different"
+            file.write_text(json.dumps(result))
+        materials.append({"folder": path, "material": name, **result})
+    if materials:
+        whole = json.loads((folder / "result.json").read_text()) | {"materials": materials, "recovered": {}}
+        (folder / "result.json").write_text(json.dumps(whole))
 
 
 def judge(folder: Path, picture: Path) -> int:

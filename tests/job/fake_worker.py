@@ -15,7 +15,7 @@ import time
 import numpy as np
 
 from mfo_backend.cli.commands import run as command
-from mfo_backend.job.run.fit_scene import JobOutcome
+from mfo_backend.job.run.job_outcome import JobOutcome
 from mfo_backend.types.errors import BadInputError, SetupError
 from mfo_backend.types.event import BestValues, Preview, Progress, StageEnd, Started
 from mfo_backend.types.result import CurvePoint, FitResult, StageReport

@@ -20,10 +20,11 @@ from ..findings import ExportError
 GENERATOR = "material_fit_mfo"
 _ABANDONED = re.compile(r"\..+\.(\d+)\.[a-z0-9_]+\.(partial|old)")  # hidden, process id, mkdtemp's letters
 MORE_PICTURES = "more_pictures"  # folder of the further pictures of a job, each a job folder of its own
+TARGETS = "targets"  # the same of materials that are fitted together
 # what a job folder may hold; a folder with anything else is somebody's own
 OWN_NAMES = {
-    "request.json", "scene.xml", "meshes", "textures", "graph", MORE_PICTURES, "view_lut.exr", "progress.jsonl",
-    "cancel", "result.json", "partial.json", "pictures", "index.html", "backend.log",
+    "request.json", "scene.xml", "meshes", "textures", "graph", MORE_PICTURES, TARGETS, "view_lut.exr",
+    "progress.jsonl", "cancel", "result.json", "partial.json", "pictures", "index.html", "backend.log",
 }  # fmt: skip
 
 
@@ -39,6 +40,19 @@ def share_files(job: Path, inner: Path) -> None:
             with suppress(OSError):
                 os.link(twin, spare)
                 os.replace(spare, path)
+
+
+def link_files(job: Path, inner: Path) -> None:
+    """Let a folder inside of a job have its scene and its pictures, too; without hard links they are copies."""
+    inner.mkdir(parents=True, exist_ok=True)
+    shared = [job / "scene.xml", *job.glob("meshes/*"), *job.glob("textures/*")]
+    for path in [*shared, *job.glob("reference.*"), *job.glob("mask.*"), *job.glob("view_lut.exr")]:
+        twin = inner / path.relative_to(job)
+        twin.parent.mkdir(exist_ok=True)
+        try:
+            os.link(path, twin)
+        except OSError:
+            shutil.copyfile(path, twin)
 
 
 @contextmanager

@@ -48,10 +48,10 @@ def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple
 
 
 def chosen_mix_values(
-    obj: bpy.types.Object, target: TargetShader, names: Sequence[str], fit: dict[str, Any], findings: Findings
+    material: bpy.types.Material, target: TargetShader, names: Sequence[str], fit: dict[str, Any], findings: Findings
 ) -> list[MixValue]:
     """The values of the target's mix of these names, or those that *All* takes of all its shaders."""
-    by_all = fit.get("parameters", "all") == "all" and fits_all_leaves(obj.active_material) and target.is_mixed
+    by_all = fit.get("parameters", "all") == "all" and fits_all_leaves(material) and target.is_mixed
     if not names and not by_all:
         return []
     problem = why_no_mix_values(target)

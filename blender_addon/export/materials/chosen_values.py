@@ -26,11 +26,11 @@ ON_RECORDED_LIGHT = ("fast", "balanced", "best")
 
 
 def chosen_graph_values(
-    obj: bpy.types.Object | None, fit: dict[str, Any], findings: Findings, *, alone: bool = True
+    obj: bpy.types.Object | None, fit: dict[str, Any], findings: Findings, *, together: str = ""
 ) -> tuple[list[GraphValue], dict[str, Any]]:
     """The values inside the graph that `fit` asks for, and the fit of the sockets alone.
 
-    `alone` says that the fit has one picture.
+    `together` says what there are several of in the fit, pictures or materials.
 
     Raises
     ------
@@ -47,7 +47,8 @@ def chosen_graph_values(
         chosen = chosen_values(graph_values(target), wanted if isinstance(wanted, str) else names)
     except GraphValueError as error:
         raise ExportError(str(error)) from error
-    reason = _not_fitted(target, fit) if alone else "a fit to several pictures changes the values of sockets alone"
+    several = f"a fit of several {together} changes the values of sockets alone" if together else None
+    reason = several or _not_fitted(target, fit)
     if reason is None:
         material = obj.active_material
         for name in shared_groups(material, [value.place for value in chosen]):

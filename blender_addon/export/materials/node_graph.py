@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +14,7 @@ import bpy
 
 from ...probe.client import Probe, ProbeError
 from ..findings import ExportError, Findings
+from ..fitted_slot import FittedSlot
 from ..material_model import Material, Socket
 from ..nodes.target_shader import chosen_leaf, fitted_leaves, leaf_name, target_shader
 from .read_material import read_target
@@ -48,8 +49,8 @@ class NodeGraph:
 
 
 @contextmanager
-def probe_for(obj: bpy.types.Object | None, *, always: bool = False) -> Iterator[Probe | None]:
-    """A second Blender where the active material of `obj` needs one, started beside what the caller does next.
+def probe_for(fitted: Sequence[FittedSlot], *, always: bool = False) -> Iterator[Probe | None]:
+    """A second Blender where one of the fitted materials needs one, started beside what the caller does next.
 
     `always` says that values of its graph are fitted, so that one is needed whatever the graph is.
 
@@ -58,13 +59,7 @@ def probe_for(obj: bpy.types.Object | None, *, always: bool = False) -> Iterator
     ExportError
         If it is needed and cannot be started.
     """
-    slot, slots = (0, ()) if obj is None else (obj.active_material_index, obj.material_slots)
-    material = slots[slot].material if slot < len(slots) else None
-    if obj is None or material is None or target_shader(material) is None:
-        yield None
-        return
-    described = read_target(material, obj.name, slot, Findings())
-    if described is None or not (always or described.asks_graph):
+    if not (always or any(asks_graph(each) for each in fitted)):
         yield None
         return
     try:
@@ -74,7 +69,16 @@ def probe_for(obj: bpy.types.Object | None, *, always: bool = False) -> Iterator
         raise ExportError(str(error)) from error
 
 
-def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
+def asks_graph(fitted: FittedSlot) -> bool:
+    """Whether Cycles has to evaluate nodes of the material."""
+    material = fitted.material
+    if material is None or target_shader(material) is None:
+        return False
+    described = read_target(material, fitted.object.name, fitted.slot, Findings())
+    return described is not None and described.asks_graph
+
+
+def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot) -> str | None:
     """The name of the leaf that covers most of the target in the picture; None where there is nothing to choose.
 
     Raises
@@ -82,12 +86,12 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object
     ProbeError
         If Cycles cannot evaluate the graph.
     """
-    material = obj.active_material
-    leaves = fitted_leaves(material)
+    material = fitted.material
+    leaves = [] if material is None else fitted_leaves(material)
     if len(leaves) < 2 or chosen_leaf(material) or not any(leaf.is_linked for leaf in leaves):
         return None
     asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
-    _send(probe, context, obj, asked, scale=1)
+    _send(probe, context, fitted, asked, 1, probe.folder)
     answer = probe.receive()  # waited for: the scene is read by it, and must be as in the copy that was asked
     shares = [
         found["weight"]["mean"][0] if leaf.is_linked else leaf.share
@@ -99,15 +103,16 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, obj: bpy.types.Object
 def _send(
     probe: Probe,
     context: bpy.types.Context,
-    obj: bpy.types.Object,
+    fitted: FittedSlot,
     leaves: list[dict[str, Any]],
     scale: int,
+    folder: Path,
     depths: int = 1,
 ) -> None:
     probe.send(
         "sockets",
-        scene=context.scene.name, layer=context.view_layer.name, object=obj.name, slot=obj.active_material_index,
-        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(probe.folder), depths=depths,
+        scene=context.scene.name, layer=context.view_layer.name, object=fitted.object.name, slot=fitted.slot,
+        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths,
     )  # fmt: skip
 
 
@@ -117,9 +122,11 @@ def names_by_graph(material: Material) -> list[str]:
 
 
 def evaluate_graph(
-    probe: Probe, context: bpy.types.Context, obj: bpy.types.Object, material: Material
+    probe: Probe, context: bpy.types.Context, fitted: FittedSlot, material: Material, number: int = 0
 ) -> Generator[None, None, tuple[Material, NodeGraph]]:
     """The material with the mean of each socket of its graph, and the pictures of them; yields while Cycles works.
+
+    Several fitted materials have different numbers, so that their files do not meet.
 
     Raises
     ------
@@ -135,15 +142,17 @@ def evaluate_graph(
         }
         for leaf in leaves
     ]
+    folder = probe.folder / f"target_{number}"
+    folder.mkdir(exist_ok=True)
     depths = DEPTHS if material.passes_light else 1
-    _send(probe, context, obj, asked, SCALE, depths)
+    _send(probe, context, fitted, asked, SCALE, folder, depths)
     while not probe.is_answered():
         yield
     answer = probe.receive()
-    files = [probe.folder / answer["positions"]]
+    files = [folder / answer["positions"]]
 
     def seen(socket: Socket, found: dict[str, Any]) -> Socket:
-        files.append(probe.folder / found["file"])
+        files.append(folder / found["file"])
         mean = found["mean"]
         return replace(socket, value=mean if len(mean) > 1 else mean[0], seen=files[-1])
 

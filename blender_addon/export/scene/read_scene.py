@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -25,6 +26,7 @@ from ..camera.bent_normals import share_of_bent_normals
 from ..camera.read_camera import read_camera, read_pixel_filter
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings, Fix
+from ..fitted_slot import FittedSlot
 from ..lights.read_light import read_light
 from ..material_model import Material, grey
 from ..materials.read_material import needs_bake, note_volume, read_context, read_target
@@ -34,7 +36,7 @@ from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
 from ..render_state import instanced_objects, layer_collections, render_state, rendered_layer, rendered_objects
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
-from .scene_data import TARGET_BSDF, TARGET_SHAPE, RenderSettings, SceneData, Shape, Terminator
+from .scene_data import RenderSettings, SceneData, Shape, Terminator, target_bsdf, target_shape
 from .visibility import check_visible
 
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -54,25 +56,27 @@ def read_scene(
     findings: Findings,
     bakes: SceneBakes | None = None,
     leaf: str | None = None,
+    targets: Sequence[FittedSlot] = (),
 ) -> SceneData | None:
     """Return the scene as the render would see it, or None with errors in `findings`.
 
     What only Cycles can tell is asked of `bakes`; `finish_scene` puts it in. `leaf` names the shader of the target's
-    mix that is fitted.
+    mix that is fitted, and `targets` are the slots whose materials are fitted together, where these are several.
     """
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
         findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
         with context.temp_override(view_layer=layer):
-            return read_scene(bpy.context, target, findings, bakes, leaf)
+            return read_scene(bpy.context, target, findings, bakes, leaf, targets)
     scene, view_layer = context.scene, context.view_layer
     others = [each.name for each in scene.view_layers if each.use and each != view_layer]
     if others and view_layer.use:
         findings.note(f"View layer '{view_layer.name}' is exported; also rendered are: {', '.join(others)}.")
-    if target is None or target.type not in MESH_TYPES:
-        what = "nothing" if target is None else f"'{target.name}' ({target.type.title()})"
-        findings.error(f"The object to fit is {what}: select an object with faces.")
-        return None
+    for each in [slot.object for slot in targets] or [target]:
+        if each is None or each.type not in MESH_TYPES:
+            what = "nothing" if each is None else f"'{each.name}' ({each.type.title()})"
+            findings.error(f"The object to fit is {what}: select an object with faces.")
+            return None
     if overrides_of(view_layer):
         findings.error(
             f"View layer '{view_layer.name}' replaces materials or the world by '{overrides_of(view_layer)[0]}': "
@@ -86,37 +90,50 @@ def read_scene(
         depsgraph = context.evaluated_depsgraph_get()
         camera = read_camera(scene, depsgraph, findings)
         settings = _read_settings(scene, findings)
-        slot = target.active_material_index
-        slots = target.material_slots
-        material = read_target(slots[slot].material if slot < len(slots) else None, target.name, slot, findings, leaf)
-        if camera is None or material is None:
+        fitted = targets or [FittedSlot(target, target.active_material_index, leaf)]
+        materials = [read_target(f.material, f.object.name, f.slot, findings, f.leaf) for f in fitted]
+        described = [material for material in materials if material is not None]
+        if camera is None or len(described) < len(materials):
             return None
         _name_settings(scene, view_layer, findings)
         world = read_world(scene, settings.exposure, findings, bakes) if view_layer.use_sky else BLACK
         data = SceneData(camera, settings, world)
-        walk = _Walk(data, target, slot, material, depsgraph, rendered_objects(view_layer), findings, bakes)
+        walk = _Walk(data, fitted, described, depsgraph, rendered_objects(view_layer), findings, bakes)
         walk.run()
-        if data.target is None:
-            if target.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
-                findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
-            elif walk.target_left_out:
-                findings.error(
-                    f"All faces of '{target.name}' with its active material have corners at NaN, infinite or absurdly "
-                    "far positions (1e18 m): move or scale the object, or mend its mesh."
-                )
-            else:
-                findings.error(f"No face of '{target.name}' uses its active material slot {slot + 1}: choose another.")
+        shapes = [data.target_of(number) for number in range(len(fitted))]
+        for number, (each, shape) in enumerate(zip(fitted, shapes, strict=True)):
+            if shape is None:
+                _say_no_faces(each, view_layer, walk.targets_left_out[number], findings)
+        seen = [(each, shape) for each, shape in zip(fitted, shapes, strict=True) if shape is not None]
+        if len(seen) < len(fitted):
             return None
         walk.note_coincident_faces()
-        share = share_of_bent_normals(data.target.mesh, camera)
-        if share > MOST_BENT:
-            findings.note(
-                f"Object '{target.name}' is smooth over few faces, or has custom normals: on {100 * share:.0f} % of it "
-                "normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all "
-                "light."
-            )
-        check_visible(data, target, scene, depsgraph, findings)
+        for each, shape in seen:
+            share = share_of_bent_normals(shape.mesh, camera)
+            if share > MOST_BENT:
+                findings.note(
+                    f"Object '{each.object.name}' is smooth over few faces, or has custom normals: on "
+                    f"{100 * share:.0f} % of it normals turn away from the camera. There Cycles bends them for "
+                    "reflections alone, the fit for all light."
+                )
+            check_visible(data, shape, each.object, scene, depsgraph, findings)
     return data
+
+
+def _say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: int, findings: Findings) -> None:
+    """Report why an object has no faces to fit, of which `left_out` triangles are nowhere."""
+    name = fitted.object.name
+    if fitted.object.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
+        findings.error(f"Object '{name}' is hidden in the render: show it.", Fix("show_in_render"))
+    elif left_out:
+        findings.error(
+            f"All faces of '{name}' with its active material have corners at NaN, infinite or absurdly "
+            "far positions (1e18 m): move or scale the object, or mend its mesh."
+        )
+    elif fitted.slot == fitted.object.active_material_index:
+        findings.error(f"No face of '{name}' uses its active material slot {fitted.slot + 1}: choose another.")
+    else:
+        findings.error(f"No face of '{name}' uses its material slot {fitted.slot + 1}: choose another.")
 
 
 def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None = None) -> None:
@@ -187,23 +204,26 @@ class _Walk:
     def __init__(
         self,
         data: SceneData,
-        target: bpy.types.Object,
-        slot: int,
-        material: Material,
+        targets: Sequence[FittedSlot],
+        materials: Sequence[Material],
         depsgraph: bpy.types.Depsgraph,
         rendered: set[str],
         findings: Findings,
         bakes: SceneBakes | None,
     ) -> None:
         self.bakes, self.baked = bakes, set[str]()  # BSDFs that are to be baked for each object
-        self.data, self.target, self.slot = data, target, slot
+        self.data, self.targets = data, targets
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
-        self.target_pieces: list[tuple[TriangleMesh, bool]] = []
-        self.target_left_out = 0  # triangles
+        self.target_pieces: list[list[tuple[TriangleMesh, bool]]] = [[] for _ in targets]
+        self.targets_left_out = [0] * len(targets)  # triangles
         self.places: list[tuple[str, TriangleMesh]] = []
-        data.materials[TARGET_BSDF] = material
-        self.bsdfs: dict[str, str] = {target.material_slots[slot].material.name_full: TARGET_BSDF}
+        data.target_count = len(targets)
+        self.bsdfs: dict[str, str] = {}
+        for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
+            data.materials[target_bsdf(number)] = material
+            assert each.material is not None  # it was read
+            self.bsdfs[each.material.name_full] = target_bsdf(number)
 
     def run(self) -> None:
         for instance in self.depsgraph.object_instances:
@@ -220,17 +240,15 @@ class _Walk:
                 own = not instance.is_instance or instance.parent == item.original.evaluated_get(self.depsgraph)
                 # an object that only collection instances show is fitted in all of them
                 own |= item.original.name_full not in self.rendered
-                self._add_mesh(instance, matrix, own and item.original == self.target)
+                self._add_mesh(instance, matrix, own)
             elif item.type not in (*MESH_TYPES, *SILENT_TYPES):
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
-        if self.target_pieces:
-            meshes, closed = zip(*self.target_pieces, strict=True)
-            self.data.shapes.insert(
-                0,
-                Shape(
-                    TARGET_SHAPE, joined(meshes), TARGET_BSDF, all(closed), Terminator(*shadow_terminator(self.target))
-                ),
-            )
+        for number, pieces in reversed(list(enumerate(self.target_pieces))):  # the first one comes first
+            if pieces:
+                meshes, closed = zip(*pieces, strict=True)
+                terminator = Terminator(*shadow_terminator(self.targets[number].object))
+                names = target_shape(number), target_bsdf(number)
+                self.data.shapes.insert(0, Shape(names[0], joined(meshes), names[1], all(closed), terminator))
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
@@ -240,9 +258,19 @@ class _Walk:
             return False
         return not item.is_instancer or item.show_instancer_for_render
 
-    def _add_mesh(
-        self, instance: bpy.types.DepsgraphObjectInstance, matrix: NDArray[np.float64], is_target: bool
-    ) -> None:
+    def _fitted(self, item: bpy.types.Object, bsdfs: dict[int, str]) -> dict[int, int]:
+        """The slots of an object that are fitted, with the numbers of their targets."""
+        found: dict[int, int] = {}
+        for number, each in enumerate(self.targets):
+            if item.original != each.object:
+                continue
+            slots = [slot for slot, bsdf in bsdfs.items() if bsdf == target_bsdf(number)]
+            # the same material in another slot is not what was chosen
+            found |= dict.fromkeys([each.slot] if each.slot in slots else slots, number)
+        return found
+
+    def _add_mesh(self, instance: bpy.types.DepsgraphObjectInstance, matrix: NDArray[np.float64], own: bool) -> None:
+        """Add an instance; the faces of its `own` object may be fitted."""
         item = instance.object
         key = (item.name_full, item.data.as_pointer())
         if key not in self.meshes:
@@ -254,9 +282,7 @@ class _Walk:
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
-        fitted = {slot for slot, bsdf in bsdfs.items() if bsdf == TARGET_BSDF} if is_target else set()
-        if self.slot in fitted:  # the same material in another slot is not what was chosen
-            fitted = {self.slot}
+        fitted = self._fitted(item, bsdfs) if own else {}
         for slot, bsdf in bsdfs.items():
             piece = world_mesh(mesh, slots == slot, matrix)
             left_out = int((slots == slot).sum()) - len(piece.triangles)
@@ -266,12 +292,12 @@ class _Walk:
                     "positions; they are left out."
                 )
             if slot in fitted:
-                self.target_left_out += left_out
+                self.targets_left_out[fitted[slot]] += left_out
             if not len(piece.triangles):
                 continue
             self.places.append((item.name, piece))
             if slot in fitted:
-                self.target_pieces.append((piece, mesh.is_closed))
+                self.target_pieces[fitted[slot]].append((piece, mesh.is_closed))
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
             shape = Shape(name, piece, bsdf, mesh.is_closed, Terminator(*shadow_terminator(item)))

@@ -18,6 +18,16 @@ TARGET_SHAPE = "target"
 TARGET_BSDF = "target_bsdf"
 
 
+def target_shape(number: int) -> str:
+    """The id of the shape of a fitted material, counted from 0 in the order of the job."""
+    return TARGET_SHAPE if number == 0 else f"{TARGET_SHAPE}_{number + 1}"
+
+
+def target_bsdf(number: int) -> str:
+    """The id of its BSDF."""
+    return f"{target_shape(number)}_bsdf"
+
+
 @dataclass(frozen=True)
 class Terminator:
     """What Cycles does to shadows of smooth-shaded facets: Blender's Geometry Offset and Shading Offset, in [0, 1]."""
@@ -54,7 +64,10 @@ class RenderSettings:
 
 @dataclass
 class SceneData:
-    """A whole scene: target shape and BSDF have the ids `target` and `target_bsdf`."""
+    """A whole scene: shape and BSDF of the first fitted material are `target` and `target_bsdf`.
+
+    Where several are fitted, `target_count` of them, the others' have numbers: `target_2` and `target_2_bsdf`.
+    """
 
     camera: Camera
     settings: RenderSettings
@@ -62,11 +75,16 @@ class SceneData:
     lights: list[Light] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     materials: dict[str, Material] = field(default_factory=dict)
+    target_count: int = 1
 
     @property
     def target(self) -> Shape | None:
-        """The shape whose material is fitted, None if it has no faces."""
-        return next((shape for shape in self.shapes if shape.identifier == TARGET_SHAPE), None)
+        """The shape whose material is fitted, or the first of them; None if it has no faces."""
+        return self.target_of(0)
+
+    def target_of(self, number: int) -> Shape | None:
+        """The shape of a fitted material, None if it has no faces."""
+        return next((shape for shape in self.shapes if shape.identifier == target_shape(number)), None)
 
     @property
     def emitting(self) -> list[Shape]:

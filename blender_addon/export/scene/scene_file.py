@@ -19,7 +19,7 @@ from ..lights.light_model import irradiance_at
 from ..material_model import Texture
 from ..materials.material_elements import bsdf_element, emission_element
 from ..meshes.mesh_arrays import turned
-from .scene_data import TARGET_BSDF, SceneData, Shape
+from .scene_data import SceneData, Shape, target_bsdf
 from .world_model import camera_world_element, world_element, world_irradiance
 
 # the back of an open emitter lies this part of the scene's radius behind its front
@@ -70,8 +70,10 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     """Return scene.xml and its files; what had to be approximated goes into `findings`."""
     files = SceneFiles()
     center, radius = scene.bounds()
-    target = scene.target
-    middle = center if target is None else target.mesh.positions.mean(axis=0).astype(np.float64)
+    targets = [shape for n in range(scene.target_count) if (shape := scene.target_of(n)) is not None]
+    # of several the middle of their middles
+    middles = [shape.mesh.positions.mean(axis=0).astype(np.float64) for shape in targets]
+    middle = np.mean(middles, axis=0) if middles else center
     children: list[Element] = [
         add(
             plugin("integrator", "path"),
@@ -91,8 +93,9 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     camera_world = None if scene.settings.film_transparent else camera_world_element(scene.world, files.picture)
     if camera_world is not None:
         children.append(camera_world)
+    fitted = {target_bsdf(number) for number in range(scene.target_count)}
     for identifier, material in scene.materials.items():
-        is_target = identifier == TARGET_BSDF
+        is_target = identifier in fitted
         children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
     for shape in scene.shapes:
         children += _shape_elements(shape, scene, radius * BACK_OFFSET, files)

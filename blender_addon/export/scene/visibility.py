@@ -9,7 +9,7 @@ from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..findings import Findings
-from .scene_data import SceneData
+from .scene_data import SceneData, Shape
 
 # rays towards as many points of the target are tried before it counts as hidden
 PROBES = 2000
@@ -17,14 +17,13 @@ PROBES = 2000
 
 def check_visible(
     data: SceneData,
+    shape: Shape,
     target: bpy.types.Object,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     findings: Findings,
 ) -> None:
-    """Report an error if no part of the target lies in the frame, or everything in the frame is hidden."""
-    shape = data.target
-    assert shape is not None
+    """Report an error if no part of the target's `shape` lies in the frame, or everything in the frame is hidden."""
     points = _points(shape.mesh.positions.astype(np.float64)[shape.mesh.triangles])
     camera = data.camera
     places, depths = camera.project(points)

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from ...job.folder.atomic_file import write_atomically
 from ...job.folder.job_folder import JobFolder
 from ...job.folder.request import read_request
-from ...job.run.fit_scene import request_materials
+from ...job.run.job_scene import request_materials
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
 from ...types.parameter import Value
 from .scenario import Scenario

@@ -24,6 +24,8 @@ from ..part_options import add_part_options, part_from_options
 from ..picture_option import HELP, PictureOption, is_plain, picture_options, with_part
 from ..result_text import result_text
 from ..run_folder import run_folder
+from ..target_option import HELP as TARGET_HELP
+from ..target_option import TargetOption, is_active, target_option
 from .run import leave
 
 REFERENCE_VIEWS = ("scene", "standard")
@@ -43,11 +45,14 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     """Add `mfo blend`."""
     parser = subparsers.add_parser(
         "blend",
-        help="fit a material of a .blend file to a reference picture",
-        description="Fit the active material of an object of a .blend file to a reference picture.",
+        help="fit materials of a .blend file to a reference picture",
+        description="Fit the active material of an object of a .blend file to a reference picture, or several "
+        "materials of a scene together, with the light that they give each other.",
+        epilog="Example: mfo blend room.blend --object Floor --object Wall@material=Paint --object Chair@slot=2 "
+        "--reference room.exr --apply --save-as fitted.blend",
     )
     parser.add_argument("file", type=Path, help="the .blend file; it is not changed unless --apply is given alone")
-    parser.add_argument("--object", required=True, metavar="NAME", help="object whose active material is fitted")
+    parser.add_argument("--object", required=True, action="append", metavar="NAME[@KEY=VALUE]", help=TARGET_HELP)
     parser.add_argument("--reference", required=True, action="append", metavar="PATH[@KEY=VALUE,...]", help=HELP)
     parser.add_argument(
         "--leave-out", action="append", type=int, default=[], metavar="NUMBER",
@@ -106,6 +111,11 @@ def run(arguments: argparse.Namespace) -> int:
     options = fit_from_options(arguments)
     given = picture_options(arguments.reference, arguments.leave_out)
     pictures = with_part(given, part_from_options(arguments))
+    targets = [target_option(text) for text in arguments.object]
+    if len(targets) > 1 and arguments.shader:
+        raise BadInputError("--shader is for one material: of several, each one's largest or chosen shader is fitted.")
+    if len(targets) > 1 and arguments.make_local:
+        raise BadInputError("--make-local is for one material: make the others local in Blender first.")
     FitSettings.from_request(options)  # a wrong option is known before Blender is started
     host = find_blender_host(arguments.blender)
     stream = take_stdout() if arguments.json else None
@@ -113,7 +123,7 @@ def run(arguments: argparse.Namespace) -> int:
     fit = fit_blend(
         host,
         arguments.file,
-        arguments.object,
+        targets[0].object if is_active(targets) else targets,
         Path(pictures[0].reference) if is_plain(pictures) else pictures,
         job,
         options,
@@ -148,14 +158,18 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def may_apply(result: Mapping[str, Any], *, forced: bool) -> bool:
-    """Whether a result may go onto its material: one that does not match its reference only if that is asked for."""
-    return forced or result.get("verdict") != Verdict.DIFFERENT.value
+    """Whether a result may go onto its material: one that does not match its reference only if that is asked for.
+
+    Of several materials those that match may.
+    """
+    found = result.get("materials") or [result]
+    return forced or any(one.get("verdict") != Verdict.DIFFERENT.value for one in found)
 
 
 def fit_blend(
     host: BlenderHost,
     blend: Path,
-    object_name: str,
+    target: str | Sequence[TargetOption],
     reference: Path | Sequence[PictureOption],
     job: Path,
     fit: Mapping[str, Any],
@@ -168,6 +182,7 @@ def fit_blend(
 ) -> BlendFit:
     """Export a job from a .blend file and run it with a progress bar on stderr.
 
+    `target` is an object, whose active material is fitted, or the materials that are fitted together.
     `reference` is a picture of the file as it is, or pictures with what each shows. `reference_view` says how a display
     picture was made: one of `REFERENCE_VIEWS`; `upright` turns it as its EXIF data say. With `will_apply` a material
     that cannot be changed is refused before the fit, unless it is to be made local.
@@ -181,7 +196,12 @@ def fit_blend(
     host.call(
         "export",
         blend,
-        f"--object={object_name}",  # one word, since a name may begin with a dash
+        # one word, since a name may begin with a dash
+        *(
+            [f"--object={target}"]
+            if isinstance(target, str)
+            else [f"--target={json.dumps(each.fields())}" for each in target]
+        ),
         *(
             [f"--reference={reference}"]
             if isinstance(reference, Path)

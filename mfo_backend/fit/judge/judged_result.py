@@ -31,11 +31,13 @@ def judged_result(
     view: View,
     *,
     noted: bool = False,
+    others: NDArray[np.bool_] | None = None,
     judge_all: Callable[[Pixels], tuple[PictureResult, ...]] | None = None,
 ) -> tuple[FitResult, Pixels]:
     """The result with its verdict, and its picture: of the start where the end is farther from the reference.
 
-    Pictures are scene-linear, `mask` sees the target, `noted` says that the export has left something out. Where the
+    Pictures are scene-linear, `mask` sees the target, `others` what is fitted with it, and `noted` says that the export
+    has left something out. Where the
     picture is a sheet of several, `judge_all` says what the result is in each of them. Under a verdict of `different`
     the status says so too, and no value is called determined.
     """
@@ -49,7 +51,7 @@ def judged_result(
         )  # fmt: skip
         end = start
     if judge_all is None:
-        judgement = judge(reference, end, mask, view, noted=noted)
+        judgement = judge(reference, end, mask, view, noted=noted, others=others)
     else:
         result = replace(result, pictures=judge_all(end))
         judgement = worst_judgement(result.pictures)

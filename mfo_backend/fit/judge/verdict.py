@@ -37,11 +37,13 @@ _FROM_BEST = (Verdict.SAME, Verdict.CLOSE, Verdict.DIFFERENT)
 Mask = NDArray[np.bool_]
 
 
-def judge(reference: Image, result: Pixels, mask: Mask, view: View, *, noted: bool = False) -> Judgement | None:
+def judge(
+    reference: Image, result: Pixels, mask: Mask, view: View, *, noted: bool = False, others: Mask | None = None
+) -> Judgement | None:
     """The verdict on a result's scene-linear picture (height, width, 3) where `mask` sees the target.
 
-    `view` is what a display reference was made with; `noted` whether the export has left something out. None if the
-    target fills too few pixels to say.
+    `view` is what a display reference was made with; `noted` whether the export has left something out. What is fitted
+    in `others` is not among the surroundings. None if the target fills too few pixels to say.
     """
     side = block_side(mask)
     target = _light_means(reference, result, view, mask, side)
@@ -51,7 +53,7 @@ def judge(reference: Image, result: Pixels, mask: Mask, view: View, *, noted: bo
         return None
     blocks = math.ceil(max(mask.shape) / AROUND_BLOCKS)
     surroundings = _light_means(reference, result, view, mask, blocks)
-    near = widened(mask, BESIDE)
+    near = widened(mask if others is None else mask | others, BESIDE)
     if reference.counts is not None:
         near = near | ~reference.counts
     outside = block_sums(near[..., None].astype(np.float64), blocks)[..., 0] == 0.0

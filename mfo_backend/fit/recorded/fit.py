@@ -46,7 +46,7 @@ from .keep_user_values import Kept, keep_values
 from .perceptual_stages import perceptual_ends
 from .recording import Setting, Vector
 from .refine import OnRecording, refine_exact, refine_sampled
-from .start import start_from_nothing
+from .start import Started, start_from_nothing
 
 TILES_OF_A_PICTURE = 300  # that are asked whether pictures agree: a wrong lamp shows in all
 STAGES = ("scan", "start", "refine")
@@ -60,6 +60,8 @@ NOTHING_BUT_NOISE = (
 class RecordedRoute:
     """A fit with no use of the material's start but as one guess; `plan` is that of the preset, unless it is given.
 
+    Where light is sampled it may `begin` at values of an earlier fit in nearly the same light, instead of the search.
+
     The result is the best of the scene's own values and the end of every finishing stage, judged on path-traced
     pictures: by the least-squares residual of tiles for `fast` and where the picture's noise is reached, by the last of
     the losses where the settings name them, else by FLIP (`fit.judge.picture_judge`).
@@ -72,7 +74,13 @@ class RecordedRoute:
         If one of the settings' losses is not defined for the reference.
     """
 
-    def __init__(self, task: FitTask, renderer: MitsubaRenderer | SheetRenderer, plan: RecordedPlan | None) -> None:
+    def __init__(
+        self,
+        task: FitTask,
+        renderer: MitsubaRenderer | SheetRenderer,
+        plan: RecordedPlan | None,
+        begin: Vector | None = None,
+    ) -> None:
         settings = task.settings
         self._task, self._renderer = task, renderer
         self._plan = plan or RecordedPlan.of(settings.preset)
@@ -84,7 +92,14 @@ class RecordedRoute:
         self._scene = (
             RecordedSheet(renderer, counts) if several else RecordedScene(renderer, int(task.mask.sum()), counts=counts)
         )
-        self.stages = (*STAGES, *self._finishing, *(["flip"] if settings.preset == "best" else []))
+        # where every light is exact the search is quick, and its recording serves for the refinement
+        self._begin = begin if begin is not None and self._scene.needs.sampled else None
+        self._alone = begin is None  # of a fit in turns with others nobody asks for a further picture
+        self.stages = (
+            *(STAGES if self._begin is None else STAGES[2:]),
+            *self._finishing,
+            *(["flip"] if settings.preset == "best" else []),
+        )
         self.verification = Verification(
             renderer,
             task.reference,
@@ -107,7 +122,11 @@ class RecordedRoute:
         task, scene, renderer = self._task, self._scene, self._renderer
         course = Course(renderer, self.stages, task.listener, task.should_stop, task.began)
         setting = Setting.of(scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped)
-        started = start_from_nothing(setting, _censored(log_residual, task))
+        started = (
+            start_from_nothing(setting, _censored(log_residual, task))
+            if self._begin is None
+            else Started(None, (self._begin,), None)
+        )
         first, *others = started.basins
         if task.should_stop():
             choose = self._choose_by(self._judge(blurred=False).value)
@@ -152,7 +171,7 @@ class RecordedRoute:
     def _next_picture(self, kept: Kept) -> NextPicture | None:
         """The further picture that would tell most of the weak values."""
         task = self._task
-        if task.settings.preset == "fast" or task.should_stop():
+        if task.settings.preset == "fast" or not self._alone or task.should_stop():
             return None
         scene = self._scene if isinstance(self._scene, RecordedScene) else self._scene.first
         pictures = 1 if task.sheet is None else len(task.sheet)

@@ -13,7 +13,7 @@ from ...material.cycles_model import SHADERS
 from ...metrics.display.tone_mapping import DisplayView
 from ...types.errors import BadInputError
 from ...types.image import Encoding
-from ...types.light_paths import NO_LIMIT, LightPaths
+from ...types.light_paths import LightPaths
 from .checked_object import CheckedObject, is_number, shown
 from .graph_files import check_graph_files
 from .graph_request import NodeGraph, graph_from_json, graph_to_json
@@ -21,17 +21,19 @@ from .job_folder import JobFolder
 from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
 from .picture_part import PicturePart, part_from_json, part_to_json
 from .scene_files import check_scene_files
-from .view_request import ViewTable, table_from_json, view_from_json
+from .view_request import ViewTable, light_paths_from_json, table_from_json, view_from_json
 
 SCHEMA_VERSION = 1
 MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
+MOST_TARGETS = 32  # materials of one fit; the number of free values mostly says no before
 MOST_LEAVES = 64  # of a mix
 OTHER_LEAVES = ("transparent", "emission")
+_MOST_OF = {"more_pictures": (MOST_PICTURES, "pictures"), "targets": (MOST_TARGETS, "materials")}
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
-    *("film_exposure", "graph", "fit", "notes", "left_out", "picture", "more_pictures"),
+    *("film_exposure", "graph", "fit", "notes", "left_out", "picture", "more_pictures", "targets"),
 )
 _MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", *MIX_KEYS)
 
@@ -112,7 +114,9 @@ class Request:
     """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference.
 
     `more_pictures` are further pictures of the same material: the path of each one's own folder, and its request. What
-    is fitted and how is said by the first picture's alone.
+    is fitted and how is said by the first picture's alone. `targets` are the materials that are fitted together, where
+    these are several, in the same way: each one's `target`, `graph`, own entry of `materials` and `fit.parameters`
+    count, and the rest is said by the job's own request.
     """
 
     scene: str
@@ -135,6 +139,7 @@ class Request:
     generator: Mapping[str, Any] = field(default_factory=dict)
     picture: Picture = field(default_factory=Picture)
     more_pictures: tuple[tuple[str, Request], ...] = ()
+    targets: tuple[tuple[str, Request], ...] = ()
 
 
 def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = False) -> Request:
@@ -154,11 +159,15 @@ def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = Fals
     except (OSError, ValueError, RecursionError) as error:
         raise BadInputError(f"{folder.request} cannot be read as JSON ({error}): write it anew.") from error
     request = request_from_json(data)
-    more = tuple(
-        (path, read_request(_folder_of(folder, path), trusted=trusted, inner=True))
-        for path in _paths_of_more(data, inner=inner)
-    )
-    request = replace(request, more_pictures=more)
+    more = {
+        key: tuple(
+            (path, read_request(_folder_of(folder, path, key), trusted=trusted, inner=True))
+            for path in _paths_of_more(data, key, inner=inner)
+        )
+        for key in _MOST_OF
+    }
+    request = replace(request, **more)
+    _check_targets(request)
     folder.file(request.scene, what=f"{WHERE}: scene")
     folder.file(request.reference, what=f"{WHERE}: reference.path")
     if request.part.mask:
@@ -207,7 +216,7 @@ def request_from_json(data: Any) -> Request:
         part=part_from_json(reference),
         view=view_from_json(top.raw("view", None), WHERE),
         view_table=table_from_json(top.raw("view", None), WHERE),
-        light_paths=_light_paths(top.raw("light_paths", None)),
+        light_paths=light_paths_from_json(top.raw("light_paths", None), WHERE),
         film_exposure=top.number("film_exposure", 1e-6, 1e6, 1.0),
         materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
         graph=graph_from_json(top.raw("graph", None), WHERE),
@@ -219,18 +228,42 @@ def request_from_json(data: Any) -> Request:
     )
 
 
-def _paths_of_more(data: Mapping[str, Any], *, inner: bool) -> tuple[str, ...]:
-    """The folders of further pictures, relative to the job's."""
-    paths = CheckedObject(data, WHERE, _KEYS).texts("more_pictures", ())
+def _paths_of_more(data: Mapping[str, Any], key: str, *, inner: bool) -> tuple[str, ...]:
+    """The folders of further pictures or materials, relative to the job's."""
+    paths, (most, what) = CheckedObject(data, WHERE, _KEYS).texts(key, ()), _MOST_OF[key]
     if inner and paths:
-        raise BadInputError(f"{WHERE} of a further picture names more_pictures: name all in the first picture's.")
-    if len(paths) >= MOST_PICTURES:
-        raise BadInputError(f"{WHERE} names {len(paths) + 1} pictures: at most {MOST_PICTURES} are fitted together.")
+        raise BadInputError(f"{WHERE} of a further {what[:-1]} names {key}: name all in the first one's.")
+    count = len(paths) + (key == "more_pictures")  # the first of which is the job's own
+    if count > most:
+        raise BadInputError(f"{WHERE} names {count} {what}: at most {most} are fitted together.")
     return paths
 
 
-def _folder_of(folder: JobFolder, path: str) -> JobFolder:
-    folder.file(f"{path}/request.json", what=f"{WHERE}: more_pictures")
+def _check_targets(request: Request) -> None:
+    """Refuse materials that cannot be fitted together.
+
+    Raises
+    ------
+    BadInputError
+        If there are several pictures, too, one is named twice, or their scenes differ.
+    """
+    if request.targets and request.more_pictures:
+        raise BadInputError(
+            "Several pictures and several materials are not fitted together: leave all pictures but one out, or all "
+            "materials but one."
+        )
+    known: set[str] = set()
+    for _, each in request.targets:
+        if not {each.target.shape_id, each.target.bsdf_id}.isdisjoint(known):
+            name = each.target.material or each.target.bsdf_id
+            raise BadInputError(f"{WHERE}: targets name the material {name!r} twice: name it once.")
+        known |= {each.target.shape_id, each.target.bsdf_id}
+        if (each.width, each.height) != (request.width, request.height):
+            raise BadInputError(f"{WHERE}: targets has a picture of another size: all materials share one.")
+
+
+def _folder_of(folder: JobFolder, path: str, key: str) -> JobFolder:
+    folder.file(f"{path}/request.json", what=f"{WHERE}: {key}")
     return JobFolder.open(folder.root / path)
 
 
@@ -280,7 +313,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "notes": list(request.notes),
         "left_out": list(request.left_out),
         **({"picture": asdict(request.picture)} if request.picture != Picture() else {}),
-        **({"more_pictures": [path for path, _ in request.more_pictures]} if request.more_pictures else {}),
+        **{key: [path for path, _ in found] for key in _MOST_OF if (found := getattr(request, key))},
     }
 
 
@@ -364,15 +397,3 @@ def _fit(data: Any) -> FitSettings:
     if not isinstance(data, Mapping):
         raise BadInputError(f"{WHERE}: fit is {shown(data)}: it must be a JSON object.")
     return FitSettings.from_request(data)
-
-
-def _light_paths(data: Any) -> LightPaths | None:
-    if data is None:
-        return None
-    counts = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
-    paths = CheckedObject(data, f"{WHERE}: light_paths", ("filter_glossy", "clamp_indirect", *counts))
-    return LightPaths(
-        paths.number("filter_glossy", 0.0, 1e4, 0.0),
-        paths.number("clamp_indirect", 0.0, 1e12, 0.0),
-        *(paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts),
-    )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The object `view` of request.json: what a display picture was seen through."""
+"""The objects `view` and `light_paths` of request.json: what a display picture was seen through, and indirect light."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...metrics.display.tone_mapping import DisplayView
+from ...types.light_paths import NO_LIMIT, LightPaths
 from .checked_object import CheckedObject
 
 
@@ -40,4 +41,17 @@ def table_from_json(data: Any, where: str) -> ViewTable | None:
         size=table.integer("size", 3, 128),
         log2_min=table.number("log2_min", -64.0, 64.0),
         log2_max=table.number("log2_max", -64.0, 64.0),
+    )
+
+
+def light_paths_from_json(data: Any, where: str) -> LightPaths | None:
+    """What is done to indirect light; None without it."""
+    if data is None:
+        return None
+    counts = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+    paths = CheckedObject(data, f"{where}: light_paths", ("filter_glossy", "clamp_indirect", *counts))
+    return LightPaths(
+        paths.number("filter_glossy", 0.0, 1e4, 0.0),
+        paths.number("clamp_indirect", 0.0, 1e12, 0.0),
+        *(paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts),
     )

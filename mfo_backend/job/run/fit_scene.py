@@ -5,26 +5,25 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ...metrics.display.tone_mapping import View
 from ...render.models.graph_pictures import GraphPictures
 from ...render.sheet.contact_sheet import ContactSheet
 from ...types.errors import BadInputError
 from ...types.event import Event, Listener, Preview
-from ...types.image import Image, Pixels
+from ...types.image import Image
 from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
-from ..folder.graph_files import locate_files
 from ..folder.job_folder import JobFolder
-from ..folder.request import Request, request_to_json
+from ..folder.request import Request
 from .class_trials import Fitted, with_other_classes, with_plainer_glow
+from .fit_materials import fit_materials
 from .graph_blender import evaluated_graph
+from .job_outcome import JobOutcome
+from .job_scene import graph_notes, load_native_code, named, request_materials
 from .material_classes import (
     MaterialClass,
     brightest_glow,
@@ -50,51 +49,6 @@ _WITHOUT_LIGHT_PATHS = (
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "
     "limits for one kind of bounce."
 )
-_GRAPH_AVERAGES = (
-    "The model 'mitsuba_principled' takes the averages of what nodes give ({names}), and leaves their normals out."
-)
-_GRAPH_UNSEEN = (
-    "What nodes give ({names}) is known where a ray of the camera meets the target, behind each other up to {depths} "
-    "times: what other things hide has the averages."
-)
-_GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
-
-
-@dataclass(frozen=True)
-class SeenPicture:
-    """What a fit has made of one picture: scene-linear at start and end, and which pixels count."""
-
-    start: Pixels
-    result: Pixels
-    counted: NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class JobOutcome:
-    """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them.
-
-    Errors are those of the `counted` pixels, True (height, width). With a `sheet` all of them are over that.
-    """
-
-    result: FitResult
-    start_image: Pixels
-    result_image: Pixels
-    counted: NDArray[np.bool_]
-    variant: str = ""
-    sheet: ContactSheet | None = None
-
-    @property
-    def seen(self) -> tuple[SeenPicture, ...]:
-        """What the fit has made of each of its pictures."""
-        sheet = self.sheet
-        if sheet is None:
-            return (SeenPicture(self.start_image, self.result_image, self.counted),)
-        return tuple(
-            SeenPicture(
-                sheet.picture(self.start_image, n), sheet.picture(self.result_image, n), sheet.cut(self.counted, n)
-            )
-            for n in range(len(sheet))
-        )
 
 
 class Fitter(Protocol):
@@ -140,6 +94,8 @@ def fit_scene(
     Interrupted
         If it was asked to stop before there was anything to keep.
     """
+    if request.targets:
+        return fit_materials(folder, request, reference, view, listener=listener, should_stop=should_stop)
     pictures = [JobPicture(folder, request, reference, view), *more]
     with evaluated_graph(folder, request, () if more else blender) as (graph, notes):
         return _fit_scene(pictures, graph, notes, listener, should_stop)
@@ -249,7 +205,7 @@ def _fit_scene(
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    result = replace(result, notes=(*notes, *result.notes, *_graph_notes(request, result)), **_named(request))
+    result = replace(result, notes=(*notes, *result.notes, *graph_notes(request, result)), **named(request))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
 
 
@@ -285,55 +241,3 @@ def load_everything() -> None:
     for module in _OF_EVERY_FIT:
         importlib.import_module(module, __package__)
     warm_up()
-
-
-def load_native_code() -> str:
-    """Import Mitsuba and choose its variant; returns the variant's name.
-
-    Raises
-    ------
-    SetupError
-        If Mitsuba or LLVM is missing.
-    """
-    from ...render.machine.llvm import configure_llvm, needs_llvm
-
-    if needs_llvm():
-        configure_llvm()  # before the first import of drjit, so the imports below stay here
-    from ...render.machine.variant import load_variant
-
-    return load_variant()
-
-
-def _named(request: Request) -> dict[str, Any]:
-    """What the fitted shader and its values are called, where they are not those of a plain Principled BSDF."""
-    material = request.materials.get(request.target.bsdf_id)
-    if material is None or not (request.target.labels or material.leaves):
-        return {}
-    return {"shader": "/".join(request.target.node), "labels": dict(request.target.labels)}
-
-
-def _graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
-    """What is not held of the values that nodes give the target, in sentences."""
-    material = request.materials.get(request.target.bsdf_id)
-    held = [name for name, socket in material.all_sockets if socket.graph] if material is not None else []
-    if not held:
-        return ()
-    names = ", ".join(held)
-    if result.model == "mitsuba_principled":
-        return (_GRAPH_AVERAGES.format(names=names),)
-    if not any("whole light paths" in note for note in result.notes):
-        return ()
-    flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
-    return (_GRAPH_UNSEEN.format(names=names, depths=1 if request.graph is None else request.graph.depths), *flat)
-
-
-def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
-    """The request's materials with textures by absolute path, the Blender version and the film's exposure."""
-    materials = request_to_json(request)["materials"]
-    for material in materials.values():
-        material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
-        material["film_exposure"] = request.film_exposure
-        for leaf in (material, *material["leaves"]):
-            for name, socket in (*leaf["sockets"].items(), ("weight", leaf["weight"])):
-                locate_files(folder, request.graph, name, socket)
-    return materials

@@ -9,7 +9,8 @@ from ...scene.image_file import read_image
 from ...types.errors import BadInputError
 from ...types.image import Encoding, Image
 from ..folder.job_folder import JobFolder
-from ..folder.request import Request, ViewTable
+from ..folder.request import Request
+from ..folder.view_request import ViewTable
 
 
 def view_of(folder: JobFolder, request: Request, reference: Image) -> View:

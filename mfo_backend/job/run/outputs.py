@@ -17,10 +17,11 @@ from ...report.picture import displayed, displayed_linear, mask_png, png_bytes
 from ...scene.image_file import write_exr
 from ...types.image import Encoding, Image
 from ..folder.atomic_file import write_atomically
+from ..folder.job_folder import JobFolder
 from ..folder.request import Request
 from ..output.progress import DIFFERENCE_PATH, PREVIEW_PATH
 from ..output.result import result_to_json, versions, write_result
-from .fit_scene import JobOutcome, SeenPicture
+from .job_outcome import JobOutcome, SeenPicture
 from .more_pictures import JobPicture
 
 
@@ -30,6 +31,8 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
     `pictures` are those of the job, the first with the folder of the report and the result; each one's own are written
     into its folder.
 
+    Of several materials each has all of this in its own folder first.
+
     Raises
     ------
     OSError, BadInputError
@@ -37,6 +40,9 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
     """
     first = pictures[0]
     folder, request = first.folder, first.request
+    places = [(JobFolder.open(folder.root / path), each) for path, each in request.targets]
+    for (place, each), own in zip(places, outcome.materials, strict=True):
+        write_outputs([JobPicture(place, each, first.reference, first.view)], own, notes=notes)
     shown = [_write_pictures(picture, seen) for picture, seen in zip(pictures, outcome.seen, strict=False)]
     curve = curve_png(outcome.result.stages)
     if curve is not None:
@@ -51,6 +57,10 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
         else {},
         notes=(*notes, *outcome.result.notes),
         versions=versions(outcome.variant),
+        materials={
+            _title(each): (path, own.result)
+            for (path, each), own in zip(request.targets, outcome.materials, strict=True)
+        },
     )
     write_atomically(folder.report, report_html(report).encode("utf-8"))
     content = result_to_json(outcome.result, notes=notes, variant=outcome.variant)
@@ -59,6 +69,13 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
             {**asdict(p.request.picture), "folder": p.folder.root.relative_to(folder.root).as_posix(), **found}
             for p, found in zip(pictures, content["pictures"], strict=True)
         ]
+    if outcome.materials:
+        content["verdict_sentence"] = outcome.result.message
+        content["materials"] = [
+            {"object": each.target.object, "material": each.target.material, "slot": each.target.slot, "folder": path,
+             **result_to_json(own.result, variant=outcome.variant)}
+            for (path, each), own in zip(request.targets, outcome.materials, strict=True)
+        ]  # fmt: skip
     write_result(folder, content)
     for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
         (folder.root / path).unlink(missing_ok=True)
@@ -97,6 +114,8 @@ def bytes_needed(request: Request) -> int:
 
 
 def _title(request: Request) -> str:
+    if request.targets:
+        return f"{len(request.targets)} materials"
     target = request.target
     material = target.material or target.bsdf_id or target.shape_id
     return f"{material} on {target.object}" if target.object else material

@@ -31,10 +31,20 @@ SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
 
 
+Opened = tuple[Target, ParameterTable, NDArray[np.float64]]  # a target, what is free of it, and the values in the scene
+
+
 def prepare_blender_principled(
     scene: Element, target: Target, selection: str | Sequence[str], materials: Materials
 ) -> PreparedMaterial:
-    """Replace every BSDF that `materials` describes by sockets, wrappers included; the target's opens `selection`.
+    """`prepare_several_blender_principled` of one target."""
+    return prepare_several_blender_principled(scene, [(target, selection)], materials)[0]
+
+
+def prepare_several_blender_principled(
+    scene: Element, targets: Sequence[tuple[Target, str | Sequence[str]]], materials: Materials
+) -> list[PreparedMaterial]:
+    """Replace every BSDF that `materials` describes by sockets, wrappers included; each target's opens its selection.
 
     Entries of `materials` are those of request.json; `blender_version` and `film_exposure` may be added to each, and
     the `texture` of a socket is an absolute path.
@@ -42,8 +52,23 @@ def prepare_blender_principled(
     Raises
     ------
     BadInputError
-        If the sockets of the target are not given, or a parameter cannot be fitted.
+        If the sockets of a target are not given, or a parameter cannot be fitted.
     """
+    opened = {target.bsdf_id: _opened(target, selection, materials) for target, selection in targets}
+    textures = _textures(scene)
+    # a light Cycles does not sample: directions no microfacet of rough glass leads to do not count there
+    uniform = {emitter.get("type") for emitter in scene.iter("emitter")} == {"constant"}
+    for bsdf in scene.findall("bsdf"):
+        bsdf_id = bsdf.get("id", "")
+        if bsdf_id in materials:
+            table = opened[bsdf_id][1] if bsdf_id in opened else None
+            start = {} if table is None else table.unpack(opened[bsdf_id][2])
+            _put_material(scene, bsdf, materials[bsdf_id], start, textures, unreachable_refraction=not uniform)
+    return [_prepared(scene, *found, materials[bsdf_id]) for bsdf_id, found in opened.items()]
+
+
+def _opened(target: Target, selection: str | Sequence[str], materials: Materials) -> Opened:
+    """What a selection opens of a target, and its values in the scene, moved into the bounds."""
     if target.bsdf_id not in materials:
         known = ", ".join(map(repr, materials)) or "none"
         raise BadInputError(
@@ -57,43 +82,56 @@ def prepare_blender_principled(
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
     table = ParameterTable(()) if chosen is None else chosen
-    start, mix = table.clip(table.pack(_constants(sockets))), mix_values(materials[target.bsdf_id])
-    opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in table.unpack(start).items()}
-    textures = _textures(scene)
-    # a light Cycles does not sample: directions no microfacet of rough glass leads to do not count there
-    uniform = {emitter.get("type") for emitter in scene.iter("emitter")} == {"constant"}
-    for bsdf in scene.findall("bsdf"):
-        bsdf_id = bsdf.get("id", "")
-        if bsdf_id not in materials:
-            continue
-        free = [name for name in table.names if name != EMISSION] if bsdf_id == target.bsdf_id else ()
-        described = dict(materials[bsdf_id]["sockets"]) | (opened if free else {})
-        material, version = materials[bsdf_id], materials[bsdf_id].get("blender_version", _VERSION)
-        properties = blender_principled_dict(
-            described,
-            distribution=material.get("distribution", "MULTI_GGX"),
-            version=version,
-            free=free,
-            unreachable_refraction=not uniform,
-            shader=material.get("shader", "principled"),
+    start = table.clip(table.pack(_constants(sockets)))
+    return target, table, start
+
+
+def _put_material(
+    scene: Element,
+    bsdf: Element,
+    material: Mapping[str, Any],
+    start: Mapping[str, Value],
+    textures: Mapping[str, Element],
+    *,
+    unreachable_refraction: bool,
+) -> None:
+    """Make a BSDF the plugin of a material; what has a `start` is open to change."""
+    bsdf_id, version = bsdf.get("id", ""), material.get("blender_version", _VERSION)
+    free = [name for name in start if name != EMISSION]
+    opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in start.items()}
+    properties = blender_principled_dict(
+        dict(material["sockets"]) | (opened if free else {}),
+        distribution=material.get("distribution", "MULTI_GGX"),
+        version=version,
+        free=free,
+        unreachable_refraction=unreachable_refraction,
+        shader=material.get("shader", "principled"),
+    )
+    if is_mixed(material):
+        properties = closure_tree_dict(
+            material, properties, version=version, unreachable_refraction=unreachable_refraction
         )
-        if is_mixed(material):
-            properties = closure_tree_dict(material, properties, version=version, unreachable_refraction=not uniform)
-        _rewrite(bsdf, properties, textures)
-        bsdf.set("id", bsdf_id)
-        radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))
-        if radiance is not None and free and EMISSION in table.names:
-            raise BadInputError(
-                "The emission of a mix, and one that nodes give, is held: leave emission_color out of the parameters."
-            )
-        if radiance is not None:
-            _replace_radiance(scene, bsdf_id, radiance, textures)
-    outer = target.outer
-    of_fitted = "fitted." if is_mixed(materials[target.bsdf_id]) else ""
+    _rewrite(bsdf, properties, textures)
+    bsdf.set("id", bsdf_id)
+    radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))
+    if radiance is not None and free and EMISSION in start:
+        raise BadInputError(
+            "The emission of a mix, and one that nodes give, is held: leave emission_color out of the parameters."
+        )
+    if radiance is not None:
+        _replace_radiance(scene, bsdf_id, radiance, textures)
+
+
+def _prepared(
+    scene: Element, target: Target, table: ParameterTable, start: NDArray[np.float64], material: Mapping[str, Any]
+) -> PreparedMaterial:
+    """What the renderer is told of a target whose BSDF has been put."""
+    outer, mix = target.outer, mix_values(material)
+    of_fitted = "fitted." if is_mixed(material) else ""
     key_ends, factors = {name: f"{of_fitted}{name}" for name in table.names}, {}
     if EMISSION in table.names:
-        strength = float(np.ravel(_constants(sockets)["emission_strength"])[0])
-        factors[EMISSION] = strength * materials[target.bsdf_id].get("film_exposure", 1.0)
+        strength = float(np.ravel(_constants(material["sockets"])["emission_strength"])[0])
+        factors[EMISSION] = strength * material.get("film_exposure", 1.0)
         key_ends[EMISSION] = RADIANCE_KEY
         _open_emission(scene, target.shape_id, factors[EMISSION] * start[table.slice_of(EMISSION)])
     if mix is not None:

@@ -21,6 +21,7 @@ from ...types.light_paths import LightPaths
 from ...types.parameter import ParameterTable, Vector
 from ..machine.plugins import check_plugins
 from ..machine.variant import load_variant
+from ..models.blender_model import prepare_several_blender_principled
 from ..models.graph_pictures import GraphPictures
 from ..models.material_model import material_model
 from ..models.prepared_material import RADIANCE_KEY, Materials, PreparedMaterial
@@ -253,6 +254,33 @@ def load_mitsuba_renderer(
     material = prepare(document, target, parameters, materials)
     # only Blender's model knows how to blur its lobes
     light_paths = light_paths if model == "blender_principled" else None
+    scene, light_paths = _loaded(document, scene_xml, light_paths)
+    return MitsubaRenderer(model, material, scene, light_paths, graph)
+
+
+def load_renderers_together(
+    scene_xml: Path,
+    targets: Sequence[tuple[str, str | Sequence[str]]],
+    *,
+    materials: Materials,
+    light_paths: LightPaths | None = None,
+) -> list[MitsubaRenderer]:
+    """One loaded scene with the materials of several shapes open to change, each with its parameters, as renderers.
+
+    Each changes its own material: the pictures of all of them show what every other one has shown last. The model is
+    Blender's. Errors are those of `renderer.load_renderer`.
+    """
+    document = read_scene(scene_xml)
+    found = [(find_target(document, shape_id), parameters) for shape_id, parameters in targets]
+    check_plugins(document, scene_xml.name)
+    prepare_for_fit(document)
+    prepared = prepare_several_blender_principled(document, found, materials)
+    scene, light_paths = _loaded(document, scene_xml, light_paths)
+    return [MitsubaRenderer("blender_principled", material, scene, light_paths) for material in prepared]
+
+
+def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) -> tuple[Any, LightPaths | None]:
+    """The scene of a prepared document, and what is done to its indirect light."""
     load_variant()
     _forget_scenes_before()
     import mitsuba as mi
@@ -280,7 +308,7 @@ def load_mitsuba_renderer(
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
-    return MitsubaRenderer(model, material, scene, light_paths, graph)
+    return scene, light_paths
 
 
 def _camera_world(document: Element) -> Element | None:

@@ -45,7 +45,7 @@ def test_names_that_look_like_options_reach_blender_as_names(monkeypatch: pytest
             said.append(_parser().parse_args(list(map(str, words))))
             raise MfoError("enough")
 
-    names = {"object_name": "-o\nnew $HOME", "reference": Path("--ref.png"), "job": tmp_path / "-job"}
+    names = {"target": "-o\nnew $HOME", "reference": Path("--ref.png"), "job": tmp_path / "-job"}
     with pytest.raises(MfoError, match="enough"):
         blend.fit_blend(Host(), Path("a.blend"), **names, fit={}, will_apply=True)  # type: ignore[arg-type]
     with pytest.raises(MfoError, match="enough"):

@@ -14,7 +14,7 @@ bpy = pytest.importorskip("bpy")
 
 from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
-from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
+from mfo_backend.job.run.job_scene import request_materials  # noqa: E402
 
 from ..scenes import new_material  # noqa: E402
 from .test_node_graphs import ball, bump, lit_scene, noise_ramp, principled  # noqa: E402

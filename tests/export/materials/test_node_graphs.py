@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy")
 from blender_addon.probe.client import PREFIX  # noqa: E402
 from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
-from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
+from mfo_backend.job.run.job_scene import request_materials  # noqa: E402
 
 from ..scenes import add_camera, add_light, new_material  # noqa: E402
 

@@ -38,7 +38,7 @@ def coarse_ball(scene: Any, geometry_offset: float, shading_offset: float, **soc
 def our_renderer(report: Any) -> Any:
     from mfo_backend.job.folder.job_folder import JobFolder
     from mfo_backend.job.folder.request import read_request
-    from mfo_backend.job.run.fit_scene import request_materials
+    from mfo_backend.job.run.job_scene import request_materials
     from mfo_backend.render.pictures.renderer import load_renderer
 
     folder = JobFolder.open(report.folder)

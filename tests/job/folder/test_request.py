@@ -13,7 +13,8 @@ import pytest
 
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.job.folder.job_folder import JobFolder
-from mfo_backend.job.folder.request import ViewTable, read_request, request_from_json, request_to_json
+from mfo_backend.job.folder.request import read_request, request_from_json, request_to_json
+from mfo_backend.job.folder.view_request import ViewTable
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding

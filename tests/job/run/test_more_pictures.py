@@ -70,7 +70,7 @@ def test_wrong_lists_are_refused(two: Path, keys: dict[str, object], sentence: s
 
 def test_a_further_picture_has_no_further_ones(two: Path) -> None:
     change(two / "more_pictures" / "2", more_pictures=["meshes"])
-    with pytest.raises(BadInputError, match="name all in the first picture's"):
+    with pytest.raises(BadInputError, match="name all in the first one's"):
         read_request(JobFolder.open(two))
 
 

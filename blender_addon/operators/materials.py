@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several materials at once: `mfo.list_materials`, `mfo.clear_materials` and `mfo.show_material`."""
+
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
+import bpy
+from bpy.props import IntProperty
+
+from ..export.fitted_slot import FittedSlot
+from ..export.scene.seen_slots import seen_slots
+from ..result import shown_result
+from ..running import running_job
+
+
+def ticked_slots(scene: bpy.types.Scene) -> list[FittedSlot]:
+    """The slots of the list that are to be fitted together, as far as they are still there."""
+    found = []
+    for entry in scene.mfo.targets:
+        obj = entry.object
+        if not entry.use or obj is None or scene.objects.get(obj.name) is not obj:
+            continue
+        slots = [n for n, slot in enumerate(obj.material_slots) if slot.material is not None]
+        same = [n for n in slots if obj.material_slots[n].material == entry.material]
+        # the material may have moved to another slot since
+        slot = entry.slot if entry.slot in same else next(iter(same), None)
+        if slot is not None:
+            found.append(FittedSlot(obj, slot))
+    return found
+
+
+class MFO_OT_list_materials(bpy.types.Operator):
+    """List the materials that the camera sees, to fit several of them together"""
+
+    bl_idname = "mfo.list_materials"
+    bl_label = "Fit Several Materials"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Make the list anew; what was unticked stays so."""
+        entries = context.scene.mfo.targets
+        slots = seen_slots(context)
+        if not slots:
+            self.report({"ERROR"}, "The camera sees no material with a Principled BSDF: set the scene's camera up.")
+            return {"CANCELLED"}
+        off = {entry.material for entry in entries if not entry.use}
+        entries.clear()
+        for each in slots:
+            entry = entries.add()
+            entry.object, entry.slot, entry.material = each.object, each.slot, each.material
+            entry.use = each.material not in off
+        running_job.redraw()
+        return {"FINISHED"}
+
+
+class MFO_OT_clear_materials(bpy.types.Operator):
+    """Fit the material of the active object alone again"""
+
+    bl_idname = "mfo.clear_materials"
+    bl_label = "Fit One Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Empty the list."""
+        context.scene.mfo.targets.clear()
+        running_job.redraw()
+        return {"FINISHED"}
+
+
+class MFO_OT_show_material(bpy.types.Operator):
+    """Show the values and pictures of this one of the materials that were fitted together"""
+
+    bl_idname = "mfo.show_material"
+    bl_label = "Show Result of Material"
+    bl_options = {"REGISTER", "INTERNAL"}
+
+    index: IntProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Show it; the others stay to be applied with it."""
+        if not 0 <= self.index < len(shown_result.together):
+            self.report({"ERROR"}, "There is no such result any more: run the fit again.")
+            return {"CANCELLED"}
+        shown_result.show_one(self.index)
+        running_job.redraw()
+        return {"FINISHED"}
+
+
+CLASSES = (MFO_OT_list_materials, MFO_OT_clear_materials, MFO_OT_show_material)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Base colours that make every target as bright as in the picture, so that the light between them is about right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...types.image import Pixels
+
+COLOR = "base_color"
+# Pictures, each of which scales all colours at once. The light between the walls of a room halves its error with each.
+STEPS = 4
+SAMPLES = 8  # of a pixel: only means over targets are looked at
+MOST = 4.0  # times a colour may grow or shrink in one step; a target in a mirror or a shadow says little of its own
+DIM = 1e-4  # of the brightest target: below, a ratio is noise
+
+
+def evened_light(
+    renderers: Sequence[MitsubaRenderer], masks: Sequence[NDArray[np.bool_]], light: Pixels, seed: int
+) -> list[NDArray[np.float64]]:
+    """Vectors whose targets have the mean radiance of the picture `light` (height, width, 3); the scene shows them.
+
+    All but the base colours is as in the scene. The values are no estimate of a material: they make up for whatever
+    else differs, and serve as the surroundings of the others' first fits alone.
+    """
+    present = [renderer.start.copy() for renderer in renderers]
+    wanted = [light[mask].mean(axis=0, dtype=np.float64) for mask in masks]
+    dim = DIM * max(float(mean.max()) for mean in wanted)
+    for _ in range(STEPS):
+        for renderer, vector in zip(renderers, present, strict=True):
+            renderer.show(vector)
+        image = renderers[0].image(present[0], seed=seed, spp=SAMPLES)
+        for renderer, vector, mask, mean in zip(renderers, present, masks, wanted, strict=True):
+            if COLOR not in renderer.table.names:
+                continue
+            shown = image[mask].mean(axis=0, dtype=np.float64)
+            entries = renderer.table.slice_of(COLOR)
+            vector[entries] *= np.clip((mean + dim) / (shown + dim), 1.0 / MOST, MOST)
+            vector[:] = renderer.table.clip(vector)
+    for renderer, vector in zip(renderers, present, strict=True):
+        renderer.show(vector)
+    return present

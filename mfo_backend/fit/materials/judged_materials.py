@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One verdict for each of several materials, on one picture that shows all of them as they ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...metrics.display.tone_mapping import View
+from ...types.event import Listener
+from ...types.image import Image, Pixels
+from ...types.result import FitResult
+from ...types.status import Status
+from ..judge.fit_task import FitTask, check_task
+from ..judge.judged_result import judged_result
+from ..judge.model_gap import model_gap
+from ..judge.picture_errors import picture_errors
+from ..random_streams import Stream
+from ..result.outcome import FitOutcome
+from .rounds import MOST_ROUNDS, Member, Turns, check_members, show_all, take_turns
+
+# Paths of the picture that is judged, and samples of a pixel at least: as `judge.verification` takes of a whole one
+MOST_PATHS, LEAST_SAMPLES = 1 << 21, 4
+START_SAMPLES = 8
+NOT_STILL = (
+    "The light between the materials still moved after {rounds} rounds: fit again from the applied values, or fit "
+    "fewer at once."
+)
+OTHERS_HELD = "How sure a value is holds with the other materials as they were found."
+
+
+@dataclass(frozen=True)
+class Together:
+    """What became of each material, in their order, and after how many rounds."""
+
+    outcomes: tuple[FitOutcome, ...]
+    rounds: int
+
+
+def fit_together(
+    members: Sequence[Member],
+    reference: Image,
+    *,
+    display: View | None,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+    noted: bool = False,
+    begin: Callable[[], object] = lambda: None,
+) -> Together:
+    """Recover several materials of one loaded scene from a picture; `noted` and `display` are as of `recover_material`.
+
+    Each result has a verdict on its own pixels of a picture with all materials as found, beside one with all as they
+    were. A material that looks worse there than before goes back to what it was. `begin` is called when nothing speaks
+    against the fit any more.
+
+    Raises
+    ------
+    BadInputError
+        If they cannot be fitted together, or a picture does not show one of them.
+    UnrecordableError
+        If one of the materials cannot be fitted.
+    Interrupted
+        If it was asked to stop before every material had been fitted once.
+    """
+    check_members(members, reference)
+    tasks = [
+        check_task(member.renderer, reference, member.settings, display, listener, should_stop) for member in members
+    ]
+    begin()
+    turns = take_turns(
+        members, reference, tasks[0].light, display=display, listener=listener, should_stop=should_stop
+    )  # fmt: skip
+    starts = [member.renderer.start for member in members]
+    start = np.mean(_halves(members, starts, START_SAMPLES), axis=0, dtype=np.float32)
+    judged, halves = _judged_all(members, tasks, turns, start, turns.present, noted=noted)
+    back = [_is_back(result, before.result) for result, before in zip(judged, turns.outcomes, strict=True)]
+    if any(back) and not all(back):  # the others are judged beside what they stand beside now
+        kept = [s if gone else x for s, x, gone in zip(starts, turns.present, back, strict=True)]
+        again, halves = _judged_all(members, tasks, turns, start, kept, noted=noted)
+        judged = [first if gone else new for first, new, gone in zip(judged, again, back, strict=True)]
+    end = np.mean(halves, axis=0, dtype=np.float32)
+    stopped = should_stop()
+    said = () if turns.still or stopped else (NOT_STILL.format(rounds=MOST_ROUNDS),)
+    outcomes = []
+    for result, task in zip(judged, tasks, strict=True):
+        gap = None if stopped else model_gap(reference, halves, task.mask, task.view)
+        of_gap = (gap.sentence,) if gap is not None and gap.sentence else ()
+        notes = (*result.notes, OTHERS_HELD, *said, *of_gap)
+        result = replace(result, model_gap=gap, notes=notes)
+        if stopped:
+            result = replace(result, status=Status.CANCELLED, message=Status.CANCELLED.sentence)
+        outcomes.append(FitOutcome(result, start, end, task.counted, halves))
+    return Together(tuple(outcomes), turns.rounds)
+
+
+def _judged_all(
+    members: Sequence[Member],
+    tasks: Sequence[FitTask],
+    turns: Turns,
+    start: Pixels,
+    vectors: Sequence[np.ndarray],
+    *,
+    noted: bool,
+) -> tuple[list[FitResult], tuple[Pixels, Pixels]]:
+    """The results by a picture of all these vectors, and its halves."""
+    halves = _halves(members, vectors, members[0].settings.verify_spp)
+    end = np.mean(halves, axis=0, dtype=np.float32)
+    fitted = np.any([task.mask for task in tasks], axis=0)
+    judged = []
+    for task, outcome in zip(tasks, turns.outcomes, strict=True):
+        errors = picture_errors(task.reference, start, end, task.mask, task.counted, task.display)
+        result = replace(outcome.result, errors=errors)
+        judged.append(
+            judged_result(result, task.reference, start, end, task.mask, task.view, noted=noted, others=fitted)[0]
+        )
+    return judged, halves
+
+
+def _halves(members: Sequence[Member], vectors: Sequence[np.ndarray], most: int) -> tuple[Pixels, Pixels]:
+    """Two pictures of all materials with these values, without common random numbers."""
+    show_all(members, vectors)
+    renderer, settings = members[0].renderer, members[0].settings
+    pixels = renderer.target_mask().size
+    samples = max(min(most, MOST_PATHS // pixels), LEAST_SAMPLES) // 2
+    seeds = [Stream.GAP.seed(settings.seed, half) for half in (0, 1)]
+    first, second = (renderer.image(vectors[0], seed=seed, spp=samples) for seed in seeds)
+    return first, second
+
+
+def _is_back(judged: FitResult, before: FitResult) -> bool:
+    """Whether a verdict has put the user's values back."""
+    return judged.recovered != before.recovered and judged.recovered == judged.initial

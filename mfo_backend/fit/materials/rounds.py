@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several materials of one scene, fitted in turns until the light that they give each other holds still."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...metrics.display.tone_mapping import View
+from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.pictures.renderer import Interrupted
+from ...types.errors import BadInputError, UnrecordableError
+from ...types.event import Listener
+from ...types.image import Image, Pixels
+from ...types.status import Status
+from ..judge.checked_reference import check_reference
+from ..random_streams import Stream
+from ..recover_material import recover_material
+from ..result.outcome import FitOutcome
+from ..settings import FitSettings
+from .evened_light import evened_light
+from .whole_course import WholeCourse
+
+MOST_VALUES = 120  # free values of all materials together: about six with all that one picture may show
+# After the first one, which searches, and the second, which has the preset's plan. In ten rooms of six materials
+# (docs/notebook/several_materials.md) the light held still after at most so many.
+MOST_ROUNDS = 4
+# Mean change of a target's pixels, relative to their mean, above which it is fitted again. Ten rooms: half of it is
+# seen as a FLIP of 0.002, the least that counts as visible. Smaller: more rounds. Larger: light that is not right.
+LIGHT_MOVED = 0.01
+LOOK_SAMPLES = 8  # of a pixel of the picture that says how far the light has moved; all have the same random numbers
+
+
+@dataclass(frozen=True)
+class Member:
+    """One of the materials: what a user calls it, its renderer and the settings of its fit."""
+
+    name: str
+    renderer: MitsubaRenderer
+    settings: FitSettings
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Where the turns have ended: each one's own last fit, not judged yet, its values, and how many rounds it took."""
+
+    outcomes: tuple[FitOutcome, ...]
+    present: tuple[NDArray[np.float64], ...]
+    rounds: int
+    still: bool
+
+
+def check_members(members: Sequence[Member], reference: Image) -> None:
+    """Refuse what cannot be fitted together.
+
+    Raises
+    ------
+    BadInputError
+        If there are too many values, the preset fits one material alone, or the camera does not see one of them.
+    """
+    counts = {member.name: member.renderer.table.length for member in members}
+    total = sum(counts.values())
+    if total > MOST_VALUES:
+        names, over = [], total - MOST_VALUES
+        for name, count in sorted(counts.items(), key=lambda pair: -pair[1]):
+            if over <= 0:
+                break
+            names, over = [*names, f"'{name}' ({count})"], over - count
+        raise BadInputError(
+            f"The {len(counts)} materials have {total} free values, and at most {MOST_VALUES} are fitted together: "
+            f"leave out {' and '.join(names)}, or choose fewer parameters."
+        )
+    if members[0].settings.preset == "paper":
+        raise BadInputError(
+            "The preset 'paper' fits one material alone: choose 'fast', 'balanced' or 'best' for several."
+        )
+    for member in members:
+        if not member.renderer.table.length:
+            raise BadInputError(f"Material '{member.name}' has no value that can be fitted: leave it out.")
+        try:
+            check_reference(reference, member.renderer.target_mask())
+        except BadInputError as error:
+            raise BadInputError(f"Material '{member.name}': {error}") from error
+
+
+def take_turns(
+    members: Sequence[Member],
+    reference: Image,
+    light: Pixels,
+    *,
+    display: View | None,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> Turns:
+    """Fit each material in the light that the others give with their newest values, until that holds still.
+
+    The first round searches from nothing, quickly; the second goes on from there with the preset's plan, and those
+    after it fit again what sees other light than at its own last fit. `light` is the reference as scene-linear
+    radiance.
+
+    Raises
+    ------
+    UnrecordableError
+        If one of the materials cannot be fitted, with its name.
+    Interrupted
+        If it was asked to stop before every material had been fitted once.
+    """
+    seed = members[0].settings.seed
+    masks = [check_reference(reference, member.renderer.target_mask()) for member in members]
+    present = evened_light([member.renderer for member in members], masks, light, Stream.TOGETHER.seed(seed))
+    course = WholeCourse([member.name for member in members], listener)
+    outcomes: list[FitOutcome | None] = [None for _ in members]
+    seen: list[Pixels | None] = [None for _ in members]
+    order = sorted(range(len(members)), key=lambda k: -int(masks[k].sum()))  # what lights the others most comes first
+    number, still = 0, False
+    while not (still or number == MOST_ROUNDS or should_stop()):
+        number += 1
+        still = number > 2
+        for k in order:
+            if should_stop():
+                still = False
+                break
+            if number > 2 and _moved(_look(members, present, seed), seen[k], masks[k]) <= LIGHT_MOVED:
+                continue
+            still = False
+            member = members[k]
+            quick = replace(member.settings, preset="fast", verify_spp=LOOK_SAMPLES, losses=None)
+            try:
+                outcome = recover_material(
+                    member.renderer, reference, quick if number == 1 else member.settings, display=display,
+                    listener=course.of(k, number), should_stop=should_stop, hand_over=False,
+                    begin=None if number == 1 else present[k], judged=False,
+                )  # fmt: skip
+            except UnrecordableError as error:
+                raise UnrecordableError(f"Material '{member.name}' cannot be fitted with others: {error}") from error
+            if outcome.result.status is Status.CANCELLED and number > 1:
+                break  # the round before has said more
+            outcomes[k] = outcome
+            present[k] = member.renderer.table.pack(outcome.result.recovered)
+            seen[k] = _look(members, present, seed)
+    ended = [outcome for outcome in outcomes if outcome is not None]
+    if len(ended) < len(members):
+        raise Interrupted
+    return Turns(tuple(ended), tuple(present), number, still)
+
+
+def show_all(members: Sequence[Member], vectors: Sequence[NDArray[np.float64]]) -> None:
+    """Give every material these values."""
+    for member, vector in zip(members, vectors, strict=True):
+        member.renderer.show(vector)
+
+
+def _look(members: Sequence[Member], present: Sequence[NDArray[np.float64]], seed: int) -> Pixels:
+    """A picture of all materials as they are now."""
+    show_all(members, present)
+    return members[0].renderer.image(present[0], seed=Stream.TOGETHER.seed(seed), spp=LOOK_SAMPLES)
+
+
+def _moved(now: Pixels, before: Pixels | None, mask: NDArray[np.bool_]) -> float:
+    """Mean change of a target's pixels, relative to their mean."""
+    if before is None:
+        return np.inf
+    level = float(now[mask].mean(dtype=np.float64))
+    return float(np.abs(now[mask] - before[mask]).mean(dtype=np.float64)) / max(level, 1e-30)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the scene of a job is loaded with: native code and materials, and what is said of these."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...types.result import FitResult
+from ..folder.graph_files import locate_files
+from ..folder.job_folder import JobFolder
+from ..folder.request import Request, request_to_json
+
+_GRAPH_AVERAGES = (
+    "The model 'mitsuba_principled' takes the averages of what nodes give ({names}), and leaves their normals out."
+)
+_GRAPH_UNSEEN = (
+    "What nodes give ({names}) is known where a ray of the camera meets the target, behind each other up to {depths} "
+    "times: what other things hide has the averages."
+)
+_GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
+
+
+def load_native_code() -> str:
+    """Import Mitsuba and choose its variant; returns the variant's name.
+
+    Raises
+    ------
+    SetupError
+        If Mitsuba or LLVM is missing.
+    """
+    from ...render.machine.llvm import configure_llvm, needs_llvm
+
+    if needs_llvm():
+        configure_llvm()  # before the first import of drjit, so the imports below stay here
+    from ...render.machine.variant import load_variant
+
+    return load_variant()
+
+
+def named(request: Request) -> dict[str, Any]:
+    """What the fitted shader and its values are called, where they are not those of a plain Principled BSDF."""
+    material = request.materials.get(request.target.bsdf_id)
+    if material is None or not (request.target.labels or material.leaves):
+        return {}
+    return {"shader": "/".join(request.target.node), "labels": dict(request.target.labels)}
+
+
+def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """What is not held of the values that nodes give the target, in sentences."""
+    material = request.materials.get(request.target.bsdf_id)
+    held = [name for name, socket in material.all_sockets if socket.graph] if material is not None else []
+    if not held:
+        return ()
+    names = ", ".join(held)
+    if result.model == "mitsuba_principled":
+        return (_GRAPH_AVERAGES.format(names=names),)
+    if not any("whole light paths" in note for note in result.notes):
+        return ()
+    flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
+    return (_GRAPH_UNSEEN.format(names=names, depths=1 if request.graph is None else request.graph.depths), *flat)
+
+
+def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
+    """The request's materials with textures by absolute path, the Blender version and the film's exposure."""
+    materials = request_to_json(request)["materials"]
+    for material in materials.values():
+        material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
+        material["film_exposure"] = request.film_exposure
+        for leaf in (material, *material["leaves"]):
+            for name, socket in (*leaf["sockets"].items(), ("weight", leaf["weight"])):
+                locate_files(folder, request.graph, name, socket)
+    return materials

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rooms of `studies.materials`, run by a Python with `bpy`.
+
+    python -m studies.materials.scene build NUMBER FOLDER [--size PIXELS]
+    python -m studies.materials.scene render FILE PICTURE SEED [--samples COUNT]
+
+`build` writes truth.blend, start.blend and truth.json: a room of six materials, under a lamp in a shade and one or two
+others. `render` shows a file in Cycles.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import bpy
+from mathutils import Vector  # pyright: ignore[reportMissingImports]  # part of bpy
+
+OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
+
+
+def build(number: int, folder: Path, size: int) -> None:
+    """Write both files and the truth."""
+    folder.mkdir(parents=True, exist_ok=True)
+    draw = random.Random(number)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.view_settings.view_transform = "Standard"
+    _room()
+    _furniture(draw)
+    _lights(draw)
+    _camera()
+    inputs = {name: _material(scene.objects[name], name) for name in OBJECTS}
+    for name in OBJECTS:
+        for socket, value in _drawn_start(draw).items():
+            inputs[name][socket].default_value = value
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "start.blend"), copy=True)
+    truth = {name: _drawn_truth(name, draw) for name in OBJECTS}
+    for name, sockets in truth.items():
+        for socket, value in sockets.items():
+            inputs[name][socket].default_value = value
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "truth.blend"), copy=True)
+    (folder / "truth.json").write_text(json.dumps(truth), "utf-8")
+
+
+def render(file: Path, picture: Path, seed: int, samples: int) -> None:
+    """Render a file as it is."""
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # Blender 5.0
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    scene.cycles.seed, scene.cycles.samples = seed, samples
+    scene.render.filepath = str(picture)
+    bpy.ops.render.render(write_still=True)
+
+
+def _room() -> None:
+    """A floor and three walls, open to the camera."""
+    _mesh("Floor", [(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)], [(0, 1, 2, 3)])
+    corners = [(-3, -3), (-3, 3), (3, 3), (3, -3)]
+    points = [(x, y, z) for z in (0.0, 3.4) for x, y in corners]
+    _mesh("Walls", points, [(0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3)])
+
+
+def _furniture(draw: random.Random) -> None:
+    bpy.ops.mesh.primitive_cube_add(size=1.3, location=(-1.5, 0.9, 0.65), rotation=(0.0, 0.0, draw.uniform(0.2, 0.9)))
+    bpy.context.object.name = "Chest"
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.7, location=(0.4, -0.6, 0.7))
+    bpy.context.object.name = "Ball"
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=48, radius=0.5, location=(1.7, 0.4, 0.9))
+    bpy.context.object.scale = (0.9, 0.9, 1.8)
+    bpy.context.object.name = "Vase"
+    bpy.ops.mesh.primitive_cone_add(
+        vertices=64, radius1=0.75, radius2=0.35, depth=0.7, end_fill_type="NOTHING", location=(0.1, 1.3, 2.2)
+    )
+    bpy.context.object.name = "Shade"
+    for name in ("Ball", "Vase", "Shade"):
+        bpy.context.view_layer.objects.active = item = bpy.data.objects[name]
+        for polygon in item.data.polygons:
+            polygon.use_smooth = True
+
+
+def _lights(draw: random.Random) -> None:
+    world = bpy.context.scene.world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    level = draw.uniform(0.05, 0.3)
+    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (level, level, level, 1.0)
+    bulb = _light("Bulb", "POINT", draw.uniform(60.0, 140.0), (0.1, 1.3, 2.2))
+    bulb.data.shadow_soft_size = draw.uniform(0.08, 0.15)
+    lamp = _light("Lamp", "AREA", draw.uniform(150.0, 320.0), (draw.uniform(-2.0, 2.0), -2.4, 3.3))
+    lamp.data.size = draw.uniform(0.6, 1.6)
+    lamp.rotation_euler = (Vector((0.0, 0.3, 0.6)) - lamp.location).to_track_quat("-Z", "Y").to_euler()
+
+
+def _light(name: str, kind: str, energy: float, place: tuple[float, float, float]) -> bpy.types.Object:
+    data = bpy.data.lights.new(name, kind)
+    data.energy = energy
+    lamp = bpy.data.objects.new(name, data)
+    lamp.location = place
+    bpy.context.collection.objects.link(lamp)
+    return lamp
+
+
+def _camera() -> None:
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.data.lens = (0.0, -8.2, 2.5), 42.0
+    camera.rotation_euler = (Vector((0.0, 0.0, 1.35)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+
+
+def _drawn_start(draw: random.Random) -> dict[str, Any]:
+    level = draw.uniform(0.3, 0.8)
+    return {"Base Color": (level, level, level, 1.0), "Roughness": draw.uniform(0.3, 0.7)}
+
+
+def _drawn_truth(name: str, draw: random.Random) -> dict[str, Any]:
+    truth: dict[str, Any] = {
+        "Base Color": (*(draw.uniform(0.08, 0.85) for _ in range(3)), 1.0),
+        "Roughness": draw.uniform(0.2, 0.7),
+        "Specular IOR Level": draw.uniform(0.3, 0.7),
+    }
+    if name in ("Chest", "Ball", "Vase"):
+        truth["Metallic"] = draw.choice([0.0, 0.0, 1.0])
+        truth["Coat Weight"] = draw.choice([0.0, 0.0, draw.uniform(0.3, 0.9)])
+        truth["Sheen Weight"] = draw.choice([0.0, 0.0, draw.uniform(0.1, 0.5)])
+    return truth
+
+
+def _mesh(name: str, points: list[tuple[float, float, float]], faces: list[tuple[int, ...]]) -> None:
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points, [], faces)
+    bpy.context.collection.objects.link(bpy.data.objects.new(name, mesh))
+
+
+def _material(item: bpy.types.Object, name: str) -> bpy.types.NodeInputs:
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    item.data.materials.append(material)
+    return next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED").inputs
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers(dest="command", required=True)
+    one = commands.add_parser("build")
+    one.add_argument("number", type=int)
+    one.add_argument("folder", type=Path)
+    one.add_argument("--size", type=int, default=96)
+    one = commands.add_parser("render")
+    one.add_argument("file", type=Path)
+    one.add_argument("picture", type=Path)
+    one.add_argument("seed", type=int)
+    one.add_argument("--samples", type=int, default=256)
+    chosen = parser.parse_args()
+    if chosen.command == "build":
+        build(chosen.number, chosen.folder, chosen.size)
+    else:
+        render(chosen.file, chosen.picture, chosen.seed, chosen.samples)

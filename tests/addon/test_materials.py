@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several materials in the panel: the list, one fit, a verdict and a history for each, one step to apply."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from blender_addon.result import shown_result
+
+from .fake_backend import RECOVERED
+
+
+@pytest.fixture
+def two(scene: SimpleNamespace) -> SimpleNamespace:
+    """The cube on a floor, both listed."""
+    bpy = scene.bpy
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 0.0, -1.0))
+    floor = bpy.context.object
+    floor.name = "Floor"
+    floor.data.materials.append(bpy.data.materials["Glaze"].copy())
+    floor.active_material.name = "Wood"
+    bpy.context.scene.mfo.reference_path = scene.reference
+    assert bpy.ops.mfo.list_materials() == {"FINISHED"}
+    return scene
+
+
+def rough(scene: SimpleNamespace, name: str) -> float:
+    nodes = scene.bpy.data.materials[name].node_tree.nodes
+    return next(n for n in nodes if n.type == "BSDF_PRINCIPLED").inputs["Roughness"].default_value
+
+
+def test_the_list_holds_what_the_camera_sees_and_keeps_what_was_unticked(two: SimpleNamespace) -> None:
+    entries = two.bpy.context.scene.mfo.targets
+    assert [(e.material.name, e.object.name, e.use) for e in entries] == [
+        ("Wood", "Floor", True),
+        ("Glaze", "Väse", True),
+    ]
+    entries[0].use = False
+    two.bpy.ops.mfo.list_materials()
+    assert [e.use for e in entries] == [False, True]
+    two.bpy.ops.mfo.clear_materials()
+    assert not entries
+
+
+def test_both_are_fitted_shown_applied_and_kept(two: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    bpy, runtime = two.bpy, two.bpy.context.window_manager.mfo_runtime
+    before = rough(two, "Wood"), rough(two, "Glaze")
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    request = json.loads((Path(two.job) / "request.json").read_text("utf-8"))
+    assert request["targets"] == ["targets/1", "targets/2"]
+    assert [(row.name, row.words) for row in runtime.materials] == [("Wood", "same"), ("Glaze", "same")]
+    assert shown_result.result is not None
+    assert shown_result.result.material_name == "Wood"
+    assert bpy.ops.mfo.show_material(index=1) == {"FINISHED"}
+    assert shown_result.result.material_name == "Glaze"
+    assert runtime.shown_material == 1
+    histories = [bpy.data.materials[name].mfo.history for name in ("Wood", "Glaze")]
+    assert [Path(history[0].job_folder).name for history in histories] == ["1", "2"]
+
+    bpy.ops.ed.undo_push(message="before apply")
+    assert bpy.ops.mfo.apply("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert (rough(two, "Wood"), rough(two, "Glaze")) == pytest.approx((RECOVERED["roughness"],) * 2)
+    bpy.ops.ed.undo()  # one step for both
+    assert (rough(two, "Wood"), rough(two, "Glaze")) == before
+
+
+def test_one_that_does_not_match_stays_until_it_is_forced(
+    two: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"different": ["Wood"]}))
+    bpy, before = two.bpy, rough(two, "Wood")
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    assert bpy.ops.mfo.apply(job_folder=two.job) == {"FINISHED"}
+    assert (rough(two, "Wood"), rough(two, "Glaze")) == pytest.approx((before, RECOVERED["roughness"]))
+    assert bpy.ops.mfo.apply(job_folder=two.job, force=True) == {"FINISHED"}
+    assert rough(two, "Wood") == pytest.approx(RECOVERED["roughness"])
+
+
+def test_what_cannot_be_fitted_together_is_said_first(two: SimpleNamespace) -> None:
+    entries = two.bpy.context.scene.mfo.targets
+    for entry in entries:
+        entry.use = False
+    with pytest.raises(RuntimeError, match="No material of the list is ticked"):
+        two.bpy.ops.mfo.fit(job_folder=two.job)
+    entries[1].use = True  # one alone is a fit of one material
+    assert two.bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    assert "targets" not in json.loads((Path(two.job) / "request.json").read_text("utf-8"))

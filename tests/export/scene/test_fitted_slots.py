@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several materials in one export: what is written for each, what the camera sees, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import bpy
+import pytest
+
+from blender_addon.export.findings import ExportError
+from blender_addon.export.fitted_slot import FittedSlot
+from blender_addon.export.scene.seen_slots import seen_slots
+from tests.export.scenes import add_camera, add_light, add_quad, new_material
+
+
+@pytest.fixture
+def room(scene: Any) -> dict[str, Any]:
+    """A floor whose second slot has one of its two faces, a table on it, and something behind the camera."""
+    add_camera(ortho_scale=4.0)
+    add_light("POINT", energy=100.0)
+    floor = add_quad("Floor", 4.0, 0.0, new_material("Wood", Roughness=0.3))
+    floor.data.clear_geometry()
+    corners = [(x, y, 0.0) for y in (-2.0, 2.0) for x in (-2.0, 0.0, 2.0)]
+    floor.data.from_pydata(corners, [], [(0, 1, 4, 3), (1, 2, 5, 4)])
+    floor.data.materials.append(new_material("Rug", Roughness=0.9))
+    floor.data.polygons[1].material_index = 1
+    table = add_quad("Table", 1.0, 0.5, new_material("Glass", Metallic=1.0))
+    away = add_quad("Away", 1.0, 9.0, new_material("Unseen"))
+    bpy.context.view_layer.update()
+    return {"Floor": floor, "Table": table, "Away": away}
+
+
+def test_each_material_has_a_shape_and_a_request_of_its_own(room: dict[str, Any], export: Any) -> None:
+    slots = [FittedSlot(room["Floor"], 1), FittedSlot(room["Table"], 0), FittedSlot(room["Floor"], 0)]
+    report = export(room["Floor"], targets=slots, fit={"parameters": ["roughness"]})
+    request = report.request
+    assert request["targets"] == ["targets/1", "targets/2", "targets/3"]
+    assert request["target"]["material"] == "Rug"
+    inner = [json.loads((report.folder / path / "request.json").read_text("utf-8")) for path in request["targets"]]
+    said = [(one["target"]["shape_id"], one["target"]["material"], one["target"]["slot"]) for one in inner]
+    assert said == [("target", "Rug", 1), ("target_2", "Glass", 0), ("target_3", "Wood", 0)]
+    assert "targets" not in inner[0]
+    text = (report.folder / "scene.xml").read_text("utf-8")
+    used = {
+        shape.get("id"): shape.find("ref").get("id")  # type: ignore[union-attr]
+        for shape in ElementTree.fromstring(text).iter("shape")
+    }
+    assert [used[name] for name in ("target", "target_2", "target_3")] == [one["target"]["bsdf_id"] for one in inner]
+    for path in request["targets"]:
+        assert (report.folder / path / "scene.xml").read_text("utf-8") == text
+        assert (report.folder / path / "meshes" / "target_2.ply").samefile(report.folder / "meshes" / "target_2.ply")
+    roughness = [one["materials"][one["target"]["bsdf_id"]]["sockets"]["Roughness"]["value"] for one in inner]
+    assert roughness == pytest.approx([0.9, 0.5, 0.3])
+
+
+def test_the_camera_sees_these_materials(room: dict[str, Any]) -> None:
+    found = [(each.object.name, each.slot) for each in seen_slots(bpy.context)]
+    assert sorted(found[:2]) == [("Floor", 0), ("Floor", 1)]
+    assert found[2:] == [("Table", 0)]
+    room["Table"].hide_render = True
+    bpy.context.view_layer.update()
+    assert "Table" not in [each.object.name for each in seen_slots(bpy.context)]
+
+
+def test_what_is_wrong_is_said_before_anything_is_written(room: dict[str, Any], export: Any, tmp_path: Any) -> None:
+    floor, table = FittedSlot(room["Floor"], 0), FittedSlot(room["Table"], 0)
+    room["Away"].data.materials[0] = bpy.data.materials["Glass"]
+    twin = FittedSlot(room["Away"], 0)
+    for slots, sentence in (
+        ([floor, table, floor], "Slot 1 of 'Floor' (material 'Wood') is named twice: name it once."),
+        ([table, floor, twin], "Material 'Glass' is named twice, in slot 1 of 'Table' and in slot 1 of 'Away'"),
+        ([floor, FittedSlot(room["Floor"], 5)], "Slot 6 of 'Floor' has no material"),
+    ):
+        with pytest.raises(ExportError, match=re.escape(sentence)):
+            export(room["Floor"], targets=slots)
+    room["Away"].data.materials[0] = new_material("Unseen 2")
+    with pytest.raises(ExportError, match="The camera does not see 'Away'"):
+        export(room["Floor"], targets=[floor, twin])
+    assert not (tmp_path / "job").exists()
+
+
+def test_several_pictures_and_several_materials_are_not_fitted_together(room: dict[str, Any], export: Any) -> None:
+    from blender_addon.export.reference.picture_setup import PictureSetup
+
+    pictures = [PictureSetup(bpy.data.images.new(str(n), 32, 32), n) for n in (1, 2)]
+    slots = [FittedSlot(room["Floor"], 0), FittedSlot(room["Table"], 0)]
+    with pytest.raises(ExportError, match="Several pictures and several materials are not fitted together"):
+        export(room["Floor"], targets=slots, reference=pictures)

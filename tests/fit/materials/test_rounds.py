@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which materials may be fitted together, the light they begin in, and what a listener hears."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mfo_backend.fit.materials.evened_light import evened_light
+from mfo_backend.fit.materials.rounds import MOST_VALUES, Member, check_members
+from mfo_backend.fit.materials.whole_course import WholeCourse
+from mfo_backend.fit.settings import FitSettings
+from mfo_backend.types.errors import BadInputError
+from mfo_backend.types.event import Progress, StageEnd, Started
+from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.parameter import Parameter, ParameterTable
+
+LEFT = np.zeros((4, 8), bool)
+LEFT[:, :4] = True
+
+
+class Wall:
+    """One of two walls in closed form: each is lit by a lamp and by the other."""
+
+    def __init__(self, shown: dict[str, np.ndarray], name: str, mask: np.ndarray, values: int = 3) -> None:
+        self.table = ParameterTable(
+            [Parameter("base_color", 3, 1e-3, 0.999, (0.5, 0.5, 0.5))]
+            + [Parameter(f"v{k}", 1, 0.0, 1.0, 0.5) for k in range(values - 3)]
+        )
+        self.start = self.table.pack({})
+        self._shown, self._name, self._mask = shown, name, mask
+        self.show(self.start)
+
+    def show(self, vector: np.ndarray) -> None:
+        self._shown[self._name] = vector[:3].copy()
+
+    def image(self, vector: np.ndarray, *, seed: int, spp: int) -> np.ndarray:
+        self.show(vector)
+        return light_of(self._shown["left"], self._shown["right"])
+
+    def target_mask(self) -> np.ndarray:
+        return self._mask
+
+
+def light_of(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Radiosity of two walls that see half of each other under irradiances of 1 and 0.3."""
+    a, b = np.linalg.solve(
+        np.array([[np.ones(3), -0.5 * left], [-0.5 * right, np.ones(3)]]).transpose(2, 0, 1),
+        np.stack([left, 0.3 * right], axis=1)[..., None],
+    )[..., 0].T
+    return np.where(LEFT[..., None], a, b).astype(np.float32)
+
+
+def walls(values: int = 3) -> list[Wall]:
+    shown: dict[str, np.ndarray] = {}
+    return [Wall(shown, "left", LEFT, values), Wall(shown, "right", ~LEFT, values)]
+
+
+def test_colours_are_evened_with_the_light_that_the_walls_give_each_other() -> None:
+    truth = np.array([0.8, 0.3, 0.1]), np.array([0.15, 0.6, 0.9])
+    pair = walls()
+    found = evened_light(pair, [LEFT, ~LEFT], light_of(*truth), 0)  # type: ignore[arg-type]
+    alone = light_of(*truth)[0, 7] / light_of(*(wall.start[:3] for wall in walls()))[0, 7] * 0.5
+    assert np.abs(alone - truth[1]).max() > 0.1  # what one step, or a fit beside walls as they were, would say
+    for vector, colour in zip(found, truth, strict=True):
+        assert vector[:3] == pytest.approx(colour, abs=0.01)
+
+
+def members(values: int, preset: str = "balanced") -> list[Member]:
+    return [
+        Member(name, wall, FitSettings(preset=preset))  # type: ignore[arg-type]
+        for name, wall in zip(("Left", "Right"), walls(values), strict=True)
+    ]
+
+
+LIT = Image(np.full((4, 8, 3), 0.5, np.float32), Encoding.LINEAR)
+
+
+def test_120_values_are_fitted_together_and_121_are_not() -> None:
+    check_members(members(MOST_VALUES // 2), LIT)
+    with pytest.raises(BadInputError, match=r"have 122 free values, and at most 120 .*: leave out 'Left' \(61\), or"):
+        check_members(members(MOST_VALUES // 2 + 1), LIT)
+
+
+def test_what_fits_one_material_alone_is_refused() -> None:
+    with pytest.raises(BadInputError, match="The preset 'paper' fits one material alone"):
+        check_members(members(3, "paper"), LIT)
+    pair = members(3)
+    pair[1].renderer.target_mask().fill(False)
+    try:
+        with pytest.raises(BadInputError, match="Material 'Right': "):
+            check_members(pair, LIT)
+    finally:
+        pair[1].renderer.target_mask()[:, 4:] = True
+
+
+def test_many_fits_are_told_as_one() -> None:
+    heard: list = []
+    course = WholeCourse(["Floor", "Wall"], heard.append)
+    for round_number in (1, 2, 3):
+        for member in (1, 0):
+            tell = course.of(member, round_number)
+            tell(Started(("scan",), ("roughness",), 0.1))
+            tell(Progress("scan", 0, 1, 3, 0.1, 0.1, 0.5, 0.0, 0.0))
+            tell(StageEnd("scan", "converged", "", 1, 0.1, 0.1))
+    assert [type(event).__name__ for event in heard].count("Started") == 1
+    shares = [event.fraction for event in heard if isinstance(event, Progress)]
+    assert shares == sorted(shares)
+    assert 0.1 < shares[0] < 0.2
+    assert shares[-1] < 1.0
+    assert [event.stage for event in heard if isinstance(event, StageEnd)][:2] == ["Wall: scan", "Floor: scan"]
