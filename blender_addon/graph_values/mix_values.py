@@ -79,7 +79,7 @@ def mix_values(target: TargetShader) -> list[MixValue]:
     for factor in _factors(target):
         node = factor.socket.node
         place = Place((*(group.name for group in factor.groups), node.name), INPUT, factor.socket.identifier)
-        found.append(_value(node, factor.socket.name, place, True, factor=factor))
+        found.append(_value(node, factor.socket.name, place, not _is_in_colors(target, factor), factor=factor))
     for number, leaf in enumerate(target.others):
         if leaf.node.bl_idname == EMISSION or not is_fitted(leaf.node):
             continue
@@ -137,6 +137,24 @@ def _factors(target: TargetShader) -> list[Factor]:
                 if _place(factor) not in held and factor.value is not None and 0.0 < factor.value < 1.0:
                     found.setdefault(_place(factor), factor)
     return list(found.values())
+
+
+def _is_in_colors(target: TargetShader, factor: Factor) -> bool:
+    """Whether each leaf that a factor leads to shows its share and a free colour as their product alone.
+
+    Then the colours make up for any factor, and no picture tells them apart.
+    """
+    leaves = [
+        leaf
+        for leaf in (target.leaf, *target.others)
+        if any(_place(factor) == _place(each) for way in leaf.ways for each in way)
+    ]
+    return all(leaf.node.bl_idname != PRINCIPLED and _has_free_color(leaf) for leaf in leaves)
+
+
+def _has_free_color(leaf: ClosureLeaf) -> bool:
+    colors = [socket for name, socket in inputs_of(leaf.node).items() if name in ("Base Color", "Sheen Tint")]
+    return is_fitted(leaf.node) and any(not socket.is_linked for socket in colors)
 
 
 def _not_plain(leaf: ClosureLeaf) -> str | None:

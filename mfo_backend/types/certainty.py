@@ -23,18 +23,20 @@ class Level(Enum):
 class Certainty:
     """Standard deviation of each component of a value, in the value's own unit, and what it means.
 
-    `along` names the values that this one can be traded against, most of all first.
+    `along` names the values that this one can be traded against, most of all first, and `shown` is what a user calls
+    them.
     """
 
     sd: tuple[float, ...]
     level: Level
     along: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
         """The level for a user."""
         if self.level is Level.NOT_TOLD_APART and self.along:
-            return f"not told apart from {', '.join(map(socket_name, self.along))}"
+            return f"not told apart from {', '.join(self.shown or map(socket_name, self.along))}"
         return _WORDS[self.level]
 
 

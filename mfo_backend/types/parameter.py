@@ -32,7 +32,8 @@ class Parameter:
     """One value of a material model.
 
     `size` is 1 for a scalar and 3 for a linear RGB colour. `lower` and `upper` bound every component during a fit.
-    Where the renderer's own gradient is not defined up to there, it is that at `slope_upper`.
+    Where the renderer's own gradient is not defined up to there, it is that at `slope_upper`. `label` is what its node
+    calls it, where that is not the socket of its name.
     """
 
     name: str
@@ -41,6 +42,12 @@ class Parameter:
     upper: float
     default: Value
     slope_upper: float = math.inf
+    label: str = ""
+
+    @property
+    def shown(self) -> str:
+        """What a user calls it."""
+        return self.label or (self.name if "/" in self.name else socket_name(self.name))
 
     def __post_init__(self) -> None:
         if self.size not in (1, 3):

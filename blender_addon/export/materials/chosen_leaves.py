@@ -58,7 +58,15 @@ def chosen_mix_values(
     if problem is not None:
         findings.note(f"Of the mix '{target.name}' alone is fitted: {problem}.")
         return []
-    return [value for value in mix_values(target) if (value.by_default if by_all else value.name in names)]
+    values = mix_values(target)
+    left = [value.name for value in values if by_all and value.factor is not None and not value.by_default]
+    if left:
+        findings.note(
+            f"{', '.join(left)} stays as it is: the colours of its shaders make up for any. Name it among the values "
+            "to have it fitted, with those colours held.",
+            explains=False,
+        )
+    return [value for value in values if (value.by_default if by_all else value.name in names)]
 
 
 def with_mix_values(material: Material, target: TargetShader, chosen: Sequence[MixValue]) -> Material:

@@ -93,7 +93,10 @@ def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: Paramete
         told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > SEEN_CHANGE][:MOST_VALUES]
         if rival.share < TOLD_FROM or not told:
             continue
-        instead = ", ".join(f"{name} {_shown(rival.x, name, table)} (not {_shown(x, name, table)})" for name in told)
+        instead = ", ".join(
+            f"{table[name].label or name} {_shown(rival.x, name, table)} (not {_shown(x, name, table)})"
+            for name in told
+        )
         if rival.last:
             notes.append(f"Every material from the result to this one looks the same: {instead}.")
         else:

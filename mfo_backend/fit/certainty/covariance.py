@@ -82,7 +82,9 @@ def certainties(sd: Vector, table: ParameterTable, spread: Vector | None = None)
             level = Level.DETERMINED
         else:
             level = Level.WEAK if worst < WEAK_BELOW else Level.NOT_VISIBLE
-        result[parameter.name] = Certainty(tuple(float(v) for v in part), level, along.get(parameter.name, ()))
+        others = along.get(parameter.name, ())
+        shown = tuple(table[name].shown for name in others)
+        result[parameter.name] = Certainty(tuple(float(v) for v in part), level, others, shown)
     return result
 
 
@@ -92,7 +94,9 @@ def certainties_away(known: Mapping[str, Certainty], away: Vector, table: Parame
         return {}
     sd = np.concatenate([known[name].sd for name in table.names])
     found = certainties(np.hypot(sd, away), table)
-    return {name: replace(certainty, along=known[name].along) for name, certainty in found.items()}
+    return {
+        name: replace(certainty, along=known[name].along, shown=known[name].shown) for name, certainty in found.items()
+    }
 
 
 def _traded(spread: Vector, table: ParameterTable) -> dict[str, tuple[str, ...]]:

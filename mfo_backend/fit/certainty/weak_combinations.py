@@ -57,19 +57,20 @@ def weak_combinations(
             step[name] = float(np.mean(direction[part] * width[part])) * deviation
         sign = 1.0 if step[named[0]] > 0.0 else -1.0
         step = {name: sign * value for name, value in step.items()}
-        found.append(WeakCombination(tuple(named), step, _sentence(step)))
+        found.append(WeakCombination(tuple(named), step, _sentence(step, table)))
     return tuple(found)
 
 
-def _sentence(step: dict[str, float]) -> str:
-    words = [name.replace("_", " ") for name in step]
+def _sentence(step: dict[str, float], table: ParameterTable) -> str:
+    words = [table[name].label or (name if "/" in name else name.replace("_", " ")) for name in step]
     moves = [
         f"{abs(v):.2g} {'more' if v > 0.0 else 'less'} {word}" for word, v in zip(words, step.values(), strict=True)
     ]
     helps = "a grazing view or another light" if any(name.startswith(_GRAZING) for name in step) else "another light"
+    all_of_them = _and(words)
     return (
-        f"{_and(words).capitalize()} can be traded against each other: {_and(moves)} would hardly change the picture; "
-        f"{helps} would tell them apart."
+        f"{all_of_them[:1].upper()}{all_of_them[1:]} can be traded against each other: {_and(moves)} would hardly "
+        f"change the picture; {helps} would tell them apart."
     )
 
 

@@ -21,7 +21,7 @@ from ...render.paths.recorded_scene import RecordedScene
 from ...render.sheet.turned_camera import target_center, turned_cameras
 from ...types.certainty import Certainty, Level
 from ...types.errors import BadInputError
-from ...types.parameter import ParameterTable, socket_name
+from ...types.parameter import ParameterTable
 from ...types.result import NextPicture
 from ..squares.recording_noise import rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
@@ -153,7 +153,7 @@ def _proposal(
         return None
     width = {name: table[name].upper - table[name].lower for name in wanted}
     signed = turn if turn <= 180.0 else turn - 360.0
-    what = f"would settle {_listed(settles)}" if settles else f"would make {_listed(surer)} surer"
+    what = f"would settle {_listed(settles, table)}" if settles else f"would make {_listed(surer, table)} surer"
     where = (
         f"with the camera turned by {abs(signed):.0f} degrees around the object "
         f"({'against the clock' if signed > 0 else 'clockwise'} from above)"
@@ -167,6 +167,6 @@ def _proposal(
     )
 
 
-def _listed(names: Sequence[str]) -> str:
-    words = [socket_name(name) for name in names]
+def _listed(names: Sequence[str], table: ParameterTable) -> str:
+    words = [table[name].shown for name in names]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -73,7 +73,7 @@ def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], fl
             kept = _solve_holding(setting, refined, found, held)
             if kept is not None and judged(kept)[0] <= AS_GOOD * cost + 1e-8 and unseen_change(kept):
                 found, off = kept, held
-                notes.append(kept_note(back))
+                notes.append(kept_note(back, table))
                 break
     notes += rival_notes(refined.rivals, found, table)
     return Kept(found, tuple(off), certainty, spread, tuple(notes))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...render.pictures.renderer import Renderer
 from ...types.certainty import Certainty, WeakCombination
 from ...types.image import Pixels
+from ...types.parameter import ParameterTable
 from ...types.result import Contradiction, FitResult, NextPicture, StageReport
 from ...types.status import Status
 
@@ -113,9 +114,10 @@ class FitOutcome:
     result_halves: tuple[Pixels, Pixels] | None = field(default=None, repr=False)
 
 
-def kept_note(names: Iterable[str]) -> str:
+def kept_note(names: Iterable[str], table: ParameterTable) -> str:
     """The sentence on values that went back to the user's."""
-    return f"The picture does not determine {', '.join(names)}: kept as in the scene."
+    shown = ", ".join(table[name].label or name for name in names)
+    return f"The picture does not determine {shown}: kept as in the scene."
 
 
 def final_result(

@@ -176,7 +176,7 @@ class TracedRoute:
         certainty = _certainty(ends, table)
         back = [name for name in certainty if ends[-1].kept[table.slice_of(name)].all()]
         unseen = [name for name in back if certainty[name].level is Level.NOT_VISIBLE]
-        return certainty, ((kept_note(unseen),) if unseen else ())
+        return certainty, ((kept_note(unseen, table),) if unseen else ())
 
 
 def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:

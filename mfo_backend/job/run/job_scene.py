@@ -63,6 +63,9 @@ def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:
     """The request's materials with textures by absolute path, the Blender version and the film's exposure."""
     materials = request_to_json(request)["materials"]
+    if request.target.bsdf_id in materials:
+        labels = {"labels": dict(request.target.labels), "node": "/".join(request.target.node)}
+        materials[request.target.bsdf_id] |= labels
     for material in materials.values():
         material["blender_version"] = tuple(request.generator.get("blender", (5, 0)))
         material["film_exposure"] = request.film_exposure

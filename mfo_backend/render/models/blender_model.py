@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
 from xml.etree import ElementTree
@@ -81,9 +82,17 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
     # values inside nodes may be all that is fitted
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
-    table = ParameterTable(()) if chosen is None else chosen
+    table = ParameterTable(()) if chosen is None else _labelled(chosen, materials[target.bsdf_id])
     start = table.clip(table.pack(_constants(sockets)))
     return target, table, start
+
+
+def _labelled(table: ParameterTable, material: Mapping[str, Any]) -> ParameterTable:
+    """With what the fitted node calls its values; that of a mix has its name before."""
+    labels = material.get("labels", {})
+    prefix = f"{material['node']}/" if material.get("node") and is_mixed(material) else ""
+    named = prefix or labels
+    return ParameterTable(replace(p, label=f"{prefix}{labels.get(p.name, p.shown)}" if named else "") for p in table)
 
 
 def _put_material(

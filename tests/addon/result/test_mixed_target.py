@@ -141,6 +141,18 @@ def test_all_shaders_of_a_mix_are_asked_for(scene: SimpleNamespace, mixed: Simpl
     assert "and 1 more and Mix factors" in " ".join(request["notes"])
 
 
+def test_a_factor_that_colours_make_up_for_is_held(scene: SimpleNamespace, mixed: SimpleNamespace) -> None:
+    """Twice the factor and half the colours are the same picture; by its name it is fitted."""
+    diffuse = mixed.tree.nodes.new("ShaderNodeBsdfDiffuse")
+    mixed.tree.links.new(diffuse.outputs[0], mixed.mix.inputs[1])
+    factor = f"Mix Shader/{mixed.mix.inputs[0].name}"
+    request = exported(scene, mixed, "all", shader="all")
+    assert "factors" not in request["materials"]["target_bsdf"]
+    assert any(f"{factor} stays as it is" in note for note in request["notes"])
+    request = exported(scene, mixed, factor)
+    assert [each["name"] for each in request["materials"]["target_bsdf"]["factors"]] == [factor]
+
+
 def test_values_of_a_mix_are_chosen_by_name(scene: SimpleNamespace, mixed: SimpleNamespace) -> None:
     """Those of the fitted leaf by its name, too; a mix of which nothing else is asked for has nothing else free."""
     request = exported(scene, mixed, "Principled BSDF/Base Color, glossy bsdf/roughness", shader="Principled BSDF")

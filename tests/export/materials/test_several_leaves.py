@@ -12,6 +12,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from blender_addon.export.nodes.target_shader import target_shader  # noqa: E402
+from blender_addon.graph_values.mix_values import mix_values  # noqa: E402
 from blender_addon.result.write_back import apply_values, revert_values  # noqa: E402
 from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
@@ -81,9 +83,10 @@ def test_pictures_at_other_values_are_cycles(
     lit_scene(scene)
     build, others = CASES[name]
     material = material_of(build)
-    material.mfo.leaf = "*"
     target = ball(material)
-    report = export(target, reference=None, fit={"parameters": "all"})
+    values = [value.name for value in mix_values(target_shader(material)) if value.by_default or value.factor]
+    fit = {"parameters": ["base_color", "roughness", *values]}
+    report = export(target, fit=fit)
     assert set(others) <= set(named(report.request))
     renderer = loaded(report)
     table = renderer.table
@@ -108,4 +111,4 @@ def test_pictures_at_other_values_are_cycles(
         slope = found[:, :, 1 + j] * (ahead[j] - vector[j])
         assert np.abs(change - slope).max() < 0.05 * np.abs(change).max() + 2e-6, table.names
     revert_values(material)
-    np.testing.assert_allclose(loaded(export(target, fit={"parameters": "all"})).start, renderer.start, atol=1e-6)
+    np.testing.assert_allclose(loaded(export(target, fit=fit)).start, renderer.start, atol=1e-6)

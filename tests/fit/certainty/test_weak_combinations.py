@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mfo_backend.fit.certainty.covariance import certainties, standard_deviations
 from mfo_backend.fit.certainty.weak_combinations import weak_combinations
+from mfo_backend.fit.result.outcome import kept_note
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
 TABLE = ParameterTable(
@@ -56,3 +59,18 @@ def test_channels_that_move_as_one_are_no_trouble():
     spread = 0.01 * np.outer(grey, grey) + np.diag([0.0, 0.0, 0.0, 1e-6, 1e-6, 1e-6])
     (weak,) = combinations(spread)
     assert set(weak.parameters) == {"base_color", "metallic"}
+
+
+def test_values_are_called_as_their_nodes_do():
+    labels = {"base_color": "Glossy BSDF/Color", "roughness": "Glossy BSDF/Roughness"}
+    table = ParameterTable(
+        [*(replace(p, label=labels.get(p.name, "")) for p in TABLE), Parameter("Mix/Factor", 1, 0.0, 1.0, 0.5)]
+    )
+    direction = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, -2.0])
+    spread = 0.01 * np.outer(direction, direction) / 7.0 + 1e-7 * np.eye(7)
+    certainty = certainties(standard_deviations(spread, table), table, spread)
+    assert certainty["Mix/Factor"].along == ("base_color",)
+    assert certainty["Mix/Factor"].shown == ("Glossy BSDF/Color",)
+    (weak,) = weak_combinations(spread, table, certainty, ())
+    assert weak.sentence.startswith("Mix/Factor and Glossy BSDF/Color can be traded")
+    assert kept_note(["base_color"], table) == "The picture does not determine Glossy BSDF/Color: kept as in the scene."

@@ -34,6 +34,16 @@ def load(tmp_path: Path, parameters, materials=None) -> Renderer:
     return load_renderer(path, "target", model="blender_principled", parameters=parameters, materials=materials)
 
 
+@pytest.mark.parametrize(("leaves", "shown"), [([], "Color"), ([{"shader": "emission", "sockets": {}}], "Gloss/Color")])
+def test_values_have_the_labels_of_their_node(tmp_path: Path, leaves: list, shown: str) -> None:
+    material = {"name": "Glaze", "distribution": "MULTI_GGX", "sockets": SOCKETS, "shader": "glossy"}
+    mixed = {"weight": {"value": 1.0}, "leaves": [leaf | {"weight": {"value": 0.5}} for leaf in leaves]}
+    labelled = material | mixed | {"labels": {"base_color": "Color"}, "node": "Gloss"}
+    table = load(tmp_path, ("base_color",), {"glaze": labelled}).table
+    assert table["base_color"].shown == shown
+    assert load(tmp_path, ("base_color",)).table["base_color"].label == ""
+
+
 def test_starts_at_the_sockets_and_follows_finite_differences(tmp_path: Path) -> None:
     renderer = load(tmp_path, ("base_color", "roughness", "coat_weight"))
     assert renderer.table.unpack(renderer.start) == {
