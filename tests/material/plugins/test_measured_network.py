@@ -39,6 +39,24 @@ def test_the_plugin_is_the_network_times_the_cosine(table, index):
     assert not np.array(bsdf.eval(mi.BSDFContext(), si, below)).any()
 
 
+def test_what_is_sampled_has_the_value_over_its_density(table):
+    import mitsuba as mi
+
+    from mfo_backend.material.plugins.measured_network import register
+
+    register()
+    bsdf = mi.load_dict({"type": "measured_network", "filename": str(table), "material": NAMES[0]})
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(*upper(3).T.astype(np.float32))
+    numbers = np.random.default_rng(4).random((2, 200)).astype(np.float32)
+    sampled, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(0.5), mi.Point2f(*numbers))
+
+    value, density = (np.array(of) for of in bsdf.eval_pdf(mi.BSDFContext(), si, sampled.wo))
+    assert (np.array(sampled.pdf) == density).all()
+    np.testing.assert_allclose(density, np.array(sampled.wo).T[:, 2] / np.pi, rtol=1e-5)
+    np.testing.assert_allclose(np.array(weight), value / density, rtol=1e-4)
+
+
 def upper(seed):
     vectors = np.random.default_rng(seed).normal(size=(200, 3))
     vectors[:, 2] = np.abs(vectors[:, 2]) + 0.01
