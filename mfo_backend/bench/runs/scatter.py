@@ -64,6 +64,8 @@ class FitRecipe:
         return runner, machine_facts(runner.variant, threads=runner.threads, import_seconds=runner.import_seconds)
 
 
+_ALL_DIED = "Every worker that tried this task has died."
+_DIED = f"{RuntimeError.__name__}: {_ALL_DIED}"  # as its row says it
 _RUNNERS: dict[Any, tuple[Any, dict[str, Any]]] = {}  # of this process
 
 
@@ -93,29 +95,54 @@ def run_scattered(
     listener: Callable[[Row], None],
     should_stop: Callable[[], bool],
 ) -> bool:
-    """As `run_bench`, on the workers of a Dask client. What is unfinished when it stops leaves no row."""
+    """As `run_bench`, on the workers of a Dask client. What is unfinished when it stops leaves no row.
+
+    Dask blames every task that a worker had when it died. Those it gives up are tried again, one at a time.
+    """
     done = {row.key for row in file.read()}
     left = [task for task in tasks if task.key not in done]
+    suspects: list[Task] = []
+
+    def add(task: Task, row: Row) -> None:
+        file.append(row)
+        listener(row)
+
+    def add_or_suspect(task: Task, row: Row) -> None:
+        if row.error == _DIED:
+            suspects.append(task)
+        else:
+            add(task, row)
+
+    finished = _measured(left, client, recipe, add_or_suspect, should_stop)
+    for task in suspects:
+        finished = finished and _measured([task], client, recipe, add, should_stop)
+    return finished
+
+
+def _measured(
+    tasks: Sequence[Task],
+    client: Any,
+    recipe: Recipe,
+    add: Callable[[Task, Row], None],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Whether all came to an end; `add` hears of each."""
     common = {"pure": False, "retries": RETRIES}
     pictures, rows = {}, {}
-    for task in left:
+    for task in tasks:
         at = (task.scenario, task.scene)
         if at not in pictures:
             pictures[at] = client.submit(true_pictures, recipe, task, **common)
         rows[task] = client.submit(measure, recipe, task, pictures[at], **common)
-    waiting = {at: sum((t.scenario, t.scene) == at for t in left) for at in pictures}
+    waiting = {at: sum((t.scenario, t.scene) == at for t in tasks) for at in pictures}
     for task, future in as_they_come(client, rows, should_stop):
         at = (task.scenario, task.scene)
         waiting[at] -= 1
         if not waiting[at]:
             del pictures[at]  # lets the workers forget them
-        if future.status == "finished":
-            row = future.result()
-        else:
-            row = failed_row(task, recipe.size, _reason(future))
+        row = future.result() if future.status == "finished" else failed_row(task, recipe.size, _reason(future))
         del rows[task]
-        file.append(row)
-        listener(row)
+        add(task, row)
     finished = not rows
     client.cancel([*rows.values(), *pictures.values()])
     return finished
@@ -124,5 +151,5 @@ def run_scattered(
 def _reason(future: Any) -> BaseException:
     error = future.exception()
     if type(error).__name__ == "KilledWorker":
-        return RuntimeError("Every worker that tried this task has died.")
+        return RuntimeError(_ALL_DIED)
     return error
