@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import bpy
 
@@ -18,32 +19,46 @@ def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copi
     `groups` are the group nodes it lies in, and `is_copied` says that a copy of the file is evaluated, which does not
     hold pixels that are not saved.
     """
-    return _problem_upstream(socket, groups, (), set(), is_copied)
-
-
-def _problem_upstream(
-    socket: bpy.types.NodeSocket, groups: _Groups, path: tuple[_Place, ...], seen: set[_Place], is_copied: bool
-) -> str | None:
-    """The same for a socket inside `groups`, group nodes of which the innermost is the last; `path` are the outputs on
-    the way, `seen` those known to be good."""
-    for link in socket.links:
+    ways = [_Way(None, iter([(socket, groups)]))]
+    on_the_way: set[_Place] = set()
+    good: set[_Place] = set()
+    while ways:
+        way = ways[-1]
+        link = next(way.links, None)
+        if link is None:
+            further, within = next(way.further, (None, ()))
+            if further is None:
+                ways.pop()
+                if way.place is not None:
+                    on_the_way.discard(way.place)
+                    good.add(way.place)
+            else:
+                way.links, way.groups = iter(further.links), within
+            continue
         if link.is_muted:
             continue
         node, output = link.from_node, link.from_socket
-        if not link.is_valid:
+        place = (*(group.as_pointer() for group in way.groups), node.as_pointer(), output.as_pointer())
+        if not link.is_valid or place in on_the_way:
             return f"the node '{node.name}' by a link in a circle or of a wrong kind"
-        place = (*(group.as_pointer() for group in groups), node.as_pointer(), output.as_pointer())
-        if place in path:
-            return f"the node '{node.name}' by a link in a circle or of a wrong kind"
-        if place in seen:
+        if place in good:
             continue
         problem = _problem(node, is_copied)
-        for further, within in feeding(node, output, groups):
-            problem = problem or _problem_upstream(further, within, (*path, place), seen, is_copied)
         if problem is not None:
             return problem
-        seen.add(place)
+        on_the_way.add(place)
+        ways.append(_Way(place, iter(feeding(node, output, way.groups))))
     return None
+
+
+@dataclass
+class _Way:
+    """An output that is looked at, and what of the sockets that feed it is still to come: graphs have any depth."""
+
+    place: _Place | None
+    further: Iterator[tuple[bpy.types.NodeSocket, _Groups]]
+    links: Iterator[bpy.types.NodeLink] = field(default_factory=lambda: iter(()))
+    groups: _Groups = ()
 
 
 def feeding(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..images.image_filter import filtered_pixels
 from ..images.image_pixels import MissingImageError, UnreadableImageError
 from ..material_model import Socket, Texture
 
+MOST_NODES = 64  # between a picture and a socket, on all ways; Cycles evaluates what is larger
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 WRAPS = {"REPEAT": "repeat", "EXTEND": "clamp", "MIRROR": "mirror"}
 FILTERS = {"Linear": "bilinear", "Cubic": "bilinear", "Smart": "bilinear", "Closest": "nearest"}
@@ -124,7 +126,7 @@ def read_socket(socket: bpy.types.NodeSocket) -> Socket:
     source = source_of(socket)
     if source is None:
         return Socket(plain_value(socket))
-    found = _evaluate(source)
+    found = _evaluate(source, iter(range(MOST_NODES)))
     is_color = socket.type == "RGBA"
     if isinstance(found, Texture):
         pixels = found.pixels
@@ -141,9 +143,11 @@ def read_socket(socket: bpy.types.NodeSocket) -> Socket:
     return Socket(value, True)
 
 
-def _evaluate(output: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
-    """Return a picture, or a constant of one or three numbers, for an output socket."""
+def _evaluate(output: bpy.types.NodeSocket, left: Iterator[int]) -> Texture | NDArray[np.float64]:
+    """Return a picture, or a constant of one or three numbers, for an output socket; each node takes one of `left`."""
     node = output.node
+    if next(left, None) is None:
+        raise UnsupportedNodeError(f"the node '{node.name}' among more than {MOST_NODES}")
     kind = node.bl_idname
     if node.mute:
         raise UnsupportedNodeError(f"the muted node '{node.name}'")
@@ -154,30 +158,32 @@ def _evaluate(output: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
     if kind == "ShaderNodeTexImage":
         return _image(node, output.name)
     if kind == "ShaderNodeGamma":
-        gamma = _constant(node.inputs["Gamma"])
-        return _apply(_input(node.inputs["Color"]), lambda a: np.where(a > 0.0, np.maximum(a, 0.0) ** gamma, a))
+        gamma = _constant(node.inputs["Gamma"], left)
+        return _apply(_input(node.inputs["Color"], left), lambda a: np.where(a > 0.0, np.maximum(a, 0.0) ** gamma, a))
     if kind == "ShaderNodeInvert":
-        factor = _constant(node.inputs[0])
-        return _apply(_input(node.inputs[1]), lambda a: a + factor * (1.0 - 2.0 * a))
+        factor = _constant(node.inputs[0], left)
+        return _apply(_input(node.inputs[1], left), lambda a: a + factor * (1.0 - 2.0 * a))
     if kind == "ShaderNodeRGBToBW":
-        return _apply(_input(node.inputs[0]), lambda a: (a @ LUMINANCE)[..., None] if a.shape[-1] == 3 else a)
+        return _apply(_input(node.inputs[0], left), lambda a: (a @ LUMINANCE)[..., None] if a.shape[-1] == 3 else a)
     if kind in ("ShaderNodeSeparateColor", "ShaderNodeSeparateRGB"):
         if getattr(node, "mode", "RGB") != "RGB":
             raise UnsupportedNodeError(f"the node '{node.name}' in mode {node.mode}")
         channel = list(node.outputs).index(output)
-        return _apply(_input(node.inputs[0]), lambda a: a[..., min(channel, a.shape[-1] - 1)][..., None])
+        return _apply(_input(node.inputs[0], left), lambda a: a[..., min(channel, a.shape[-1] - 1)][..., None])
     if kind == "ShaderNodeMath" and node.operation in MATH:
-        return _math(node)
+        return _math(node, left)
     raise UnsupportedNodeError(f"the node '{node.name}' ({node.bl_label})")
 
 
-def _input(socket: bpy.types.NodeSocket) -> Texture | NDArray[np.float64]:
+def _input(socket: bpy.types.NodeSocket, left: Iterator[int]) -> Texture | NDArray[np.float64]:
     source = source_of(socket)
-    return np.atleast_1d(np.asarray(plain_value(socket), dtype=np.float64)) if source is None else _evaluate(source)
+    if source is None:
+        return np.atleast_1d(np.asarray(plain_value(socket), dtype=np.float64))
+    return _evaluate(source, left)
 
 
-def _constant(socket: bpy.types.NodeSocket) -> float:
-    value = _input(socket)
+def _constant(socket: bpy.types.NodeSocket, left: Iterator[int]) -> float:
+    value = _input(socket, left)
     if isinstance(value, Texture):
         raise UnsupportedNodeError(f"a picture on '{socket.name}' of the node '{socket.node.name}'")
     return float(value[0])
@@ -189,8 +195,8 @@ def _apply(value: Texture | NDArray[np.float64], function: Any) -> Texture | NDA
     return function(value)
 
 
-def _math(node: bpy.types.Node) -> Texture | NDArray[np.float64]:
-    first, second = _input(node.inputs[0]), _input(node.inputs[1])
+def _math(node: bpy.types.Node, left: Iterator[int]) -> Texture | NDArray[np.float64]:
+    first, second = _input(node.inputs[0], left), _input(node.inputs[1], left)
     if isinstance(first, Texture) and isinstance(second, Texture):
         raise UnsupportedNodeError(f"the node '{node.name}' with two pictures")
     picture = first if isinstance(first, Texture) else second if isinstance(second, Texture) else None

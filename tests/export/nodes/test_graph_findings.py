@@ -31,6 +31,11 @@ def circle(tree: Tree) -> Any:
     return first.outputs[0]
 
 
+def script(tree: Tree) -> Any:
+    node = tree.nodes.new("ShaderNodeScript")
+    return node.outputs.new("NodeSocketFloat", "Value")
+
+
 def unsaved_picture(tree: Tree) -> Any:
     image = bpy.data.images.new("Painted", 4, 4)
     image.pixels[0] = 0.5
@@ -61,6 +66,7 @@ def inside_a_group(tree: Tree) -> Any:
         (empty_group, "the group 'Empty' without an output"),
         (circle, "by a link in a circle or of a wrong kind"),
         (inside_a_group, "by a link in a circle or of a wrong kind"),
+        (script, "the script 'Script', which is not evaluated"),
         (unsaved_picture, "the image 'Painted' with changes that are not saved (save or pack it)"),
     ],
 )
@@ -95,3 +101,37 @@ def test_a_node_of_another_blender(scene: Any) -> None:
     errors, _ = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
     assert len(errors) == 1
     assert "which this Blender does not know" in errors[0]
+
+
+def chain(tree: Tree, output: Any, length: int) -> Any:
+    """Maths one after the other."""
+    for _ in range(length):
+        node = tree.nodes.new("ShaderNodeMath")
+        tree.links.new(output, node.inputs[0])
+        output = node.outputs[0]
+    return output
+
+
+def lattice(tree: Tree, output: Any, length: int) -> Any:
+    """Maths whose number of ways doubles with each step."""
+    for _ in range(length):
+        node = tree.nodes.new("ShaderNodeMath")
+        for socket in list(node.inputs)[:2]:
+            tree.links.new(output, socket)
+        output = node.outputs[0]
+    return output
+
+
+@pytest.mark.parametrize(("build", "length"), [(chain, 1200), (lattice, 60)])
+@pytest.mark.parametrize("is_broken", [False, True])
+def test_a_graph_may_have_any_depth(scene: Any, build: Any, length: int, is_broken: bool) -> None:
+    """Longer than Python's stack, and with more ways than can be walked one by one."""
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    material = new_material("Target")
+    tree = material.node_tree
+    first = circle(tree) if is_broken else tree.nodes.new("ShaderNodeTexNoise").outputs[0]
+    node = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    tree.links.new(build(tree, first, length), node.inputs["Roughness"])
+    errors, _ = check_export(bpy.context, add_quad("Target", 2.0, 0.0, material))
+    assert [("in a circle" in error) for error in errors] == [True] * is_broken
