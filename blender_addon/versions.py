@@ -44,8 +44,11 @@ def light_is_normalized(light: bpy.types.Light) -> bool:
 
 
 def cycles_settings(owner: Any) -> Any:
-    """Return Cycles' settings of a scene, light, object ..., or None where the Cycles add-on is off."""
-    return getattr(owner, "cycles", None)
+    """Return Cycles' settings of a scene, light, object ..., or None where the Cycles add-on is off.
+
+    They are those of the original: a change of them by a script does not reach evaluated copies.
+    """
+    return getattr(getattr(owner, "original", owner), "cycles", None)
 
 
 def shadow_terminator(item: bpy.types.Object) -> tuple[float, float]:

@@ -62,6 +62,7 @@ class Stream(Enum):
     NEXT_PICTURE = Span(0x2E870000, 1, apart=True)
     TOGETHER = Span(0x70610000, 1, apart=True)  # looks at several materials between their fits
     PREVIEW = Span(0x3E710000, 1, apart=True)
+    LOOK = Span(0x4C4B0000, 1, apart=True)  # between the stages of a fit from another class
 
     def seed(self, fit: int, number: int = 0) -> int:
         """The seed of this number in the stream of a fit with the seed `fit`.

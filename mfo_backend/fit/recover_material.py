@@ -70,6 +70,7 @@ def recover_material(
     noted: bool = False,
     begin: Vector | None = None,
     judged: bool = True,
+    nearer_than: float | None = None,
 ) -> FitOutcome:
     """Recover the renderer's parameters from a picture of the same scene.
 
@@ -95,9 +96,14 @@ def recover_material(
         Values of an earlier fit to go on from, where light is sampled, instead of the search for a start.
     judged
         False leaves the verdict to the caller, who has other pictures for it.
+    nearer_than
+        FLIP beyond noise of a result of another class: stages on whole light paths stop where their first ones do not
+        come below it.
 
     Raises
     ------
+    NoNearerError
+        If the first stages did not come `nearer_than` that.
     BadInputError
         If reference and scene do not fit together or the camera does not see the target.
     SetupError
@@ -106,6 +112,7 @@ def recover_material(
         If no route of the preset holds the material, and it may not be handed over.
     """
     task = check_task(renderer, reference, settings, display, listener, should_stop)
+    task = replace(task, nearer_than=nearer_than)
     reasons: list[str] = []
     for make, why in _ways(task, plan, begin, hand_over=hand_over):
         try:

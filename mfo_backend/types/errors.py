@@ -24,5 +24,13 @@ class SetupError(MfoError):
     status = Status.SETUP
 
 
+class NoNearerError(Exception):  # of a trial, which no user meets
+    """A fit from another class of material stopped early: it would not come nearer than the result that there is."""
+
+    def __init__(self, seconds: float, passes: float) -> None:
+        super().__init__("The first stages came no nearer.")
+        self.seconds, self.passes = seconds, passes
+
+
 class UnrecordableError(BadInputError):
     """The target's material or scene is none that recorded light paths can hold; the preset `paper` can."""

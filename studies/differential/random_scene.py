@@ -8,36 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 
-Draw = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Rig:
-    """What settings change."""
-
-    scene: Any
-    target: Any
-    box: Any
-    floor: Any
-    light: Any
-    camera: Any
-    folder: Path
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A property by name, what sets it, and words of the sentence that may name it; none where it is exported."""
-
-    name: str
-    put: Callable[[Rig, Draw], None]
-    words: tuple[str, ...] = ()
+from .artist_settings import ARTIST_SETTINGS
+from .rig import Draw, Rig, Setting, background, principled, put_socket
 
 
 def build(names: Iterable[str], seed: int, folder: Path, *, size: int, samples: int) -> Rig:
@@ -80,7 +58,8 @@ def _plain(draw: Draw, folder: Path, size: int, samples: int) -> Rig:
     bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, location=(0, 0, 1))
     target = _named("Ball", draw.uniform(0.1, 0.9, 3), draw.uniform(0.3, 0.8))
     bpy.ops.object.shade_smooth()
-    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(-1.4, -0.6, 0.5))
+    # above the floor: which of two faces in one plane is seen through a cut-out is left to chance
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(-1.4, -0.6, 0.51))
     box = _named("Box", draw.uniform(0.1, 0.9, 3), 0.7)
     bpy.ops.mesh.primitive_plane_add(size=10.0)
     floor = _named("Floor", draw.uniform(0.2, 0.7, 3), 0.8)
@@ -106,21 +85,6 @@ def _named(name: str, color: Any, roughness: float) -> Any:
     put_socket(item, "Base Color", (*color, 1.0))
     put_socket(item, "Roughness", roughness)
     return item
-
-
-def background(world: Any) -> Any:
-    """The Background node of a world."""
-    return next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-
-
-def principled(item: Any) -> Any:
-    """The Principled node of an object's material."""
-    return next(node for node in item.data.materials[0].node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-
-
-def put_socket(item: Any, name: str, value: Any) -> None:
-    """Set a socket of an object's Principled node."""
-    principled(item).inputs[name].default_value = value
 
 
 def _put(path: str, value: Callable[[Draw], Any]) -> Callable[[Rig, Draw], None]:
@@ -231,6 +195,10 @@ def _no_shadow(rig: Rig, _: Draw) -> None:
     rig.light.data.use_shadow = False
 
 
+def _full_shadow(rig: Rig, _: Draw) -> None:
+    rig.box.data.materials[0].use_transparent_shadow = False
+
+
 def _second_layer(rig: Rig, _: Draw) -> None:
     rig.scene.view_layers.new("Second")
     rig.scene.view_layers[0].use = False
@@ -275,11 +243,11 @@ def _uncorrected(rig: Rig, _: Draw) -> None:
 
 
 LAMP, CYCLES = "light.data", "scene.cycles"
-SETTINGS = (
+SETTINGS: tuple[Setting, ...] = (
     Setting("fast gi", _put(f"{CYCLES}.use_fast_gi", _on), ("Fast GI",)),
     Setting("film exposure", _put(f"{CYCLES}.film_exposure", _between(0.5, 2.0))),
-    Setting("diffuse bounces", _put(f"{CYCLES}.diffuse_bounces", _among(0, 1))),
-    Setting("glossy bounces", _put(f"{CYCLES}.glossy_bounces", _among(0, 1))),
+    Setting("diffuse bounces", _put(f"{CYCLES}.diffuse_bounces", _among(0, 1)), ("limit of diffuse bounces",)),
+    Setting("glossy bounces", _put(f"{CYCLES}.glossy_bounces", _among(0, 1)), ("limit of glossy bounces",)),
     Setting("max bounces", _put(f"{CYCLES}.max_bounces", _among(0, 1, 2))),
     Setting("reflective caustics", _put(f"{CYCLES}.caustics_reflective", _off), ("caustics",)),
     Setting("pixel filter", _put(f"{CYCLES}.pixel_filter_type", _among("GAUSSIAN", "BLACKMAN_HARRIS"))),
@@ -301,7 +269,7 @@ SETTINGS = (
     Setting("lamp size", _put(f"{LAMP}.size", _between(0.2, 2.0))),
     Setting("lamp spread", _put(f"{LAMP}.spread", _between(1.0, 3.0))),
     Setting("lamp blend", _put(f"{LAMP}.spot_blend", _between(0.0, 1.0))),
-    Setting("lamp shadow", _no_shadow, ("casts no shadows",)),
+    Setting("lamp shadow", _no_shadow),
     Setting("lamp bounces", _put(f"{LAMP}.cycles.max_bounces", _among(0, 1)), ("limit of bounces",)),
     Setting("lamp hidden from diffuse", _visibility("light", "diffuse"), ("hidden from",)),
     Setting("lamp hidden from glossy", _visibility("light", "glossy"), ("hidden from",)),
@@ -315,7 +283,10 @@ SETTINGS = (
     Setting("box hidden from camera", _visibility("box", "camera"), ("hidden from camera",)),
     Setting("box hidden from diffuse", _visibility("box", "diffuse"), ("hidden from diffuse",)),
     Setting("box hidden from glossy", _visibility("box", "glossy"), ("hidden from glossy",)),
-    Setting("box without shadow", _visibility("box", "shadow"), ("shadow",)),
+    Setting("box without shadow", _visibility("box", "shadow")),
+    Setting("target without shadow", _visibility("target", "shadow")),
+    Setting("box cut-out", lambda r, d: put_socket(r.box, "Alpha", float(d.uniform(0.1, 0.8)))),
+    Setting("full shadow", _full_shadow),
     Setting("box a holdout", _put("box.is_holdout", _on), ("holdout",)),
     Setting("box a shadow catcher", _put("box.is_shadow_catcher", _on), ("shadow catcher",)),
     Setting("collection indirect only", lambda r, d: _collection(r, "indirect_only"), ("Indirect Only",)),
@@ -335,10 +306,11 @@ SETTINGS = (
     Setting("coat", lambda r, d: _sockets(r, d, Coat_Weight=1.0, Coat_Roughness=0.4)),
     Setting("sheen", lambda r, d: _sockets(r, d, Sheen_Weight=1.0, Sheen_Roughness=0.6)),
     Setting("glass", lambda r, d: put_socket(r.target, "Transmission Weight", 1.0), ("caustics",)),
-    Setting("cut-out", lambda r, d: put_socket(r.target, "Alpha", float(d.uniform(0.2, 0.8))), ("through Alpha",)),
+    Setting("cut-out", lambda r, d: put_socket(r.target, "Alpha", float(d.uniform(0.2, 0.8)))),
     Setting("glowing", lambda r, d: _sockets(r, d, Emission_Strength=2.0)),
-    Setting("glowing box", lambda r, d: put_socket(r.box, "Emission Strength", 1.5), ("glowing objects",)),
+    Setting("glowing box", lambda r, d: put_socket(r.box, "Emission Strength", 1.5)),
     Setting("bump correction", _uncorrected, ("Bump Map Correction",)),
 )  # fmt: skip
+SETTINGS += ARTIST_SETTINGS
 PLAIN_WORDS = ("smooth over few faces",)  # of what the plain scene has at times
 WORDS = {setting.name: setting.words for setting in SETTINGS}

@@ -8,6 +8,7 @@ Mitsuba has an equal for point lights of no extent and for suns of no angle. All
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,20 @@ from .light_model import Light, Vector, area_radiance, point_intensity, sphere_r
 
 # Blender's spot, sun and area shine along local -Z, Mitsuba's along +Z
 TURN = np.diag([1.0, -1.0, -1.0, 1.0])
+# radians; a sun without shadows is a lamp of ours, which has an angle: as narrow as no highlight shows
+NARROW_SUN = math.radians(0.01)
 
 
 def light_element(light: Light, identifier: str) -> Element:
     """Return the emitter for `light`."""
-    return {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[light.kind](light, identifier)
+    element = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[light.kind](light, identifier)
+    return element if light.shadow else add(element, boolean("shadow", False))
 
 
 def _point(light: Light, identifier: str) -> Element:
     place = transform("to_world", _translation(light.position))
+    if light.radius <= 0.0 and not light.shadow:
+        return _sharp_spot(light, identifier, place, 360.0)
     if light.radius <= 0.0:
         return add(plugin("emitter", "point", identifier), place, rgb("intensity", point_intensity(light)))
     lamp = _lamp("blender_point", light, identifier, sphere_radiance(light))
@@ -33,16 +39,22 @@ def _point(light: Light, identifier: str) -> Element:
 
 
 def _spot(light: Light, identifier: str) -> Element:
+    place, degrees = transform("to_world", light.world @ TURN), math.degrees(light.spot_size)
     if light.radius <= 0.0:
-        lamp = add(plugin("emitter", "blender_sharp_spot", identifier), rgb("intensity", point_intensity(light)))
-    else:
-        lamp = add(_lamp("blender_spot", light, identifier, sphere_radiance(light)), *_ball(light))
-    cone = scalar("cone", math.degrees(light.spot_size))
-    return add(lamp, transform("to_world", light.world @ TURN), cone, scalar("blend", light.spot_blend))
+        return _sharp_spot(light, identifier, place, degrees, light.spot_blend)
+    lamp = add(_lamp("blender_spot", light, identifier, sphere_radiance(light)), *_ball(light))
+    return add(lamp, place, scalar("cone", degrees), scalar("blend", light.spot_blend))
+
+
+def _sharp_spot(light: Light, identifier: str, place: Element, degrees: float, blend: float = 0.0) -> Element:
+    lamp = add(plugin("emitter", "blender_sharp_spot", identifier), rgb("intensity", point_intensity(light)))
+    return add(lamp, place, scalar("cone", degrees), scalar("blend", blend))
 
 
 def _sun(light: Light, identifier: str) -> Element:
     frame = transform("to_world", _frame(-light.world[:3, 2] / np.linalg.norm(light.world[:3, 2])))
+    if light.sun_angle <= 0.0 and not light.shadow:
+        light = replace(light, sun_angle=NARROW_SUN, normalize=True)
     if light.sun_angle <= 0.0:
         return add(plugin("emitter", "directional", identifier), frame, rgb("irradiance", sun_irradiance(light)))
     lamp = _lamp("blender_sun", light, identifier, sun_radiance(light))

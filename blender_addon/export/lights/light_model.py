@@ -35,6 +35,7 @@ class Light:
     size_y: float = 1.0
     spread: float = math.pi
     camera: bool = False  # whether the camera sees it
+    shadow: bool = True  # whether anything blocks its light
 
     @property
     def position(self) -> Vector:

@@ -46,8 +46,6 @@ def read_light(
         return None
     if power == 0.0 or color.max() == 0.0:
         return None
-    if not data.use_shadow:
-        findings.note(f"Light '{name}' casts no shadows in Blender; in the fit it does.")
     name_settings(LIGHT_CYCLES, cycles, name, findings)
     _note_linking(evaluated, findings)
     _note_rays(evaluated, findings)
@@ -68,6 +66,7 @@ def read_light(
         size_y=getattr(data, "size_y", 1.0),
         spread=getattr(data, "spread", np.pi) if data.type == "AREA" else np.pi,
         camera=evaluated.visible_camera,
+        shadow=data.use_shadow,
     )
     if light.kind in ("AREA", "SPOT") and abs(np.linalg.det(matrix[:3, :3])) * min(light.sizes) < LEAST_VOLUME:
         findings.error(f"Light '{name}' is scaled or sized to nothing: give it a size and a scale above 0.")

@@ -91,8 +91,6 @@ def approximated(material: Material) -> list[str]:
         found.append(f"Subsurface is fitted as diffuse: no light travels below the surface.{weight}")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
-    if material.value("Alpha", 1.0) != 1.0 and material.transparent_shadows:
-        found.append("where it casts a shadow through Alpha, Cycles lets light pass and the fit less of it.")
     above = [
         name
         for name, nothing in (("Coat Weight", 0.0), ("Sheen Weight", 0.0), ("Alpha", 1.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces of two objects in the same place, of which a ray meets either. Knows nothing of bpy."""
+"""Faces of objects in the same place, of which a ray meets either. Knows nothing of bpy."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from ..files.ply_file import TriangleMesh
 
-STEPS = 1 << 16  # across the whole scene; triangles are in the same place if they agree to one of these
+STEPS = 1 << 16  # across the whole scene; triangles that agree to one of these are looked at
+CLOSE = 1e-3  # of a triangle's longest side: corners so near are in the same place
 
 
 def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, str]]:
-    """Return the pairs of different names that share a triangle, each once, in order of their first triangle."""
-    if len({name for name, _ in places}) < 2:
+    """Return the pairs of names that share a triangle, each once; a name with itself where it has one twice."""
+    if not places:
         return []
     corners = [mesh.positions[mesh.triangles].astype(np.float64) for _, mesh in places]
     low = np.min([c.min(axis=(0, 1)) for c in corners], axis=0)
@@ -24,11 +25,21 @@ def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, 
     owner = np.repeat(np.arange(len(corners)), [len(c) for c in corners])
     keys = np.concatenate([_keys((c - low) / size) for c in corners])
     order = np.argsort(keys, kind="stable")
-    keys, owner = keys[order], owner[order]
-    same = (keys[1:] == keys[:-1]) & (owner[1:] != owner[:-1])
-    pairs = np.unique(np.stack([owner[:-1][same], owner[1:][same]], axis=1), axis=0)
-    named = dict.fromkeys((places[a][0], places[b][0]) for a, b in pairs if places[a][0] != places[b][0])
-    return list(named)
+    same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
+    first, second = order[same], order[same + 1]
+    every = np.concatenate(corners)
+    close = _in_place(every[first], every[second])
+    pairs = np.unique(np.stack([owner[first[close]], owner[second[close]]], axis=1), axis=0)
+    return list(dict.fromkeys((places[a][0], places[b][0]) for a, b in pairs))
+
+
+def _in_place(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether triangles (n, 3, 3) with an area have the same corners in any order."""
+    sides = np.linalg.norm(first - np.roll(first, 1, axis=1), axis=2)
+    area = np.linalg.norm(np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0]), axis=1)
+    apart = np.linalg.norm(first[:, :, None] - second[:, None], axis=3).min(axis=2).max(axis=1)
+    longest = sides.max(axis=1)
+    return (apart <= CLOSE * longest) & (area > CLOSE * longest**2)
 
 
 def _keys(corners: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -46,8 +46,9 @@ DEFAULT_SPP = 64
 MOST_BENT = 0.05
 BOUNCES = ("diffuse", "glossy", "transmission")
 # of a ball, a box and a floor with a limit of 0 one block was 8 % too dark, the picture 1 %; with 1 the picture was
-# 0.06 % too dark, and with 2 or 4 nothing was above the noise
-FEW_GLOSSY_BOUNCES = 2
+# 0.06 % too dark, and with 2 or 4 nothing was above the noise. With no diffuse bounce a metal's picture was 0.4 % too
+# bright, one block 2 %
+FEW_BOUNCES = 2
 
 
 def read_scene(
@@ -108,14 +109,8 @@ def read_scene(
         if len(seen) < len(fitted):
             return None
         walk.note_coincident_faces()
+        walk.note_bent_normals(seen)
         for each, shape in seen:
-            share = share_of_bent_normals(shape.mesh, camera)
-            if share > MOST_BENT:
-                findings.note(
-                    f"Object '{each.object.name}' is smooth over few faces, or has custom normals: on "
-                    f"{100 * share:.0f} % of it normals turn away from the camera. There Cycles bends them for "
-                    "reflections alone, the fit for all light."
-                )
             check_visible(data, shape, each.object, scene, depsgraph, findings)
     return data
 
@@ -176,21 +171,17 @@ def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings
 
 def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
     """The settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
-    if cycles.sample_clamp_indirect > 0.0:
-        findings.note(
-            f"Clamping of indirect light ({cycles.sample_clamp_indirect:.3g}) works on single samples, and those of "
-            "the fit are not Cycles': how much light it takes away may differ.",
-            explains=False,  # Blender's default
-        )
     if not (cycles.caustics_reflective and cycles.caustics_refractive):
         findings.note("Cycles removes caustics; the fit does not.")
-    if cycles.glossy_bounces < min(FEW_GLOSSY_BOUNCES, cycles.max_bounces):
-        findings.note(
-            f"The limit of glossy bounces is {cycles.glossy_bounces}: what counts as one follows from Cycles' choice "
-            "among the lobes of a material, which the fit does not have exactly. Light over glossy surfaces may be "
-            f"several percent off; set {FEW_GLOSSY_BOUNCES} or more in Render Properties > Light Paths, and render the "
-            "reference anew."
-        )
+    for kind in ("glossy", "diffuse"):
+        limit = getattr(cycles, f"{kind}_bounces")
+        if limit < min(FEW_BOUNCES, cycles.max_bounces):
+            findings.note(
+                f"The limit of {kind} bounces is {limit}: what counts as one follows from Cycles' choice among the "
+                "lobes of a material, which the fit does not have exactly. Light over glossy surfaces may be several "
+                f"percent off; set {FEW_BOUNCES} or more in Render Properties > Light Paths, and render the reference "
+                "anew."
+            )
     return {
         "filter_glossy": cycles.blur_glossy,
         "clamp_indirect": cycles.sample_clamp_indirect * cycles.film_exposure,
@@ -218,6 +209,7 @@ class _Walk:
         self.target_pieces: list[list[tuple[TriangleMesh, bool]]] = [[] for _ in targets]
         self.targets_left_out = [0] * len(targets)  # triangles
         self.places: list[tuple[str, TriangleMesh]] = []
+        self.custom_normals = set[str]()
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
@@ -246,9 +238,11 @@ class _Walk:
         for number, pieces in reversed(list(enumerate(self.target_pieces))):  # the first one comes first
             if pieces:
                 meshes, closed = zip(*pieces, strict=True)
-                terminator = Terminator(*shadow_terminator(self.targets[number].object))
+                each = self.targets[number]
+                terminator = Terminator(*shadow_terminator(each.object))
+                shadow = self._shadow_transmission(each.object, each.slot)
                 names = target_shape(number), target_bsdf(number)
-                self.data.shapes.insert(0, Shape(names[0], joined(meshes), names[1], all(closed), terminator))
+                self.data.shapes.insert(0, Shape(names[0], joined(meshes), names[1], all(closed), terminator, shadow))
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
@@ -279,6 +273,8 @@ class _Walk:
         if mesh is None:
             return
         self._note_visibility(item)
+        if item.data.has_custom_normals:
+            self.custom_normals.add(item.name)
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
@@ -300,13 +296,20 @@ class _Walk:
                 self.target_pieces[fitted[slot]].append((piece, mesh.is_closed))
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
-            shape = Shape(name, piece, bsdf, mesh.is_closed, Terminator(*shadow_terminator(item)))
+            terminator, shadow = Terminator(*shadow_terminator(item)), self._shadow_transmission(item, slot)
+            shape = Shape(name, piece, bsdf, mesh.is_closed, terminator, shadow)
             if bsdf in self.baked:
                 self._note_generated(item, slot)
             if self.bakes is not None and bsdf in self.baked:
                 surface = Surface(instance, slot, mesh, slots == slot, matrix)
                 shape = self.bakes.ask_surface(self.data, shape, surface, self.findings)
             self.data.shapes.append(shape)
+
+    def _shadow_transmission(self, item: bpy.types.Object, slot: int) -> float | None:
+        if not item.visible_shadow:
+            return 1.0
+        material = material_of_slot(item, slot)
+        return None if material is None or material.use_transparent_shadow else 0.0
 
     def _note_generated(self, item: bpy.types.Object, slot: int) -> None:
         material = material_of_slot(item, slot)
@@ -321,10 +324,29 @@ class _Walk:
     def note_coincident_faces(self) -> None:
         """Report objects whose faces lie in the same place."""
         for first, second in shared_faces(self.places):
+            if first == second:
+                self.findings.note(
+                    f"'{first}' has faces twice in the same place, which shadow each other in Cycles and not in the "
+                    "fit: merge them (Merge by Distance), or look for a modifier that copies them."
+                )
+                continue
             self.findings.note(
                 f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
                 "Cycles and in the fit."
             )
+
+    def note_bent_normals(self, fitted: Sequence[tuple[FittedSlot, Shape]]) -> None:
+        """Report `fitted` objects, and others with custom normals, on which these turn away from the camera."""
+        meshes = dict(reversed([place for place in self.places if place[0] in self.custom_normals]))
+        meshes |= {each.object.name: shape.mesh for each, shape in fitted}
+        for name, mesh in meshes.items():
+            share = share_of_bent_normals(mesh, self.data.camera)
+            if share > MOST_BENT:
+                self.findings.note(
+                    f"Object '{name}' is smooth over few faces, or has custom normals: on {100 * share:.0f} % of it "
+                    "normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all "
+                    "light."
+                )
 
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
         material = material_of_slot(item, slot)
@@ -359,7 +381,6 @@ class _Walk:
                 ("visible_diffuse", "diffuse"),
                 ("visible_glossy", "glossy"),
                 ("visible_transmission", "transmission"),
-                ("visible_shadow", "shadow"),
             )
             if not getattr(item, name)
         ]

@@ -38,13 +38,17 @@ class Terminator:
 
 @dataclass(frozen=True)
 class Shape:
-    """One mesh with one material; `identifier` is its id in the scene file."""
+    """One mesh with one material; `identifier` is its id in the scene file.
+
+    `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha.
+    """
 
     identifier: str
     mesh: TriangleMesh
     bsdf: str
     is_closed: bool
     terminator: Terminator = Terminator()
+    shadow_transmission: float | None = None
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,6 +27,9 @@ from .world_model import camera_world_element, world_element, world_irradiance
 BACK_OFFSET = 1e-5
 # a weak emitter may still matter elsewhere: it is sampled at least this often, relative to the strongest
 LEAST_WEIGHT = 0.1
+# Clamping of indirect light by the radiance of a white matt surface at the target. At 1 plastic, metal and coat were
+# within 0.1 % of Cycles and glass within 0.2 %; at 0.3 nothing was above the noise of 0.3 % either
+LEAST_CLAMP = 1.0
 
 
 @dataclass
@@ -78,7 +82,7 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
         add(
             plugin("integrator", "path"),
             integer("max_depth", scene.settings.max_depth),
-            boolean("hide_emitters", _hide_emitters(scene, findings)),
+            boolean("hide_emitters", _hide_emitters(scene)),
         ),
         sensor_element(scene.camera, scene.settings.pixel_filter, scene.settings.spp),
     ]
@@ -88,9 +92,10 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
         emitters.append((world, world_irradiance(scene.world)))
     for index, light in enumerate(scene.lights):
         emitters.append((light_element(light, f"light_{index + 1:04d}"), irradiance_at(light, middle)))
+    _note_clamping(scene, sum(irradiance for _, irradiance in emitters), findings)
     _weigh(emitters)
     children += [element for element, _ in emitters]
-    camera_world = None if scene.settings.film_transparent else camera_world_element(scene.world, files.picture)
+    camera_world = camera_world_element(scene.world, files.picture, hidden=scene.settings.film_transparent)
     if camera_world is not None:
         children.append(camera_world)
     fitted = {target_bsdf(number) for number in range(scene.target_count)}
@@ -101,6 +106,16 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
         children += _shape_elements(shape, scene, radius * BACK_OFFSET, files)
     files.text = scene_text(children)
     return files
+
+
+def _note_clamping(scene: SceneData, irradiance: float, findings: Findings) -> None:
+    clamp = float(scene.settings.light_paths.get("clamp_indirect", 0.0))
+    if 0.0 < clamp < LEAST_CLAMP * irradiance / math.pi:
+        findings.note(
+            f"Clamping of indirect light ({clamp / scene.settings.exposure:.3g}) is low for the lights of this scene: "
+            "it works on single samples, and those of the fit are not Cycles', so how much light it takes away may "
+            "differ."
+        )
 
 
 def _weigh(emitters: list[tuple[Element, float]]) -> None:
@@ -121,28 +136,27 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
         path = f"meshes/{identifier}.ply"
         files.meshes[path] = mesh
         element = add(plugin("shape", "ply", identifier), string("filename", path), reference(shape.bsdf))
-        add(element, *_terminator(shape))
+        add(element, *_shadows(shape))
         emitter = emission_element(material, scene.settings.exposure, files.texture)
         elements.append(element if emitter is None else add(element, emitter))
     return elements
 
 
-def _terminator(shape: Shape) -> list[Element]:
-    """What the backend reads about shadows of smooth facets (`mfo_backend/render/transport/smooth_facets.py`)."""
+def _shadows(shape: Shape) -> list[Element]:
+    """What the backend reads about shadows: `smooth_facets.py`, `shadow_rays.py` of `mfo_backend/render/transport`."""
     numbers = {
-        "shadow_geometry_offset": shape.terminator.geometry_offset,
-        "shadow_shading_offset": shape.terminator.shading_offset,
+        "shadow_geometry_offset": shape.terminator.geometry_offset or None,
+        "shadow_shading_offset": shape.terminator.shading_offset or None,
+        "shadow_transmission": shape.shadow_transmission,
     }
-    return [add(plugin("texture", "uniform", name=name), scalar("value", v)) for name, v in numbers.items() if v > 0.0]
+    return [
+        add(plugin("texture", "uniform", name=name), scalar("value", value))
+        for name, value in numbers.items()
+        if value is not None
+    ]
 
 
-def _hide_emitters(scene: SceneData, findings: Findings) -> bool:
-    """Whether camera rays may pass through glowing objects and miss the world; both or none: Mitsuba has one switch."""
+def _hide_emitters(scene: SceneData) -> bool:
+    """Whether camera rays miss the world, for integrators without `camera_world`, which hide glowing objects too."""
     hidden = scene.settings.film_transparent or not scene.world.camera
-    world_is_seen = scene.world.is_lit and not hidden
-    if not world_is_seen and not scene.emitting:
-        return scene.world.is_lit
-    if hidden and scene.world.is_lit:
-        what = "The film is transparent" if scene.settings.film_transparent else "The world is hidden from the camera"
-        findings.note(f"{what}, but glowing objects are in view: the world shows behind them.")
-    return False
+    return hidden and scene.world.is_lit and not scene.emitting

@@ -16,6 +16,7 @@ from ..files.xml_scene import Element, add, bitmap, plugin, rgb, scalar, string,
 AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 # pictures up to this height get rows between their rows, so that both renderers interpolate alike
 EXACT_HEIGHT = 1024
+BLACK_PICTURE = np.zeros((2, 4, 3), np.float32)
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,19 @@ def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> E
     )
 
 
-def camera_world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> Element | None:
-    """Return the `<texture>` that camera rays see behind everything, as `camera_world` of the backend reads it."""
-    if world.camera_pixels is None or not world.camera:
+def camera_world_element(
+    world: World, save: Callable[[NDArray[np.float32]], str], *, hidden: bool = False
+) -> Element | None:
+    """Return the `<texture>` that camera rays see behind everything, as `camera_world` of the backend reads it.
+
+    It is black if the world is `hidden`, or itself hidden from the camera, and None if it is the world as it is.
+    """
+    if not world.is_lit:
         return None
-    element = bitmap("camera_world", save(world.camera_pixels))
+    pixels = BLACK_PICTURE if hidden or not world.camera else world.camera_pixels
+    if pixels is None:
+        return None
+    element = bitmap("camera_world", save(pixels))
     element.set("id", element.attrib.pop("name"))  # nothing of Mitsuba's own refers to it
     return element
 

@@ -41,6 +41,8 @@ class FitTask:
         Polled before every iteration and between stages and pictures.
     began
         The fit's begin on the monotonic clock, seconds.
+    nearer_than
+        FLIP beyond noise that a fit from another class has to come below; None where there is none before it.
     """
 
     renderer: Renderer
@@ -55,6 +57,7 @@ class FitTask:
     listener: Listener
     should_stop: Callable[[], bool]
     began: float
+    nearer_than: float | None = None
 
     @property
     def sheet(self) -> ContactSheet | None:

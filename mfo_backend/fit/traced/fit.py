@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 from ...render.models.prepared_material import EMISSION
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...types.certainty import Certainty, Level
-from ...types.errors import UnrecordableError
+from ...types.errors import NoNearerError, UnrecordableError
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..certainty.covariance import certainties, certainties_away
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
+from ..judge.verdict import judge
 from ..judge.verification import Verification
 from ..plans import TransmissionPlan
 from ..random_streams import Stream
@@ -38,6 +40,7 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ...render.paths.traced_paths import TracedPaths
 
 STAGES = ("scan", "race", "polish")
+_LOOK_SPP = 32  # of a picture between two stages; its noise is taken out of what is compared
 _PREVIEW_PATHS, _PREVIEW_SPP = 1 << 15, 2  # a quarter of a launch, whatever the size of the picture
 Vector = NDArray[np.float64]
 
@@ -102,6 +105,8 @@ class TracedRoute:
         raced_to = race(setting, nodes) if not should_stop() else nodes
         found = [raced_to[0]]
         if not should_stop():
+            self._look(raced_to[0])
+        if not should_stop():
             polishing = polish(setting, raced_to)
             ends, pictures = polishing.ends, polishing.pictures
             candidates = [end.x for end in reversed(ends)] + found
@@ -149,6 +154,16 @@ class TracedRoute:
             stages=tuple(course.reports),
             notes=notes,
         )
+
+    def _look(self, x: Vector) -> None:
+        """Stop a fit from another class which the race did not bring nearer than what it has to be better than."""
+        task = self._task
+        if task.nearer_than is None:
+            return
+        image = self._renderer.image(x, seed=Stream.LOOK.seed(task.settings.seed), spp=_LOOK_SPP)
+        judgement = judge(task.reference, image, task.mask, task.view)
+        if judgement is not None and judgement.target.visible > task.nearer_than:
+            raise NoNearerError(time.monotonic() - task.began, self._renderer.passes)
 
     def _choose(self, squares: int, judge: PictureJudge | None) -> Callable[[Sequence[Pixels]], Choice]:
         """The first end unless the eye sees that another is better; a perceptual one is judged below the noise."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...render.sheet.contact_sheet import ContactSheet
-from ...types.errors import UnrecordableError
+from ...types.errors import NoNearerError, UnrecordableError
 from ...types.image import Pixels
 from ...types.result import FitResult
 from ...types.status import Status
@@ -57,6 +57,10 @@ def with_other_classes(
         except UnrecordableError:
             refused.append(other)
             continue
+        except NoNearerError as ended:
+            no_nearer.append(other)
+            fitted = replace(fitted, result=_with_cost(fitted.result, ended.seconds, ended.passes))
+            continue
         if again.result.status is not Status.CANCELLED:
             no_nearer.append(other)
         fitted = better(fitted, again, other, material)
@@ -64,6 +68,10 @@ def with_other_classes(
         return fitted
     notes = (*fitted.result.notes, *tried_notes(no_nearer, refused))
     return replace(fitted, result=replace(fitted.result, notes=notes))
+
+
+def _with_cost(result: FitResult, seconds: float, passes: float) -> FitResult:
+    return replace(result, seconds=result.seconds + seconds, passes=result.passes + passes)
 
 
 def better(first: Fitted, again: Fitted, other: MaterialClass, material: Mapping[str, Any]) -> Fitted:

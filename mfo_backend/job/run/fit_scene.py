@@ -151,14 +151,16 @@ def _fit_scene(
         labels = [picture.label for picture in pictures]
         return one_sheet(renderers, [p.reference for p in pictures], [p.view for p in pictures], labels)
 
-    def fit(renderer: Renderer, together: SheetTask | None, *, hand_over: bool = True) -> Fitted:
+    def fit(
+        renderer: Renderer, together: SheetTask | None, *, hand_over: bool = True, nearer_than: float | None = None
+    ) -> Fitted:
         heard, shown, display = listener, reference, view
         if together is not None:
             shown, display = together.reference, together.display or view
             heard = partial(_of_first, listener, together.renderer.sheet)
         outcome = recover_material(
             renderer, shown, fit_of, display=display, listener=heard, should_stop=should_stop,
-            hand_over=hand_over, noted=any(p.request.left_out for p in pictures),
+            hand_over=hand_over, noted=any(p.request.left_out for p in pictures), nearer_than=nearer_than,
         )  # fmt: skip
         result = outcome.result if together is None else with_notes(outcome.result, together.notes)
         sheet = None if together is None else together.renderer.sheet
@@ -188,7 +190,9 @@ def _fit_scene(
             # values inside nodes are those of the material in the scene
             loaded = load(lambda material: changed(material, other), parameters_of(other, table.names), None)
             again = task_of(loaded)
-            return fit(renderer_of(loaded, again), again, hand_over=False)
+            judgement = fitted.result.judgement
+            nearer_than = None if judgement is None else judgement.target.visible
+            return fit(renderer_of(loaded, again), again, hand_over=False, nearer_than=nearer_than)
 
         def is_wanted(found: Fitted) -> bool:
             # no class of material makes up for a wrong light

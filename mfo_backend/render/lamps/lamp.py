@@ -35,14 +35,15 @@ class Crossing:
 
 
 class Lamp(mi.Emitter):
-    """Properties of all lamps: `radiance` (linear Rec.709), `to_world` (it shines along +Z) and `camera` (false):
-    whether camera rays see it."""
+    """Properties of all lamps: `radiance` (linear Rec.709), `to_world` (it shines along +Z), `camera` (false): whether
+    camera rays see it, and `shadow` (true): whether its light casts shadows."""
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.m_flags = mi.EmitterFlags.SpatiallyVarying
         self.radiance = opaque_color(props["radiance"])
         self.camera = bool(props.get("camera", False))
+        self.shadow = bool(props.get("shadow", True))
 
     def towards(self, point: mi.Point3f, u: mi.Point2f) -> mi.Vector3f:
         """A unit direction from `point` to the lamp for random numbers `u` in [0, 1)."""

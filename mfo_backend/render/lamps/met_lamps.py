@@ -56,12 +56,13 @@ class SceneLamps:
         density: mi.Float | None = None,
         camera: mi.Bool | bool = False,
         chance: float | None = None,
+        sent_from: mi.Point3f | None = None,
     ) -> mi.Color3f:
         """Radiance of all lamps that `ray` meets before `surface`, or before infinity where that is not valid.
 
         Each counts by the share that `density`, with which the ray was sent out, has beside that of a light sample, its
         lamp chosen with `chance` (default: as the scene does); without `density` each counts in full. Where `camera` is
-        true only lamps that cameras see are met.
+        true only lamps that cameras see are met. A ray that went straight through surfaces was `sent_from` elsewhere.
         """
         total = mi.Color3f(0)
         limit = dr.select(surface.is_valid(), surface.t, dr.inf)
@@ -72,7 +73,8 @@ class SceneLamps:
                 on &= ~mi.Bool(camera)
             share = mi.Float(1)
             if density is not None:
-                share = density / (density + found.density * (own_chance if chance is None else chance))
+                other = found.density if sent_from is None else lamp.crossing(sent_from, ray.d).density
+                share = density / (density + other * (own_chance if chance is None else chance))
             total += dr.select(on, lamp.radiance * (found.factor * share), 0)
         return total
 

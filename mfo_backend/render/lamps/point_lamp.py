@@ -106,12 +106,14 @@ class SpotLamp(PointLamp):
 
 
 class SharpSpot(mi.Emitter):
-    """A spot light of no extent: `intensity` (W/sr, linear Rec.709), `to_world` and the properties of `SpotCone`."""
+    """A spot light of no extent: `intensity` (W/sr, linear Rec.709), `to_world`, the properties of `SpotCone` and
+    `shadow`, as of all lamps."""
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.m_flags = mi.EmitterFlags.DeltaPosition
         self.intensity = opaque_color(props["intensity"])
+        self.shadow = bool(props.get("shadow", True))
         self.center = mi.Point3f(opaque_vector(matrix_of(props)[:3, 3]))
         self.cone = SpotCone(props)
 

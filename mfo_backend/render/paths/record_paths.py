@@ -24,7 +24,8 @@ from ..camera.highlight_cells import Highlights, highlight_cells
 from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
-from ..transport.smooth_facets import ShadowTerminator, seen_side
+from ..transport.shadow_rays import ShadowRays
+from ..transport.smooth_facets import seen_side
 from ..transport.traced_radiance import traced_radiance
 from .even_points import even_points
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
@@ -107,7 +108,7 @@ def record_paths(
         If no pixel sees the shape, or no light reaches it (unless `allow_dark`).
     """
     with dr.suspend_grad():
-        lamps, terminator = SceneLamps(scene), ShadowTerminator.of(scene)
+        lamps, shadows = SceneLamps(scene), ShadowRays(scene)
         if lamps and settings.light_paths is None:
             # so that paths over other surfaces know they are no camera's
             settings = replace(settings, light_paths=LightPaths())
@@ -150,10 +151,10 @@ def record_paths(
         dr.eval(si if sampled or settings.mixed else (), own, position, filter_weight, held)
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels, shape.bsdf() if settings.mixed else None, own)
-        exact = [part for part in _delta_lights(scene, hits, terminator) if dr.width(part.position) > 0]
+        exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
-            lanes += _sampled_lights(scene, hits, settings, lamps, terminator)
+            lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
 
         covered, coverage = coverage_of(pixels, position, filter_weight)
         constant = recorded_background(
@@ -232,23 +233,23 @@ def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction
     return si
 
 
-def _delta_lights(scene: mi.Scene, hits: _Hits, terminator: ShadowTerminator) -> list[TechniqueLanes]:
+def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[TechniqueLanes]:
     """One exact sample for each light of no extent."""
     si = hits.si
-    started = []
+    started, terminator = [], shadows.terminator
     for emitter in scene.emitters():
         if not mi.has_flag(emitter.flags(), DELTA):
             continue
         ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
         wo = si.to_local(ds.d)
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
-        lit &= ~scene.ray_test(terminator.ray(si, ds, lit), True, lit)
-        started.append(_lit(hits, wo, value * (hits.share * terminator.bend(si, wo, lit)), lit))
+        value *= shadows.passed(si, ds, lit).through
+        started.append(_lit(hits, wo, value * (hits.share * terminator.bend(si, wo, lit)), lit & (dr.max(value) > 0.0)))
     return [kept() for kept in started]
 
 
 def _sampled_lights(
-    scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps, terminator: ShadowTerminator
+    scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps, shadows: ShadowRays
 ) -> list[TechniqueLanes]:
     """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
     everywhere = list(scene.emitters())
@@ -267,7 +268,7 @@ def _sampled_lights(
     tile = hits.position // TILE**2 + own * dr.opaque(mi.UInt32, tiles)
     pixels, tiles = hits.pixels * settings.samples, tiles * settings.samples
     hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
-    proposal = settings.proposal
+    proposal, terminator = settings.proposal, shadows.terminator
     front = si.wi.z > 0.0
     # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
     # would be most of the noise, 3 % of a tile for two lights
@@ -283,9 +284,13 @@ def _sampled_lights(
         ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
-        lit &= ~scene.ray_test(terminator.ray(si, ds, lit), lit)
+        passed = shadows.passed(si, ds, lit)
+        value *= passed.through
+        lit &= dr.max(value) > 0.0
         light_density = ds.pdf * choice
         mis = light_density / (light_density + proposal.density(si.wi, wo))
+        # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it
+        mis = dr.select(passed.alpha, 1.0, mis)
         started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
 
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)

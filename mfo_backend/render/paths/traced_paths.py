@@ -14,7 +14,6 @@ stays where it is). Emitters are sampled at every vertex, as by Mitsuba's `path`
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -30,13 +29,15 @@ from ...material.principled.blender_principled import evaluate
 from ...material.principled.layers import layer_stack
 from ...material.principled.lobe_sampling import NAMES, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
-from ...types.parameter import ParameterTable
 from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
+from ..transport.cycles_path import seen_world
 from ..transport.path_random import PathRandom
-from ..transport.smooth_facets import ShadowTerminator, sample_light, seen_side
+from ..transport.shadow_rays import MOST_PASSAGES, ShadowRays, left_of, sample_light
+from ..transport.smooth_facets import seen_side
+from .tangents import Tangents
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
@@ -46,39 +47,6 @@ _TRANSMITS = (
 )
 LEAST_DIFFUSE = 0.02  # probability, under glass: more takes paths from the glass
 DEEPEST = 32  # path length of a scene without a limit
-
-
-@dataclass(frozen=True)
-class Tangents:
-    """The directions in which derivatives are taken: one for each free value, but one for all of the base colour.
-
-    A channel of the picture depends on no other channel of the base colour, so that its three derivatives need one
-    pass.
-    """
-
-    table: ParameterTable
-    entries: tuple[tuple[int, ...], ...]
-
-    @staticmethod
-    def of(table: ParameterTable) -> Tangents:
-        """Those of a table."""
-        entries: list[tuple[int, ...]] = []
-        for p in table:
-            at = range(*table.slice_of(p.name).indices(table.length))
-            entries += [tuple(at)] if p.name == "base_color" else [(k,) for k in at]
-        return Tangents(table, tuple(entries))
-
-    def expand(self, columns: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(..., 3, 1 + directions) to (..., 3, 1 + values)."""
-        if all(len(e) == 1 for e in self.entries):
-            return columns
-        out = np.zeros((*columns.shape[:-1], 1 + self.table.length), np.float32)
-        out[..., 0] = columns[..., 0]
-        for direction, entry in enumerate(self.entries):
-            for channel, k in enumerate(entry):
-                where = slice(None) if len(entry) == 1 else channel
-                out[..., where, 1 + k] = columns[..., where, 1 + direction]
-        return out
 
 
 class TracedPaths:
@@ -114,7 +82,13 @@ class TracedPaths:
         if self._hide and renderer.shape.is_emitter():
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self._light_paths = renderer.light_paths
-        self._lamps, self._terminator = SceneLamps(scene), ShadowTerminator.of(scene)
+        self._lamps, self._shadows = SceneLamps(scene), ShadowRays(scene)
+        self._terminator = self._shadows.terminator
+        self._camera_world = getattr(integrator, "camera_world", None)
+        # a mix tells by its other leaves what goes through it; of those this one's alpha is taken as it is
+        names = () if self._tree is not None else self.table.names
+        through = self._shadows.lets_through and "alpha" in names
+        self._alpha_entry = (self.table.slice_of("alpha").start,) if through else None
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
 
@@ -190,6 +164,7 @@ class TracedPaths:
         """Radiance along the rays and its derivatives in all directions."""
         scene = self.renderer.scene
         directions = len(self._tangents.entries) if jacobian else 0
+        alpha = None if self._alpha_entry is None else dr.gather(mi.Float, theta, offset + self._alpha_entry[0])
         state = {
             "ray": mi.Ray3f(ray),
             "beta": [mi.Color3f(1.0)] + [mi.Color3f(0.0) for _ in range(directions)],
@@ -199,6 +174,7 @@ class TracedPaths:
             "delta": mi.Bool(True),
             "depth": mi.UInt32(0),
             "left": mi.UInt32(self._depth),
+            "passages": mi.UInt32(0),
             "active": mi.Bool(True),
         }
         if self._light_paths is not None:
@@ -215,21 +191,28 @@ class TracedPaths:
             ds = mi.DirectionSample3f(scene, si, s["before"])
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
             seen = dr.select(s["delta"], 1.0, self._share(s["density"], light))
+            straight = depth == s["passages"]
             if self._hide:
-                seen = dr.select(depth == 0, 0.0, seen)
-            emission = mi.Color3f(emitter.eval(si, active)) * seen
+                seen = dr.select(straight, 0.0, seen)
+            emission = mi.Color3f(emitter.eval(si, active))
+            if self._camera_world is not None:
+                behind_all = straight & active & ~si.is_valid()
+                emission = dr.select(behind_all, seen_world(self._camera_world, s["ray"].d, behind_all), emission)
+            emission *= seen
             emission = dr.select(active, emission, 0.0)
             emission *= self._clamp(beta[0] * emission, depth >= 2)
             total = [t + b * emission for t, b in zip(total, beta, strict=True)]
             if self._lamps:
-                straight = s["bounces"][0] + s["bounces"][1] + s["bounces"][2] == 0
                 likely = dr.select(s["delta"], 1e30, s["density"])
-                shine = self._lamps.met(ray, si, active, density=likely, camera=straight)
+                sent_from = s["before"].p if self._shadows.lets_through else None
+                shine = self._lamps.met(ray, si, active, density=likely, camera=straight, sent_from=sent_from)
                 shine *= self._clamp(beta[0] * shine, depth >= 2)
                 total = [t + b * shine for t, b in zip(total, beta, strict=True)]
             active = active & si.is_valid() & (s["left"] > 1)
             # light sampled from here
-            ds, value = sample_light(scene, self._terminator, si, rng.pair(2 + 3 * depth), active)
+            ds, value, times = sample_light(
+                scene, self._shadows, si, rng.pair(2 + 3 * depth), active, None if alpha is None else self._bsdf
+            )
             wo = si.to_local(ds.d)
             lit = active & (ds.pdf > 0.0)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
@@ -253,10 +236,13 @@ class TracedPaths:
             f_next = [f * bend for f in f_next]
             weight = value * dr.select(alone(ds), 1.0, self._share(ds.pdf, pdf_light))
             weight = dr.select(lit, weight, 0.0)
-            weight *= self._clamp(beta[0] * f_light[0] * weight, depth >= 1)
-            total[0] += beta[0] * f_light[0] * weight
+            left_over, slope = left_of(alpha, times)
+            weight *= self._clamp(beta[0] * f_light[0] * weight * left_over, depth >= 1)
+            total[0] += beta[0] * f_light[0] * weight * left_over
             for k in range(directions):
-                total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight
+                total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight * left_over
+                if self._tangents.entries[k] == self._alpha_entry:
+                    total[1 + k] += beta[0] * f_light[0] * weight * slope
             usable = active & (pdf_next > 0.0)
             inverse = dr.select(usable, dr.rcp(dr.maximum(pdf_next, 1e-30)), 0.0)
             new = [beta[0] * f_next[0] * inverse]
@@ -265,16 +251,21 @@ class TracedPaths:
             # a path that shows nothing itself may have derivatives
             strongest = reduce(dr.maximum, (dr.max(dr.abs(c)) for c in new))
             active = usable & (strongest > 1e-5)
+            # what goes straight through is still on its way from where it was sent out
+            is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
+            passages = s["passages"] + dr.select(is_bounce, mi.UInt32(0), 1)
+            counts = is_bounce | (not self._shadows.lets_through)
             after = {
                 "ray": si.spawn_ray(si.to_world(local)),
                 "beta": new,
                 "total": total,
-                "before": mi.Interaction3f(si),
-                "density": pdf_next,
-                "delta": mi.has_flag(kind, mi.BSDFFlags.Delta),
+                "before": dr.select(counts, mi.Interaction3f(si), s["before"]),
+                "density": dr.select(counts, pdf_next, s["density"]),
+                "delta": dr.select(counts, mi.has_flag(kind, mi.BSDFFlags.Delta), s["delta"]),
                 "depth": depth + 1,
-                "left": s["left"] - 1,
-                "active": active,
+                "left": s["left"] - dr.select(counts, mi.UInt32(1), 0),
+                "passages": passages,
+                "active": active & (passages <= MOST_PASSAGES),
             }
             return after | self._counted(s, kind, pdf_next, after["left"])
 

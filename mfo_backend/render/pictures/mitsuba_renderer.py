@@ -327,6 +327,8 @@ def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, fl
     camera_world = _camera_world(document)
     if camera_world is not None:  # what camera rays see behind everything
         document.remove(camera_world)
+        for hides in integrator.findall("boolean[@name='hide_emitters']"):  # this picture has what is hidden
+            hides.set("value", "false")
         camera_world.set("name", CAMERA_WORLD)
         integrator.append(camera_world)
     for bsdf in document.iter("bsdf"):

@@ -22,7 +22,8 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 
 from ...types.light_paths import NO_LIMIT, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
-from .smooth_facets import ShadowTerminator, sample_light, seen_side
+from .shadow_rays import MOST_PASSAGES, ShadowRays, sample_light
+from .smooth_facets import seen_side
 
 PLUGIN_NAME = "cycles_path"
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
@@ -36,6 +37,8 @@ class CyclesPath(RBIntegrator):
 
     A nested texture `camera_world` is what rays straight from the camera see behind everything (`camera_world`).
     """
+
+    shadows_as_cycles = True  # see `shadow_rays`
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
@@ -63,7 +66,8 @@ class CyclesPath(RBIntegrator):
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out.
         """
         primal = mode == dr.ADMode.Primal
-        lamps, terminator = SceneLamps(scene), ShadowTerminator.of(scene)
+        lamps, shadows = SceneLamps(scene), ShadowRays(scene)
+        terminator = shadows.terminator
         context = mi.BSDFContext()
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
@@ -77,6 +81,10 @@ class CyclesPath(RBIntegrator):
         previous = dr.zeros(mi.Interaction3f)
         density = mi.Float(1)
         delta = mi.Bool(True)
+        if shadows.lets_through and before is not None:
+            # what such a ray meets straight behind a surface is found by the light samples of where it was sent out
+            density, delta = mi.Float(0), mi.Bool(False)
+        passages = mi.UInt32(0)
         active = mi.Bool(active)
         valid = mi.Bool(False)
         known = met is not None
@@ -111,11 +119,12 @@ class CyclesPath(RBIntegrator):
             shown *= clamp_factor(self.clamp_indirect, first * shown, bounce >= 2)
             if dr.hint(lamps, mode="scalar"):
                 likely = dr.select(delta, CERTAIN, density)
-                shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight)
+                sent_from = previous.p if shadows.lets_through else None
+                shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight, sent_from=sent_from)
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
-            ds, light = sample_light(scene, terminator, si, sampler.next_2d(), goes_on)
+            ds, light, _ = sample_light(scene, shadows, si, sampler.next_2d(), goes_on)
             lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
             if dr.hint(terminator.bends, mode="scalar"):
                 light *= terminator.bend(si, si.to_local(ds.d), lit)
@@ -150,14 +159,19 @@ class CyclesPath(RBIntegrator):
             diffuse[counts & is_diffuse] += 1
             glossy[counts & ~is_diffuse & ~is_through] += 1
             through[counts & is_through] += 1
-            left -= 1
+            # what goes straight through is still on its way from where it was sent out
+            sent = counts if shadows.lets_through else goes_on
+            left[sent] -= 1
+            passages[goes_on & ~counts] += 1
+            goes_on &= passages <= MOST_PASSAGES
             done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
             left = dr.select(done, dr.minimum(left, 1), left)
             least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
-            bounce += 1
+            bounce[sent] += 1
             throughput *= ratio
-            density, delta = mi.Float(bs.pdf), mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            previous = mi.Interaction3f(si)
+            density = dr.select(sent, bs.pdf, density)
+            delta = dr.select(sent, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), delta)
+            previous = dr.select(sent, mi.Interaction3f(si), previous)
             ray = mi.Ray3f(onward)
             active = goes_on
             if dr.hint(known, mode="scalar"):

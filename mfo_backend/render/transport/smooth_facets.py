@@ -31,8 +31,8 @@ class ShadowTerminator:
     """The triangles of a scene whose shadow rays do not start where they are hit."""
 
     def __init__(self, scene: mi.Scene) -> None:
-        lifted = [s for s in scene.shapes() if s.is_mesh() and _number(s, GEOMETRY_OFFSET) > 0.0 and _is_bent(s)]
-        bent = [s for s in scene.shapes() if _number(s, SHADING_OFFSET) > 0.0]
+        lifted = [s for s in scene.shapes() if s.is_mesh() and shape_number(s, GEOMETRY_OFFSET) > 0.0 and _is_bent(s)]
+        bent = [s for s in scene.shapes() if shape_number(s, SHADING_OFFSET) > 0.0]
         self.lifts, self.bends = bool(lifted), bool(bent)
         if self.lifts:
             sizes = np.array([(s.face_count(), s.vertex_count()) for s in lifted])
@@ -43,10 +43,12 @@ class ShadowTerminator:
                 own_memory(np.concatenate([np.array(getattr(s, f"vertex_{name}_buffer")()) for s in lifted]), mi.Float)
                 for name in ("positions", "normals")
             )
-            self._first = _by_shape(lifted, faces, mi.UInt32)
-            self._cutoff = _by_shape(lifted, [_number(s, GEOMETRY_OFFSET) for s in lifted], mi.Float)
+            self._first = shape_table(lifted, faces, mi.UInt32)
+            self._cutoff = shape_table(lifted, [shape_number(s, GEOMETRY_OFFSET) for s in lifted], mi.Float)
         if self.bends:
-            self._frequency = _by_shape(bent, [1.0 / (1.0 - 0.5 * _number(s, SHADING_OFFSET)) for s in bent], mi.Float)
+            self._frequency = shape_table(
+                bent, [1.0 / (1.0 - 0.5 * shape_number(s, SHADING_OFFSET)) for s in bent], mi.Float
+            )
 
     @staticmethod
     def of(scene: mi.Scene) -> ShadowTerminator:
@@ -131,18 +133,6 @@ def seen_side(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     return si
 
 
-def sample_light(
-    scene: mi.Scene, terminator: ShadowTerminator, si: mi.SurfaceInteraction3f, u: mi.Point2f, active: mi.Bool
-) -> tuple[mi.DirectionSample3f, mi.Color3f]:
-    """As `scene.sample_emitter_direction` with its test for obstacles, from where Cycles tests for them."""
-    if not terminator.lifts:
-        return scene.sample_emitter_direction(si, u, True, active)
-    ds, light = scene.sample_emitter_direction(si, u, False, active)
-    hidden = scene.ray_test(terminator.ray(si, ds, active), active & (ds.pdf > 0.0))
-    ds.pdf = dr.select(hidden, 0.0, ds.pdf)
-    return ds, dr.select(hidden, 0.0, light)
-
-
 def _barycentric(v: list[mi.Vector3f], p: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float]:
     """Weights of the corners `v` at the point `p` of their triangle."""
     a, b, c = v[1] - v[0], v[2] - v[0], p - v[0]
@@ -175,7 +165,8 @@ def _height(
     return sign * dr.maximum(envelope, 0.5 * sign * parabola)
 
 
-def _number(shape: mi.Shape, name: str) -> float:
+def shape_number(shape: mi.Shape, name: str) -> float:
+    """A shape's attribute of one number, 0 where it has none."""
     if not np.any(shape.has_attribute(name)):
         return 0.0
     si = dr.zeros(mi.SurfaceInteraction3f)
@@ -192,7 +183,7 @@ def _is_bent(mesh: Any) -> bool:
     return bool(any((np.einsum("ij,ij->i", n[faces[:, k]], n[faces[:, k - 1]]) < FLAT).any() for k in range(3)))
 
 
-def _by_shape(shapes: list[Any], values: Any, kind: type) -> Any:
+def shape_table(shapes: list[Any], values: Any, kind: type) -> Any:
     """A table of one value a shape by its number in this process, 0 where it has none."""
     numbers = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(s))[0]) for s in shapes]
     table = np.zeros(max(numbers) + 1, np.float32 if kind is mi.Float else np.uint32)

@@ -308,10 +308,10 @@ def test_no_pixel_is_read(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatc
 def test_everything_an_export_says_comes_with_the_button(scene: SimpleNamespace) -> None:
     from blender_addon.check import preflight
 
-    scene.bpy.data.lights[0].use_shadow = False
+    scene.bpy.data.lights[0].cycles.max_bounces = 1
     assert scene.bpy.ops.mfo.check() == {"FINISHED"}
     assert preflight.is_thorough
-    assert any("casts no shadows" in f.sentence for f in preflight.by_export())
+    assert any("limit of bounces" in f.sentence for f in preflight.by_export())
     check(scene)
     preflight.check_now(scene.bpy.context.scene, scene.bpy.context.view_layer)
     assert preflight.by_export() or not preflight.is_thorough

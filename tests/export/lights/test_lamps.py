@@ -68,9 +68,7 @@ def test_what_stays_different_is_said(scene: Any) -> None:
     assert check_export(bpy.context, target) == ([], [])
     light.visible_glossy = False
     light.data.cycles.use_multiple_importance_sampling = False
-    light.data.use_shadow = False
     assert check_export(bpy.context, target)[1] == [
-        "Light 'Light' casts no shadows in Blender; in the fit it does.",
         "Light 'Light' is hidden from glossy rays; in the fit it is not.",
         "Light 'Light' is without Multiple Importance Sampling: mirrors do not show it in Cycles, but in the fit they "
         "do.",

@@ -78,14 +78,19 @@ def test_what_stays_different_is_said(scene: Any, export: Any) -> None:
         "glossy_bounces": 4,
         "transmission_bounces": 12,
     }
-    assert report.notes == (
-        "Clamping of indirect light (10) works on single samples, and those of the fit are not Cycles': how much light "
-        "it takes away may differ.",
-        "Cycles removes caustics; the fit does not.",
-    )
-    # what Blender's defaults bring about in every scene explains no difference
+    assert report.notes == ("Cycles removes caustics; the fit does not.",)
     assert report.request["left_out"] == ["Cycles removes caustics; the fit does not."]
     assert report.request["film_exposure"] == 2.0
+
+
+def test_clamping_is_said_where_it_is_low_for_the_lights(scene: Any, export: Any) -> None:
+    wall = corner(scene)
+    scene.cycles.film_exposure = 2.0
+    scene.cycles.sample_clamp_indirect = 10.0  # Blender's default
+    assert export(wall).notes == ()
+    scene.cycles.sample_clamp_indirect = 0.01
+    (said,) = export(wall).notes
+    assert said.startswith("Clamping of indirect light (0.01) is low for the lights of this scene: ")
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from mfo_backend.job.run.material_classes import (
 )
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.certainty import Certainty, Level
-from mfo_backend.types.errors import UnrecordableError
+from mfo_backend.types.errors import NoNearerError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.result import FitResult
 from mfo_backend.types.status import Status
@@ -200,6 +200,8 @@ def best_of(ends):
         end = ends[other.name]
         if end is None:
             raise UnrecordableError("It has a texture.")
+        if isinstance(end, NoNearerError):
+            raise end
         return end
 
     def is_wanted(found):
@@ -216,6 +218,9 @@ def test_what_was_tried_in_vain_is_said():
         "Fits that began again from one that is of glass or cut out came not clearly nearer.",
     )
     assert (found.seconds, found.passes) == (3.0, 6.0)
+    early = best_of({"of glass": NoNearerError(0.5, 1.0), "cut out": fitted(0.3)})
+    assert early.notes == found.notes
+    assert (early.seconds, early.passes) == (2.5, 5.0)
     assert best_of({"of glass": None, "cut out": fitted(0.3)}).notes == (
         "The material of the scene did not match. Fits that began again from one that is cut out came not clearly "
         "nearer. No fit holds one that is of glass.",

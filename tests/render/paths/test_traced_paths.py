@@ -9,7 +9,7 @@ import pytest
 from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.errors import UnrecordableError
 from mfo_backend.types.light_paths import LightPaths
-from tests.render.scenes import FLOOR, SKY, write_scene
+from tests.render.scenes import AREA, FLOOR, SKY, write_scene
 
 NAMES = ["base_color", "transmission_weight", "roughness", "ior", "alpha"]
 GLASS = {"base_color": (0.9, 0.6, 0.4), "transmission_weight": 0.8, "roughness": 0.4, "ior": 1.45, "alpha": 0.9}
@@ -59,6 +59,25 @@ def test_derivatives_are_those_of_the_mean_picture(glass):
         # the index has heavy tails: the slope of the Fresnel term has no bound at total reflection
         noise = 0.03 if k == renderer.table.slice_of("ior").start else 0.015
         np.testing.assert_allclose(columns[:, k], secant, rtol=0.05, atol=noise)
+
+
+def test_alpha_has_the_slope_of_the_light_that_passes(tmp_path):
+    """A cut-out ball under lamps: what its far side shows has come through the near one."""
+    materials = {"target_bsdf": {"name": "Leaf", "distribution": "MULTI_GGX", "sockets": {}}}
+    path = write_scene(tmp_path, AREA + FLOOR, size=16, depth=8)
+    renderer = load_renderer(
+        path, "target", model="blender_principled", parameters=NAMES, materials=materials, light_paths=LightPaths()
+    )
+    from mfo_backend.render.paths.traced_paths import TracedPaths
+
+    paths, pixels = TracedPaths(renderer), np.flatnonzero(renderer.target_mask().ravel())
+    x = renderer.table.pack({**GLASS, "transmission_weight": 0.0, "alpha": 0.5})
+    k = renderer.table.slice_of("alpha").start
+    h = np.zeros_like(x)
+    h[k] = 0.03
+    column = paths.images(x[None], pixels, seed=1, samples=1024, jacobian=True)[0].mean(axis=0)[:, 1 + k]
+    down, up = paths.images(np.stack([x - h, x + h]), pixels, seed=2, samples=1024, jacobian=False)[..., 0]
+    np.testing.assert_allclose(column, (up - down).mean(axis=0) / 0.06, rtol=0.03, atol=0.003)
 
 
 def test_the_weight_of_clear_glass_has_derivatives_without_spikes(glass):

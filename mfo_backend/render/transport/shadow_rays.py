@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much of a lamp's light reaches a point, as Cycles' shadow rays say (kernel/integrator/shade_shadow.h).
+
+A shadow ray goes on through surfaces that are cut out by alpha, and loses what they do not let through. It sees no
+obstacle on the way to a lamp that casts no shadows (its property `shadow`), and a shape whose attribute
+`SHADOW_TRANSMISSION` is 1 is none; where that is 0 the shape blocks light whatever its alpha. Rays that a material has
+sent out see all of these as they are. Choose the variant before importing this.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ...material.arrays.own_memory import own_memory
+from .smooth_facets import ShadowTerminator, shape_number, shape_table
+
+SHADOW_TRANSMISSION = "shadow_transmission"
+MOST_PASSAGES = 8  # surfaces a ray goes straight through before it ends: Blender's default of Transparent bounces
+
+
+@dataclass(frozen=True)
+class Passed:
+    """What is left of light: its share `through` (RGB), whether `alpha` took some, and how often it went through the
+    surface `of` which was asked."""
+
+    through: Any
+    alpha: Any
+    times: Any
+
+
+class ShadowRays:
+    """The shadow rays of a scene."""
+
+    def __init__(self, scene: mi.Scene) -> None:
+        self.terminator = ShadowTerminator.of(scene)
+        self._scene = scene
+        self._shadowless = [e for e in scene.emitters() if not getattr(e, "shadow", True)]
+        self._marked = marked = [s for s in scene.shapes() if np.any(s.has_attribute(SHADOW_TRANSMISSION))]
+        # of each shape: 1 more than what it lets through, or 0 where its material says it
+        values = [1.0 + shape_number(s, SHADOW_TRANSMISSION) for s in marked]
+        self._marks = shape_table(marked, values, mi.Float) if marked else own_memory(np.zeros(1, np.float32), mi.Float)
+        as_cycles = getattr(scene.integrator(), "shadows_as_cycles", False)  # Mitsuba's integrators block all light
+        self.lets_through = as_cycles and any(
+            s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
+        )
+        self.plain = not marked and not self.lets_through and not self._shadowless
+
+    def passed(self, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f, active: Any, of: Any = None) -> Passed:
+        """What is left of the light of the sample `ds` at `si`; passages through the BSDF `of` are only counted."""
+        casts = mi.Bool(active)
+        for lamp in self._shadowless:
+            casts &= ds.emitter != mi.EmitterPtr(lamp)
+        ray = self.terminator.ray(si, ds, casts)
+        if not self._marked and not self.lets_through:
+            hidden = self._scene.ray_test(ray, casts)
+            return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0))
+        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of))
+
+    @dr.syntax
+    def _followed(self, ray: mi.Ray3f, end: mi.Point3f, active: mi.Bool, of: mi.BSDFPtr) -> Passed:
+        scene, marks = self._scene, self._marks
+        through, alpha, times, met = mi.Color3f(1), mi.Bool(False), mi.UInt32(0), mi.UInt32(0)
+        while dr.hint(active, label="shadow rays"):
+            si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=False, active=active)
+            active &= si.is_valid()
+            bsdf = si.bsdf()
+            share = mi.Color3f(bsdf.eval_null_transmission(si, active))
+            own = active & (bsdf == of)
+            number = dr.reinterpret_array(mi.UInt32, si.shape)
+            known = active & (number < dr.opaque(mi.UInt32, dr.width(marks)))
+            mark = dr.gather(mi.Float, marks, number, known)
+            marked = known & (mark > 0)
+            own &= ~marked
+            alpha |= active & ~marked & (dr.max(share) > 0)
+            share = dr.select(marked, mi.Color3f(mark - 1), dr.select(own, 1, share))
+            met += 1
+            times[own] += 1
+            share = dr.select(met > MOST_PASSAGES, 0, share)
+            through = dr.select(active, through * share, through)
+            active &= dr.max(through) > 0
+            ray = si.spawn_ray_to(end)
+        return Passed(through, alpha, times)
+
+
+def sample_light(
+    scene: mi.Scene, shadows: ShadowRays, si: mi.SurfaceInteraction3f, u: mi.Point2f, active: mi.Bool, of: Any = None
+) -> tuple[mi.DirectionSample3f, mi.Color3f, mi.UInt32]:
+    """As `scene.sample_emitter_direction` with its test for obstacles, as Cycles tests for them.
+
+    The last is how often the light went through the BSDF `of`, which takes nothing of it here.
+    """
+    if shadows.plain and not shadows.terminator.lifts:
+        return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0)
+    ds, light = scene.sample_emitter_direction(si, u, False, active)
+    passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of)
+    ds.pdf = dr.select(dr.max(passed.through) > 0, ds.pdf, 0.0)
+    return ds, light * passed.through, passed.times
+
+
+def left_of(alpha: mi.Float | None, times: mi.UInt32) -> tuple[mi.Float | float, mi.Float | float]:
+    """What a surface leaves of light that goes through it so many times, and the derivative by its alpha.
+
+    All of it, and 0, where no alpha is known.
+    """
+    if alpha is None:
+        return 1.0, 0.0
+    clear, first = mi.Float(1.0), mi.Float(1.0)  # to the power of `times`, and of one less
+    for k in range(1, MOST_PASSAGES + 1):
+        first = dr.select(times >= k, clear, first)
+        clear = dr.select(times >= k, clear * (1.0 - alpha), clear)
+    return clear, -mi.Float(times) * first

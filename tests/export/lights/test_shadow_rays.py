@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What shadow rays pass by: lights and objects without shadows, and surfaces that alpha cuts out. Oracle: Cycles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+SEED = 1  # a fine ball, which no sentence names
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("lamp shadow",),
+        ("lamp shadow", "lamp radius"),
+        ("box without shadow", "target without shadow"),
+        ("box cut-out",),
+        ("box cut-out", "full shadow"),
+        ("cut-out", "film transparent", "glowing box"),
+    ],
+    ids=" and ".join,
+)
+def test_the_picture_is_that_of_cycles_without_a_note(settings: tuple[str, ...], mitsuba: Any, tmp_path: Path) -> None:
+    from studies.differential.study import try_scene
+
+    outcome = try_scene(settings, SEED, tmp_path, size=32, samples=64)
+    assert outcome.notes == ()
+    assert outcome.difference is not None
+    assert not outcome.difference.is_failure
+
+
+def test_recorded_paths_see_the_same(mitsuba: Any, tmp_path: Path) -> None:
+    """The floor, in the shadow of a box that is cut out."""
+    from blender_addon.export.job import export_job
+    from mfo_backend.job.folder.job_folder import JobFolder
+    from mfo_backend.job.folder.request import read_request
+    from mfo_backend.job.run.fit_scene import request_materials
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures.renderer import load_renderer
+    from studies.differential.random_scene import build
+
+    rig = build(("box cut-out",), SEED, tmp_path, size=32, samples=4)
+    bpy.context.scene.render.filepath = str(tmp_path / "cycles.exr")
+    bpy.ops.render.render(write_still=True)
+    report = export_job(bpy.context, rig.floor, tmp_path / "job", reference=tmp_path / "cycles.exr", fit={})
+    folder = JobFolder.open(report.folder)
+    request = read_request(folder)
+    renderer: Any = load_renderer(
+        report.folder / request.scene,
+        request.target.shape_id,
+        model="blender_principled",
+        parameters=["roughness"],
+        materials=request_materials(folder, request),
+        light_paths=request.light_paths,
+    )
+    recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    paths = recorded.record(renderer.start, grid=8, seed=3, near=False)
+    groups = paths.tile_groups()
+    picture = groups.average(renderer.image(renderer.start, seed=7, spp=256))
+    got = recorded.evaluator(paths, groups)(renderer.start)[:, :, 0]
+    assert abs(got.mean() / picture.mean() - 1.0) < 0.01  # 0.005 without any shadow to pass
+    assert np.abs(got - picture).mean() / picture.mean() < 0.035

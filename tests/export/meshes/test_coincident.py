@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which faces are in the same place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from blender_addon.export.files.ply_file import TriangleMesh
+from blender_addon.export.job import check_export
+from blender_addon.export.meshes.coincident import shared_faces
+
+from ..scenes import add_camera, add_light, new_material
+
+
+def mesh(corners: Any) -> TriangleMesh:
+    positions = np.asarray(corners, np.float32).reshape(-1, 3)
+    triangles = np.arange(len(positions), dtype=np.uint32).reshape(-1, 3)
+    return TriangleMesh(positions, np.zeros_like(positions), np.zeros((len(positions), 2), np.float32), triangles)
+
+
+FACE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+
+
+def test_a_face_twice_is_found_within_an_object_and_between_two() -> None:
+    turned = np.roll(FACE, 1, axis=0)[::-1]
+    assert shared_faces([("A", mesh([FACE, turned]))]) == [("A", "A")]
+    assert shared_faces([("A", mesh([FACE])), ("B", mesh([turned, FACE + 3]))]) == [("A", "B")]
+    assert shared_faces([("A", mesh([FACE, FACE + 1e-2])), ("B", mesh([FACE + 2]))]) == []
+    assert shared_faces([]) == []
+
+
+def test_small_faces_of_a_large_scene_and_faces_without_area_are_none() -> None:
+    small = 1e-4 * FACE
+    assert shared_faces([("A", mesh([small, small + 1e-4, 100 * FACE]))]) == []
+    point = 0 * FACE
+    assert shared_faces([("A", mesh([point, point, FACE]))]) == []
+
+
+def test_an_object_with_faces_twice_is_named(scene: Any) -> None:
+    bpy.ops.mesh.primitive_cube_add()
+    item = bpy.context.object
+    item.data.materials.append(new_material("Target"))
+    add_light("POINT", (3, -3, 3), energy=300.0)
+    add_camera("PERSP", (0, -6, 0), rotation=(np.pi / 2, 0, 0))
+    assert not any("twice" in note for note in check_export(bpy.context, item)[1])
+    item.modifiers.new("Mirror", "MIRROR").use_axis = (True, True, False)
+    assert any("'Cube' has faces twice in the same place" in note for note in check_export(bpy.context, item)[1])
