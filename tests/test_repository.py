@@ -19,7 +19,7 @@ MANIFEST = (ROOT / "blender_manifest.toml").read_text("utf-8")
 SOURCES = sorted(
     path
     for path in ROOT.rglob("*.py")
-    if not {".venv", "build", "dist"} & set(path.relative_to(ROOT).parts) and not path.parts[-1].startswith(".")
+    if not any(part in ("build", "dist") or part.startswith(".") for part in path.relative_to(ROOT).parts)
 )
 LOCKS = sorted((ROOT / "requirements").glob("*.lock"))
 
