@@ -11,6 +11,10 @@ import bpy
 
 # fmt: off
 _GERMAN = {
+    "Mark the material as an asset, with its verdict, its reference and the picture of its fit": "Das Material als Asset markieren, mit seinem Urteil, seiner Referenz und dem Bild seiner Anpassung",
+    "Begin with the values of another material of this file; nodes and links stay as they are": "Mit den Werten eines anderen Materials dieser Datei beginnen; Nodes und Verbindungen bleiben, wie sie sind",
+    "Material": "Material",
+    "Whose values are taken": "Dessen Werte genommen werden",
     "Bottom": "Unten",
     "Draw a rectangle over the camera's view: what lies outside has no part in the fit": "Ein Rechteck über der Kameraansicht ziehen: was außerhalb liegt, hat keinen Anteil an der Anpassung",
     "Image that lies over the picture: what is white in it counts, what is black or transparent does not": "Bild, das über dem Bild liegt: was darin weiß ist, zählt, was schwarz oder durchsichtig ist, nicht",
@@ -192,6 +196,8 @@ _GERMAN = {
     "linked": "verbunden",
 }
 _GERMAN_OPERATORS = {
+    "Save as Asset": "Als Asset sichern",
+    "Start From": "Beginnen mit",
     "Draw What Counts": "Zeichnen, was zählt",
     "Only This Region Counts": "Nur dieser Bereich zählt",
     "Paint a Mask": "Maske malen",

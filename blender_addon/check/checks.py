@@ -171,8 +171,9 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
         note_picture_settings(scene, findings)
     replaced = overrides_of(view_layer)
     if replaced:
-        sentence = f"View layer '{view_layer.name}' replaces materials or the world by '{replaced[0]}'"
-        findings.error(f"{sentence}: remove the override.", Fix("no_override"))
+        name, other = view_layer.name, replaced[0]
+        sentence = f"View layer '{name}' replaces materials or the world by '{other}': remove the override."
+        findings.error(sentence, Fix("no_override"))
     found = list(from_export(findings))
     if scene.render.engine != "CYCLES":
         engine = scene.render.engine.removeprefix("BLENDER_").replace("_", " ").title()

@@ -250,10 +250,11 @@ def partial_export(
             requests[""] = whole.of(fitted[0], 0, fits[0], seen=False) | {"targets": paths}
         files.write(folder)
         tell(0.9)
-        if picture is not None:
+        if picture is not None and reference is not None:
             reference_entry = picture.write(folder)
             for each in requests.values():
                 each["reference"] = reference_entry
+                each["generator"]["reference"] = reference.name  # what the user calls it
         for path, graph in zip(paths, graphs, strict=True):
             if path:
                 link_files(folder, folder / path)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a user or a script can do: set up the backend, choose pictures, check, fit, apply, revert, go back, compare."""
 
-from . import apply, backend, check, cycles, fit, history, materials, more_pictures, part, pictures, reference
+from . import apply, asset, backend, check, cycles, fit, history, materials, more_pictures, part, pictures, reference
 
 CLASSES = (
     *reference.CLASSES,
@@ -11,6 +11,7 @@ CLASSES = (
     *check.CLASSES,
     *fit.CLASSES,
     *apply.CLASSES,
+    *asset.CLASSES,
     *history.CLASSES,
     *cycles.CLASSES,
     *pictures.CLASSES,

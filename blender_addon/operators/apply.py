@@ -22,6 +22,7 @@ from ..result.write_back import (
     toggle_values,
 )
 from ..running import running_job
+from ..sentences.translated import translated
 
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -61,14 +62,14 @@ class MFO_OT_apply(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with a result; a script may always try with a job folder."""
         if running_job.current is not None:
-            cls.poll_message_set("A fit is running; wait for it or cancel it")
+            cls.poll_message_set(translated("A fit is running; wait for it or cancel it"))
             return False
         if not bpy.app.background and not context.window_manager.mfo_runtime.has_result:
-            cls.poll_message_set("There is no result yet; run a fit")
+            cls.poll_message_set(translated("There is no result yet; run a fit"))
             return False
         fitted = shown_result.material()
         if fitted is not None and unwritable(fitted):
-            cls.poll_message_set(unwritable(fitted))
+            cls.poll_message_set(translated(unwritable(fitted)))
             return False
         return True
 
@@ -79,7 +80,7 @@ class MFO_OT_apply(bpy.types.Operator):
             self.force = was_asked(context, str(whole_job(shown_result.together[0][0].folder)))
         elif not self.job_folder and found is not None and must_ask(found.verdict):
             if not was_asked(context, str(found.folder)):
-                self.report({"WARNING"}, f"{found.sentence} {PRESS_AGAIN}")
+                self.report({"WARNING"}, translated(f"{found.sentence} {PRESS_AGAIN}"))
                 return {"CANCELLED"}
             self.force = True
         return self.execute(context)
@@ -94,13 +95,15 @@ class MFO_OT_apply(bpy.types.Operator):
             taken = [(result, self._material(result, uid)) for result, uid in found if result not in left]
             notes = [note for result, material in taken for note in self._put(context, result, material)]
         except (JobResultError, WriteBackError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         for result in left:
-            self.report({"WARNING"}, f"{result.material_name!r} was left as it is: {result.sentence} {PRESS_AGAIN}")
+            self.report(
+                {"WARNING"}, translated(f"{result.material_name!r} was left as it is: {result.sentence} {PRESS_AGAIN}")
+            )
         for note in notes:
-            self.report({"WARNING"}, note)
-        self.report({"INFO"}, f"The recovered values are on {', '.join(repr(m.name) for _, m in taken)}.")
+            self.report({"WARNING"}, translated(note))
+        self.report({"INFO"}, translated(f"The recovered values are on {', '.join(repr(m.name) for _, m in taken)}."))
         return {"FINISHED"}
 
     def _put(self, context: bpy.types.Context, result: JobResult, material: bpy.types.Material) -> list[str]:
@@ -144,7 +147,7 @@ class _OnAppliedMaterial:
         """In windows only where values were applied."""
         material = context.object.active_material if context.object else None
         if not bpy.app.background and (material is None or not material.mfo.originals):
-            cls.poll_message_set("Nothing was applied to the active material")
+            cls.poll_message_set(translated("Nothing was applied to the active material"))
             return False
         return True
 
@@ -153,10 +156,10 @@ class _OnAppliedMaterial:
         try:
             notes = self._change(applied_material(context, self.material))
         except WriteBackError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         for note in notes:
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, translated(note))
         return {"FINISHED"}
 
 

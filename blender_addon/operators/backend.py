@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 from ..backend import backend_state
 from ..backend.preferences import preference
 from ..running import running_job
+from ..sentences.translated import translated
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
@@ -37,10 +38,10 @@ class MFO_OT_install_backend(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Refused while it runs already, or while a fit may be using the environment."""
         if backend_state.is_installing():
-            cls.poll_message_set("The backend is being installed")
+            cls.poll_message_set(translated("The backend is being installed"))
             return False
         if running_job.current is not None:
-            cls.poll_message_set("A fit is running; cancel it first")
+            cls.poll_message_set(translated("A fit is running; cancel it first"))
             return False
         return True
 
@@ -49,7 +50,7 @@ class MFO_OT_install_backend(bpy.types.Operator):
         wheels = bpy.path.abspath(self.wheels or preference(context, "wheels"))
         refusal = _why_not(wheels)
         if refusal:
-            self.report({"ERROR"}, refusal)
+            self.report({"ERROR"}, translated(refusal))
             return {"CANCELLED"}
         python = bpy.path.abspath(self.python or preference(context, "base_python"))
         backend_state.start_install(python, wheels)
@@ -58,12 +59,12 @@ class MFO_OT_install_backend(bpy.types.Operator):
         outcome = backend_state.wait(lambda line: print(f"Material Fit: {line}", flush=True))
         state = backend_state.current
         if outcome is not None and outcome.status == "cancelled":
-            self.report({"WARNING"}, outcome.sentence)
+            self.report({"WARNING"}, translated(outcome.sentence))
             return {"CANCELLED"}
         if state.name != "READY":
-            self.report({"ERROR"}, " ".join([state.sentence, *state.problems]))
+            self.report({"ERROR"}, translated(" ".join([state.sentence, *state.problems])))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"The backend is ready: {state.sentence}")
+        self.report({"INFO"}, translated(f"The backend is ready: {state.sentence}"))
         return {"FINISHED"}
 
 
@@ -78,10 +79,10 @@ class MFO_OT_cancel_install(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Only while it runs and was not cancelled yet."""
         if not backend_state.is_installing():
-            cls.poll_message_set("Nothing is being installed")
+            cls.poll_message_set(translated("Nothing is being installed"))
             return False
         if backend_state.is_cancelling():
-            cls.poll_message_set("The installation is being cancelled")
+            cls.poll_message_set(translated("The installation is being cancelled"))
             return False
         return True
 
@@ -102,7 +103,7 @@ class MFO_OT_test_backend(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Not while it is being installed."""
         if backend_state.is_installing():
-            cls.poll_message_set("The backend is being installed")
+            cls.poll_message_set(translated("The backend is being installed"))
             return False
         return True
 
@@ -116,9 +117,9 @@ class MFO_OT_test_backend(bpy.types.Operator):
             backend_state.wait(lambda _line: None)
         sentence = " ".join([state.sentence, *state.problems])
         if state.name in {"BROKEN", "NOT_INSTALLED"}:
-            self.report({"ERROR"}, sentence)
+            self.report({"ERROR"}, translated(sentence))
             return {"CANCELLED"}
-        self.report({"INFO"}, sentence)
+        self.report({"INFO"}, translated(sentence))
         return {"FINISHED"}
 
 
@@ -139,9 +140,11 @@ class MFO_OT_remove_backend(bpy.types.Operator):
         """Delete the folder."""
         left = backend_state.remove()
         if left:
-            self.report({"ERROR"}, f"{left[0]} cannot be deleted: close what uses it and remove the backend again.")
+            self.report(
+                {"ERROR"}, translated(f"{left[0]} cannot be deleted: close what uses it and remove the backend again.")
+            )
             return {"CANCELLED"}
-        self.report({"INFO"}, "The backend was removed.")
+        self.report({"INFO"}, translated("The backend was removed."))
         return {"FINISHED"}
 
 
@@ -156,7 +159,7 @@ class MFO_OT_open_install_log(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Only where there is one."""
         if not backend_state.current.log_file:
-            cls.poll_message_set("Nothing was installed yet")
+            cls.poll_message_set(translated("Nothing was installed yet"))
             return False
         return True
 
@@ -164,7 +167,7 @@ class MFO_OT_open_install_log(bpy.types.Operator):
         """Hand it to the system's editor."""
         log = Path(backend_state.current.log_file)
         if not log.is_file():
-            self.report({"ERROR"}, f"{log} is gone: install the backend again.")
+            self.report({"ERROR"}, translated(f"{log} is gone: install the backend again."))
             return {"CANCELLED"}
         bpy.ops.wm.path_open(filepath=str(log))
         return {"FINISHED"}

@@ -15,6 +15,7 @@ from ..check.mending import KINDS, MendingError
 from ..export.job import ExportError, export_findings
 from ..properties import toggle_bound, toggle_node_value
 from ..running import running_job
+from ..sentences.translated import translated
 
 _BUTTON = {"HIDDEN", "SKIP_SAVE"}
 
@@ -30,7 +31,7 @@ class MFO_OT_check(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Needs an object."""
         if not bpy.app.background and context.view_layer.objects.active is None:
-            cls.poll_message_set("Select the object whose material is to be fitted")
+            cls.poll_message_set(translated("Select the object whose material is to be fitted"))
             return False
         return True
 
@@ -58,7 +59,7 @@ class MFO_OT_mend(bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         """The tooltip of the button's own kind."""
         kind = KINDS.get(properties.kind)
-        return kind.tooltip if kind else ""
+        return translated(kind.tooltip) if kind else ""
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Change the one thing and check again."""
@@ -68,7 +69,7 @@ class MFO_OT_mend(bpy.types.Operator):
                 raise MendingError(f"There is no remedy {self.kind!r}: give one of {', '.join(KINDS)}.")
             kind.mend(context, self.argument)
         except (MendingError, RuntimeError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         preflight.check_mended(context.scene, context.view_layer)
         running_job.redraw()

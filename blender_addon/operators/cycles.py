@@ -10,6 +10,7 @@ from ..backend.preferences import new_job_folder
 from ..check import preflight
 from ..result import shown_result
 from ..running import cycles_check
+from ..sentences.translated import translated
 from .fit_options import FitError, python_of
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -17,7 +18,7 @@ _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
 def _refuse_second(cls: type) -> bool:
     if cycles_check.is_running():
-        cls.poll_message_set("Cycles is rendering already; wait for it or cancel it")  # type: ignore[attr-defined]
+        cls.poll_message_set(translated("Cycles is rendering already; wait for it or cancel it"))  # type: ignore[attr-defined]
     return cycles_check.is_running()
 
 
@@ -34,10 +35,12 @@ class MFO_OT_check_in_cycles(bpy.types.Operator):
         if _refuse_second(cls):
             return False
         if not context.window_manager.mfo_runtime.has_result or shown_result.result is None:
-            cls.poll_message_set("There is no result to render; run a fit or show an earlier result")
+            cls.poll_message_set(translated("There is no result to render; run a fit or show an earlier result"))
             return False
         if not bpy.app.background and context.mode != "OBJECT":
-            cls.poll_message_set("Leave Edit Mode first: what is edited is not in the copy that is rendered")
+            cls.poll_message_set(
+                translated("Leave Edit Mode first: what is edited is not in the copy that is rendered")
+            )
             return False
         return True
 
@@ -49,7 +52,7 @@ class MFO_OT_check_in_cycles(bpy.types.Operator):
             name = material.name if material else result.material_name
             cycles_check.check_result(result.folder, name, python_of(context))
         except (FitError, OSError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         return _wait_in_background(self, context)
 
@@ -67,7 +70,7 @@ class MFO_OT_render_reference(bpy.types.Operator):
         if _refuse_second(cls):
             return False
         if context.scene.camera is None:
-            cls.poll_message_set("The scene has no camera; add one")
+            cls.poll_message_set(translated("The scene has no camera; add one"))
             return False
         return True
 
@@ -76,7 +79,7 @@ class MFO_OT_render_reference(bpy.types.Operator):
         try:
             cycles_check.render_reference(new_job_folder(context, "reference") / "reference.exr")
         except OSError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         return _wait_in_background(self, context)
 
@@ -92,7 +95,7 @@ class MFO_OT_cancel_cycles(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Only while it runs."""
         if not cycles_check.is_running():
-            cls.poll_message_set("Cycles is not rendering for Material Fit")
+            cls.poll_message_set(translated("Cycles is not rendering for Material Fit"))
             return False
         return True
 
@@ -109,7 +112,7 @@ def _wait_in_background(operator: bpy.types.Operator, context: bpy.types.Context
         cycles_check.wait()
         runtime = context.window_manager.mfo_runtime
         if runtime.cycles_flip < 0.0 and runtime.cycles_text:
-            operator.report({"ERROR"}, runtime.cycles_text)
+            operator.report({"ERROR"}, translated(runtime.cycles_text))
             return {"CANCELLED"}
     return {"FINISHED"}
 

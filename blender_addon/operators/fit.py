@@ -15,6 +15,7 @@ from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..result import shown_result
 from ..running import fit_queue, running_export, running_job
+from ..sentences.translated import translated
 from .check import thorough_check
 from .fit_options import (
     FitError,
@@ -45,20 +46,22 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with an object and a material; anything else is said by name when it starts."""
         if running_job.current is not None and bpy.app.background:
-            cls.poll_message_set("A fit is running; cancel it first")
+            cls.poll_message_set(translated("A fit is running; cancel it first"))
             return False
         if running_export.current is not None:
-            cls.poll_message_set("The scene is being exported for a fit")
+            cls.poll_message_set(translated("The scene is being exported for a fit"))
             return False
         if not bpy.app.background and needs_setup():
-            cls.poll_message_set("The backend is not installed yet: press Install below")
+            cls.poll_message_set(translated("The backend is not installed yet: press Install below"))
             return False
         listed = bool(context.scene.mfo.targets)
         if not bpy.app.background and context.object is None and not listed:
-            cls.poll_message_set("Select the object whose material is to be fitted")
+            cls.poll_message_set(translated("Select the object whose material is to be fitted"))
             return False
         if not bpy.app.background and not listed and context.object.active_material is None:
-            cls.poll_message_set("The object has no material in its active slot; give it one with a Principled BSDF")
+            cls.poll_message_set(
+                translated("The object has no material in its active slot; give it one with a Principled BSDF")
+            )
             return False
         return True
 
@@ -74,7 +77,7 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
             fit = drained(self.steps(context, *self._targets(context)))
             if running_job.current is not None:
                 fit_queue.add(fit)
-                self.report({"INFO"}, f"Material {fit.material_name!r} waits for the fit that runs.")
+                self.report({"INFO"}, translated(f"Material {fit.material_name!r} waits for the fit that runs."))
                 running_job.redraw()
                 return {"FINISHED"}
             self.start(fit)
@@ -82,7 +85,7 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
             running_job.fail([str(error)])
             if not bpy.app.background:
                 thorough_check(context)  # lists everything that stops it, with buttons
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         if not self.blocks():
             return {"FINISHED"}
@@ -90,9 +93,9 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         running_job.record_results()
         runtime = context.window_manager.mfo_runtime
         if runtime.state == "FAILED":
-            self.report({"ERROR"}, runtime.sentence)
+            self.report({"ERROR"}, translated(runtime.sentence))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{outcome.sentence} {_error_summary()}".strip())
+        self.report({"INFO"}, translated(f"{outcome.sentence} {_error_summary()}".strip()))
         return {"FINISHED"}
 
     def _targets(self, context: bpy.types.Context) -> tuple[bpy.types.Object, str, list[FittedSlot]]:
@@ -119,10 +122,12 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with more than one material to fit."""
         if running_job.current is not None and bpy.app.background:
-            cls.poll_message_set("A fit is running; cancel it first")
+            cls.poll_message_set(translated("A fit is running; cancel it first"))
             return False
         if not bpy.app.background and len(selected_targets(context, most=2)) < 2:
-            cls.poll_message_set("Select several objects that have different materials with a Principled BSDF")
+            cls.poll_message_set(
+                translated("Select several objects that have different materials with a Principled BSDF")
+            )
             return False
         return True
 
@@ -142,7 +147,7 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
             except FitError as error:
                 refused.append(f"{obj.name}: {error}")
         for sentence in refused:
-            self.report({"WARNING"}, sentence)
+            self.report({"WARNING"}, translated(sentence))
         running_job.redraw()
         return {"FINISHED"} if running_job.current or shown_result.result else {"CANCELLED"}
 
@@ -159,7 +164,7 @@ class MFO_OT_drop_queued(bpy.types.Operator):
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Drop it; its folder goes if it was made for it."""
         if not 0 <= self.index < len(fit_queue.waiting):
-            self.report({"ERROR"}, "This fit does not wait any more.")
+            self.report({"ERROR"}, translated("This fit does not wait any more."))
             return {"CANCELLED"}
         fit_queue.drop(self.index)
         running_job.redraw()
@@ -179,10 +184,10 @@ class MFO_OT_cancel(bpy.types.Operator):
         if running_export.current is not None:
             return True
         if running_job.current is None:
-            cls.poll_message_set("No fit is running")
+            cls.poll_message_set(translated("No fit is running"))
             return False
         if running_job.current.process.cancelling:
-            cls.poll_message_set("The fit is being cancelled")
+            cls.poll_message_set(translated("The fit is being cancelled"))
             return False
         return True
 
@@ -213,7 +218,7 @@ class MFO_OT_choose_shader(bpy.types.Operator):
                 raise FitError("The active object has no material in its active slot.")
             choose_shader(material, self.shader)
         except FitError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -15,6 +15,7 @@ from ..result.job_result import JobResultError, must_ask, read_job_result
 from ..result.local_copy import unwritable
 from ..result.write_back import WriteBackError, apply_values
 from ..running import running_job
+from ..sentences.translated import translated
 from .apply import PRESS_AGAIN, was_asked
 
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
@@ -40,7 +41,7 @@ class _PastResult:
     def poll(cls, context: bpy.types.Context) -> bool:
         """Only with a marked result."""
         if history.chosen(_material(context)) is None:
-            cls.poll_message_set("The active material has no earlier results")  # type: ignore[attr-defined]
+            cls.poll_message_set(translated("The active material has no earlier results"))  # type: ignore[attr-defined]
             return False
         return True
 
@@ -59,7 +60,7 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
         entry = history.chosen(_material(context))
         if entry is not None and must_ask(entry.verdict):
             if not was_asked(context, entry.job_folder):
-                self.report({"WARNING"}, f"{_MISMATCH} {PRESS_AGAIN}")
+                self.report({"WARNING"}, translated(f"{_MISMATCH} {PRESS_AGAIN}"))
                 return {"CANCELLED"}
             self.force = True
         return self.execute(context)
@@ -71,7 +72,7 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
         assert material is not None
         assert entry is not None  # see poll
         if must_ask(entry.verdict) and not self.force:
-            self.report({"ERROR"}, f"{_MISMATCH} Nothing was applied; force=True applies it anyway.")
+            self.report({"ERROR"}, translated(f"{_MISMATCH} Nothing was applied; force=True applies it anyway."))
             return {"CANCELLED"}
         try:
             notes = apply_values(
@@ -82,10 +83,10 @@ class MFO_OT_apply_past(_PastResult, bpy.types.Operator):
                 leaf=entry.leaf or None,
             )
         except WriteBackError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         for note in notes:
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, translated(note))
         return {"FINISHED"}
 
 
@@ -100,7 +101,7 @@ class MFO_OT_show_past(_PastResult, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Not while a fit uses the panel."""
         if running_job.current is not None:
-            cls.poll_message_set("A fit is running; its pictures are shown")
+            cls.poll_message_set(translated("A fit is running; its pictures are shown"))
             return False
         return super().poll(context)
 
@@ -113,7 +114,7 @@ class MFO_OT_show_past(_PastResult, bpy.types.Operator):
         try:
             _show(Path(entry.job_folder), material.session_uid)
         except (JobResultError, WriteBackError) as error:
-            self.report({"ERROR"}, f"{error} Its values are kept here and can be applied.")
+            self.report({"ERROR"}, translated(f"{error} Its values are kept here and can be applied."))
             return {"CANCELLED"}
         return {"FINISHED"}
 
@@ -149,7 +150,7 @@ class MFO_OT_open_job(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Not while a fit uses the panel."""
         if running_job.current is not None:
-            cls.poll_message_set("A fit is running; wait for it or cancel it")
+            cls.poll_message_set(translated("A fit is running; wait for it or cancel it"))
             return False
         return True
 
@@ -168,10 +169,10 @@ class MFO_OT_open_job(bpy.types.Operator):
             if material is not None and not unwritable(material):
                 history.record(material, found)
         except (JobResultError, WriteBackError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         if material is None:
-            self.report({"WARNING"}, f"Material {found.material_name!r} is not in this file.")
+            self.report({"WARNING"}, translated(f"Material {found.material_name!r} is not in this file."))
         return {"FINISHED"}
 
 

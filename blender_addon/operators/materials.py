@@ -11,6 +11,7 @@ from ..export.fitted_slot import FittedSlot
 from ..export.scene.seen_slots import seen_slots
 from ..result import shown_result
 from ..running import running_job
+from ..sentences.translated import translated
 
 
 def ticked_slots(scene: bpy.types.Scene) -> list[FittedSlot]:
@@ -41,7 +42,9 @@ class MFO_OT_list_materials(bpy.types.Operator):
         entries = context.scene.mfo.targets
         slots = seen_slots(context)
         if not slots:
-            self.report({"ERROR"}, "The camera sees no material with a Principled BSDF: set the scene's camera up.")
+            self.report(
+                {"ERROR"}, translated("The camera sees no material with a Principled BSDF: set the scene's camera up.")
+            )
             return {"CANCELLED"}
         off = {entry.material for entry in entries if not entry.use}
         entries.clear()
@@ -79,7 +82,7 @@ class MFO_OT_show_material(bpy.types.Operator):
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Show it; the others stay to be applied with it."""
         if not 0 <= self.index < len(shown_result.together):
-            self.report({"ERROR"}, "There is no such result any more: run the fit again.")
+            self.report({"ERROR"}, translated("There is no such result any more: run the fit again."))
             return {"CANCELLED"}
         shown_result.show_one(self.index)
         running_job.redraw()

@@ -11,6 +11,7 @@ from bpy.props import IntProperty
 from mathutils import Matrix, Vector
 
 from ..result import shown_result
+from ..sentences.translated import translated
 
 
 def add_picture(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> bpy.types.PropertyGroup:
@@ -49,7 +50,9 @@ class MFO_OT_remove_picture(bpy.types.Operator):
         """Remove the entry."""
         pictures = context.scene.mfo.pictures
         if self.index >= len(pictures):
-            self.report({"ERROR"}, f"There is no picture {self.index + 2}: the last is {len(pictures) + 1}.")
+            self.report(
+                {"ERROR"}, translated(f"There is no picture {self.index + 2}: the last is {len(pictures) + 1}.")
+            )
             return {"CANCELLED"}
         pictures.remove(self.index)
         return {"FINISHED"}
@@ -67,10 +70,10 @@ class MFO_OT_set_up_next_picture(bpy.types.Operator):
         """Only with a proposal and the camera that it turns."""
         found = shown_result.result
         if found is None or found.next_turn is None:
-            cls.poll_message_set("The last fit proposes no further picture")
+            cls.poll_message_set(translated("The last fit proposes no further picture"))
             return False
         if context.scene.camera is None:
-            cls.poll_message_set("The scene has no camera")
+            cls.poll_message_set(translated("The scene has no camera"))
             return False
         return True
 
@@ -89,7 +92,9 @@ class MFO_OT_set_up_next_picture(bpy.types.Operator):
         scene.collection.objects.link(camera)
         camera.matrix_world = Matrix.Translation(center) @ turn @ Matrix.Translation(-center) @ source.matrix_world
         scene.camera = entry.camera = camera
-        self.report({"INFO"}, f"Camera {camera.name!r} is set up: make the picture from there and choose its file.")
+        self.report(
+            {"INFO"}, translated(f"Camera {camera.name!r} is set up: make the picture from there and choose its file.")
+        )
         return {"FINISHED"}
 
 

@@ -7,6 +7,7 @@ from ..check import preflight
 from ..export.camera.read_camera import picture_size
 from ..picture_part import count_all, count_render_region
 from ..result import overlay
+from ..sentences.translated import translated
 
 
 class MFO_OT_show_part(bpy.types.Operator):
@@ -23,7 +24,7 @@ class MFO_OT_show_part(bpy.types.Operator):
             try:
                 overlay.show(context.scene)
             except RuntimeError as error:
-                self.report({"WARNING"}, str(error).strip())
+                self.report({"WARNING"}, translated(str(error).strip()))
         return {"FINISHED"}
 
 
@@ -38,7 +39,7 @@ class MFO_OT_take_render_region(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Only with a render region."""
         if not context.scene.render.use_border:
-            cls.poll_message_set("There is no render region: draw one in the camera's view")
+            cls.poll_message_set(translated("There is no render region: draw one in the camera's view"))
             return False
         return True
 
@@ -62,10 +63,10 @@ class MFO_OT_draw_part(bpy.types.Macro):
         settings, camera = context.scene.mfo, context.scene.camera
         chosen = settings.reference_image if settings.reference_source == "IMAGE" else settings.reference_path
         if context.space_data is None or context.space_data.type != "VIEW_3D":
-            cls.poll_message_set("Draw in a 3D view: open the sidebar there")
+            cls.poll_message_set(translated("Draw in a 3D view: open the sidebar there"))
             return False
         if camera is None or camera.type != "CAMERA" or not chosen:
-            cls.poll_message_set("Choose the picture to match, and give the scene a camera, first")
+            cls.poll_message_set(translated("Choose the picture to match, and give the scene a camera, first"))
             return False
         return True
 
@@ -89,7 +90,7 @@ class MFO_OT_paint_mask(bpy.types.Operator):
         for editor in editors[:1]:
             editor.image, editor.ui_mode = part.mask, "PAINT"
         if not editors:
-            self.report({"INFO"}, f"The mask {part.mask.name!r} is ready: paint it in an Image Editor.")
+            self.report({"INFO"}, translated(f"The mask {part.mask.name!r} is ready: paint it in an Image Editor."))
         preflight.request()
         return {"FINISHED"}
 

@@ -11,6 +11,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..result.comparison import comparison_image, picture_image, split_image
+from ..sentences.translated import translated
 
 
 class _JobOperator:
@@ -24,7 +25,7 @@ class _JobOperator:
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only where a job is known."""
         if not bpy.app.background and not job_folder_of(context):
-            cls.poll_message_set("There is no result yet; run a fit")  # type: ignore[attr-defined]
+            cls.poll_message_set(translated("There is no result yet; run a fit"))  # type: ignore[attr-defined]
             return False
         return True
 
@@ -63,7 +64,7 @@ class MFO_OT_show_pictures(_JobOperator, bpy.types.Operator):
             else:
                 image = picture_image(pictures, Path(self.show).name)
         except OSError as error:
-            self.report({"ERROR"}, f"The pictures of the fit cannot be read ({error}): run the fit again.")
+            self.report({"ERROR"}, translated(f"The pictures of the fit cannot be read ({error}): run the fit again."))
             return {"CANCELLED"}
         for area in _image_editors(context):
             area.spaces.active.image = image
@@ -84,7 +85,7 @@ class MFO_OT_open_report(_JobOperator, bpy.types.Operator):
         """Hand index.html to the system."""
         report = Path(self.folder(context)) / "index.html"
         if not report.is_file():
-            self.report({"ERROR"}, f"There is no report in {report.parent}: run the fit again.")
+            self.report({"ERROR"}, translated(f"There is no report in {report.parent}: run the fit again."))
             return {"CANCELLED"}
         bpy.ops.wm.url_open(url=report.absolute().as_uri())
         return {"FINISHED"}
@@ -103,7 +104,7 @@ class MFO_OT_copy_values(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Only with a result."""
         if not context.window_manager.mfo_runtime.has_result:
-            cls.poll_message_set("There is no result yet; run a fit")
+            cls.poll_message_set(translated("There is no result yet; run a fit"))
             return False
         return True
 
@@ -112,15 +113,15 @@ class MFO_OT_copy_values(bpy.types.Operator):
         """Of one value what it was, is, and how sure."""
         row = context.window_manager.mfo_runtime.values.get(properties.name)
         if row is None:
-            return "Copy all recovered values as text"
-        said = f"{row.name}: {row.start or 'unknown'} before, {row.result} recovered"
-        return f"{said} ({row.words})" if row.words else said
+            return translated("Copy all recovered values as text")
+        said = translated(f"{row.name}: {row.start or 'unknown'} before, {row.result} recovered")
+        return f"{said} ({translated(row.words)})" if row.words else said
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put the lines on the clipboard."""
         rows = [row for row in context.window_manager.mfo_runtime.values if self.name in ("", row.name)]
         context.window_manager.clipboard = values_as_text(rows)
-        self.report({"INFO"}, f"Copied {len(rows)} value{'s' * (len(rows) != 1)}.")
+        self.report({"INFO"}, translated(f"Copied {len(rows)} values." if len(rows) != 1 else "Copied 1 value."))
         return {"FINISHED"}
 
 

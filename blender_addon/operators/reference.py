@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 from ..check import preflight
 from ..export.reference.reference import DISPLAY_SUFFIXES, LINEAR_SUFFIXES
 from ..result import overlay
+from ..sentences.translated import translated
 
 
 class MFO_OT_use_reference(bpy.types.Operator):
@@ -29,7 +30,7 @@ class MFO_OT_use_reference(bpy.types.Operator):
             try:
                 overlay.show(scene)
             except RuntimeError as error:
-                self.report({"WARNING"}, str(error).strip())
+                self.report({"WARNING"}, translated(str(error).strip()))
         preflight.request()
         return {"FINISHED"}
 
@@ -47,10 +48,10 @@ class MFO_OT_overlay_reference(bpy.types.Operator):
         settings, camera = context.scene.mfo, context.scene.camera
         chosen = settings.reference_image if settings.reference_source == "IMAGE" else settings.reference_path
         if camera is None or camera.type != "CAMERA":
-            cls.poll_message_set("The scene has no camera; add one")
+            cls.poll_message_set(translated("The scene has no camera; add one"))
             return False
         if not chosen and not overlay.is_shown(camera):
-            cls.poll_message_set("Choose the picture to match first")
+            cls.poll_message_set(translated("Choose the picture to match first"))
             return False
         return True
 
@@ -63,7 +64,9 @@ class MFO_OT_overlay_reference(bpy.types.Operator):
         try:
             overlay.show(scene)
         except RuntimeError as error:
-            self.report({"ERROR"}, f"The reference cannot be shown ({str(error).strip()}): choose another file.")
+            self.report(
+                {"ERROR"}, translated(f"The reference cannot be shown ({str(error).strip()}): choose another file.")
+            )
             return {"CANCELLED"}
         view = getattr(context.space_data, "region_3d", None)
         if view is not None:

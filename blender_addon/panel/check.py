@@ -9,6 +9,7 @@ from ..check import preflight
 from ..check.checks import FINE, IGNORED, STOPS, TO_CHOOSE, Finding
 from ..check.mending import KINDS
 from ..running import running_job
+from ..sentences.translated import translated
 from .layout import draw_sentence
 
 _ICONS = {STOPS: "ERROR", TO_CHOOSE: "FORWARD", IGNORED: "INFO", FINE: "CHECKMARK"}
@@ -22,7 +23,7 @@ class Check:
     def draw_header(self, _context: bpy.types.Context) -> None:
         """Say in the heading whether anything stops the fit."""
         words, icon = preflight.summary()
-        self.layout.label(text=words, icon=icon)  # type: ignore[attr-defined]  # from Panel
+        self.layout.label(text=translated(words), icon=icon)  # type: ignore[attr-defined]  # from Panel
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -59,7 +60,7 @@ def _draw_finding(layout: bpy.types.UILayout, context: bpy.types.Context, findin
         buttons = layout.column(align=True)
         buttons.enabled = not is_mended
         for fix in finding.fixes:
-            label = KINDS[fix.kind].label.format(fix.argument)
+            label = translated(KINDS[fix.kind].label.format(fix.argument))
             icon = "CHECKMARK" if is_mended else "TOOL_SETTINGS"
             button = buttons.operator("mfo.mend", text=label, icon=icon)
             button.kind, button.argument = fix.kind, fix.argument

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..result.shown_result import VERDICT_ICONS
+from .layout import is_narrow
 
 
 class MFO_UL_history(bpy.types.UIList):
@@ -15,7 +16,7 @@ class MFO_UL_history(bpy.types.UIList):
 
     def draw_item(
         self,
-        _context: bpy.types.Context,
+        context: bpy.types.Context,
         layout: bpy.types.UILayout,
         data: bpy.types.PropertyGroup,
         item: bpy.types.PropertyGroup,
@@ -25,10 +26,14 @@ class MFO_UL_history(bpy.types.UIList):
     ) -> None:
         """Draw one result; the one on the material has a full dot, one that looks the same a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
-        split = layout.split(factor=0.62)  # a day and a time, a verdict and its number
+        narrow = is_narrow(context)
+        split = layout.split(factor=0.82 if narrow else 0.62)  # a day and a time, a verdict and its number
         split.label(text=item.name[5:16], icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
         reached = f"{item.flip:.3f}" if item.flip >= 0.0 else ""
-        split.label(text="partial" if item.partial else reached, icon=VERDICT_ICONS.get(item.verdict, "BLANK1"))
+        split.label(
+            text="" if narrow else "partial" if item.partial else reached,
+            icon=VERDICT_ICONS.get(item.verdict, "BLANK1"),
+        )
 
 
 class History:

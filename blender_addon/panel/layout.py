@@ -8,15 +8,18 @@ import textwrap
 import bpy
 
 from ..result import previews
+from ..sentences.translated import translated
 
 _LABELS = {"cycles": "In Cycles", "cycles_difference": "Difference"}
+_SHORT = {"reference": "Goal", "cycles_difference": "Error"}  # where three names have little room
+_LETTERS_OF_A_ROW = 27  # of a line that holds two buttons uncut; a narrower side bar has one below the other
 
 
 def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
-    """A sentence over as many lines as the region needs; labels do not wrap."""
+    """A sentence in the user's language over as many lines as the region needs; labels do not wrap."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(text, letters(context)) or [""]):
+    for i, line in enumerate(textwrap.wrap(translated(text), letters(context)) or [""]):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
@@ -24,6 +27,16 @@ def letters(context: bpy.types.Context) -> int:
     """How many letters a line of the region holds."""
     scale = context.preferences.system.ui_scale
     return max(16, int((context.region.width / scale - 80) / 5.8))  # 5.8 px is an average letter at scale 1
+
+
+def is_narrow(context: bpy.types.Context) -> bool:
+    """Whether two buttons beside each other would have their names cut."""
+    return letters(context) < _LETTERS_OF_A_ROW
+
+
+def pair(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
+    """Where two buttons belong: beside each other, or below where there is no room."""
+    return layout.column(align=True) if is_narrow(context) else layout.row(align=True)
 
 
 def draw_pictures(
@@ -37,6 +50,8 @@ def draw_pictures(
         if previews.icon(name):
             column.template_icon(icon_value=previews.icon(name), scale=scale)
         label = _LABELS.get(name, name.title())
+        if is_narrow(context) and len(names) > 2:
+            label = _SHORT.get(name, label)
         if clickable:
             column.operator("mfo.show_pictures", text=label).show = name
         else:

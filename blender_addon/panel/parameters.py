@@ -37,6 +37,7 @@ class Parameters:
         """Draw the choice and, for Chosen, a line for each value."""
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
         _draw_leaves(layout, context)
+        layout.operator("mfo.start_from", icon="EYEDROPPER")
         layout.row().prop(settings, "parameter_set", expand=True)
         if settings.parameter_set != "chosen":
             return

@@ -5,16 +5,14 @@ from __future__ import annotations
 
 import bpy
 
-from .layout import letters
-
-_LETTERS_OF_A_ROW = 27  # of a line that holds two edges uncut
+from .layout import pair
 
 
 def draw_part(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings of the first picture's part."""
     part = context.scene.mfo.first_picture.part
     header, body = layout.panel("mfo_part", default_closed=True)
-    header.label(text="Part That Counts", icon="BLANK1" if part.is_whole else "SELECT_SET")
+    header.label(text="Part That Counts", icon="NONE" if part.is_whole else "SELECT_SET")
     if not part.is_whole:
         header.operator("mfo.whole_picture", text="", icon="X", emboss=False)
     if body is None:
@@ -24,7 +22,7 @@ def draw_part(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     drawn.operator("mfo.draw_part", icon="SELECT_SET")
     column = body.column(align=True)
     for names in (("left", "right"), ("top", "bottom")):
-        row = column.column(align=True) if letters(context) < _LETTERS_OF_A_ROW else column.row(align=True)
+        row = pair(column, context)
         for name in names:
             row.prop(part, name, slider=True)
     row = body.row(align=True)

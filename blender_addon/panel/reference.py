@@ -9,10 +9,8 @@ from ..check import preflight
 from ..check.checks import asks_view
 from ..result import overlay
 from ..running import running_job
-from .layout import letters
+from .layout import pair
 from .part import draw_part
-
-_LETTERS_OF_A_ROW = 27  # of a line that holds both answers uncut; a narrower side bar has one below the other
 
 
 class Reference:
@@ -45,9 +43,7 @@ class Reference:
         if asks_view(context.scene):
             question = column.column(align=True)
             question.label(text="How was it made?")
-            narrow = letters(context) < _LETTERS_OF_A_ROW
-            choice = question.column(align=True) if narrow else question.row(align=True)
-            choice.prop(settings, "reference_view", expand=True)
+            pair(question, context).prop(settings, "reference_view", expand=True)
 
 
 def _draw_more_pictures(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

@@ -33,3 +33,14 @@ def test_backend_set_up_in_windows(windowed: RealBlender, tmp_path: Path, monkey
     assert "ALL GOOD" in out, out[-4000:]
     assert "script error" not in out, out[-4000:]
     print(next(line for line in out.splitlines() if "ALL GOOD" in line))
+
+
+@pytest.mark.parametrize(("scale", "width"), [(1, 220), (2, 400)])
+def test_main_way_by_mouse_and_keys(windowed: RealBlender, tmp_path: Path, scale: int, width: int) -> None:
+    fake_backend.png(tmp_path / "reference.png", (180, 60, 40))
+    python = str(fake_backend.write_interpreter(tmp_path / "backend_python"))
+    options = ["--enable-event-simulate", "--addons", ADDON_ID, "--python-exit-code", "3"]
+    script = [str(SCRIPT.with_name("by_hand.py")), "--", ADDON_ID, str(tmp_path), str(scale), str(width)]
+    out = windowed.run(*options, "--python", *script, windows=True, MFO_BACKEND_PYTHON=python).stdout
+    assert "ALL GOOD by hand" in out, out[-4000:]
+    assert "script error" not in out, out[-4000:]
