@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import bpy
+
+from .shader_graph import Links
 
 GROUP, GROUP_INPUT = "ShaderNodeGroup", "NodeGroupInput"
 _Groups = tuple[bpy.types.Node, ...]
@@ -21,24 +23,22 @@ def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copi
     """
     ways = [_Way(None, iter([(socket, groups)]))]
     on_the_way: set[_Place] = set()
+    links = Links()
     good: set[_Place] = set()
     while ways:
         way = ways[-1]
-        link = next(way.links, None)
-        if link is None:
-            further, within = next(way.further, (None, ()))
-            if further is None:
-                ways.pop()
-                if way.place is not None:
-                    on_the_way.discard(way.place)
-                    good.add(way.place)
-            else:
-                way.links, way.groups = iter(further.links), within
+        further, within = next(way.further, (None, ()))
+        if further is None:
+            ways.pop()
+            if way.place is not None:
+                on_the_way.discard(way.place)
+                good.add(way.place)
             continue
-        if link.is_muted:
+        link = links.any_into(further)
+        if link is None or link.is_muted:
             continue
         node, output = link.from_node, link.from_socket
-        place = (*(group.as_pointer() for group in way.groups), node.as_pointer(), output.as_pointer())
+        place = (*(group.as_pointer() for group in within), node.as_pointer(), output.as_pointer())
         if not link.is_valid or place in on_the_way:
             return f"the node '{node.name}' by a link in a circle or of a wrong kind"
         if place in good:
@@ -47,18 +47,16 @@ def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copi
         if problem is not None:
             return problem
         on_the_way.add(place)
-        ways.append(_Way(place, iter(feeding(node, output, way.groups))))
+        ways.append(_Way(place, iter(feeding(node, output, within))))
     return None
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Way:
     """An output that is looked at, and what of the sockets that feed it is still to come: graphs have any depth."""
 
     place: _Place | None
     further: Iterator[tuple[bpy.types.NodeSocket, _Groups]]
-    links: Iterator[bpy.types.NodeLink] = field(default_factory=lambda: iter(()))
-    groups: _Groups = ()
 
 
 def feeding(

@@ -17,7 +17,7 @@ from ..images.image_filter import filtered_pixels
 from ..images.image_pixels import MissingImageError, UnreadableImageError
 from ..material_model import Socket, Texture
 
-MOST_NODES = 64  # between a picture and a socket, on all ways; Cycles evaluates what is larger
+MOST_NODES = 32  # between a picture and a socket, on all ways; Cycles evaluates what is larger
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 WRAPS = {"REPEAT": "repeat", "EXTEND": "clamp", "MIRROR": "mirror"}
 FILTERS = {"Linear": "bilinear", "Cubic": "bilinear", "Smart": "bilinear", "Closest": "nearest"}
@@ -48,12 +48,18 @@ class Links:
 
     def into(self, socket: bpy.types.NodeSocket) -> bpy.types.NodeLink:
         """The link into a linked input."""
+        found = self.any_into(socket)
+        assert found is not None
+        return found
+
+    def any_into(self, socket: bpy.types.NodeSocket) -> bpy.types.NodeLink | None:
+        """The link into an input, be it valid or not; None where there is none."""
         tree = socket.id_data
         known = self._of.get(tree.as_pointer())
         if known is None:
             known = {link.to_socket.as_pointer(): link for link in tree.links}
             self._of[tree.as_pointer()] = known
-        return known[socket.as_pointer()]
+        return known.get(socket.as_pointer())
 
 
 def source_of(socket: bpy.types.NodeSocket, links: Links | None = None) -> bpy.types.NodeSocket | None:
