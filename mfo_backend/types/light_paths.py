@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 NO_LIMIT = 1024  # bounces: Blender's largest
+TRANSPARENT_BOUNCES = 8  # Blender's default
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class LightPaths:
         lights. 0 is off.
     diffuse_bounces, glossy_bounces, transmission_bounces
         Bounces of one kind after which a path ends.
+    transparent_bounces
+        Surfaces that light goes straight through one after the other.
     """
 
     filter_glossy: float = 0.0
@@ -28,3 +31,4 @@ class LightPaths:
     diffuse_bounces: int = NO_LIMIT
     glossy_bounces: int = NO_LIMIT
     transmission_bounces: int = NO_LIMIT
+    transparent_bounces: int = TRANSPARENT_BOUNCES

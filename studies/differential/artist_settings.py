@@ -255,6 +255,24 @@ def _delta(rig: Rig, draw: Draw) -> None:
     rig.box.matrix_parent_inverse = Matrix.Translation((0.0, 0.2, 0.0))
 
 
+def _stack(rig: Rig, draw: Draw) -> None:
+    """Clear panes before the ball, as many as light passes or more."""
+    rig.scene.cycles.transparent_max_bounces = int(draw.integers(0, 5))
+    pane = rig.floor.copy()
+    pane.data = rig.floor.data.copy()
+    material = rig.floor.data.materials[0].copy()
+    pane.data.materials[0] = material
+    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    node.inputs["Alpha"].default_value = 0.3
+    pane.scale, pane.rotation_euler = (0.1, 0.1, 0.1), (math.pi / 2, 0.0, 0.0)
+    rig.scene.collection.objects.link(pane)
+    for k in range(int(draw.integers(1, 5))):
+        other = pane.copy()
+        other.location = (0.3, -1.6 - 0.1 * k, 1.2)
+        rig.scene.collection.objects.link(other)
+    bpy.data.objects.remove(pane)
+
+
 def _all() -> Iterator[Setting]:
     exported = {
         "sheared": _sheared, "scaled scene": _scaled_scene, "stretched lamp": _stretched_lamp,
@@ -264,7 +282,7 @@ def _all() -> Iterator[Setting]:
         "curve": _curve, "text": _text, "metaball": _metaball, "simplified": _simplified, "hidden": _hidden,
         "shape key": _shape_key, "world group": _world_group, "world for camera": _world_for_camera,
         "color attribute": _color_attribute, "lamp nodes": _lamp_nodes,
-        "two-sided target": _two_sided_target, "delta": _delta,
+        "two-sided target": _two_sided_target, "stack": _stack, "delta": _delta,
         "mirror modifier": _modifier("MIRROR", use_axis=(False, False, True), use_bisect_axis=(False, False, True)),
         "array modifier": _modifier("ARRAY", count=2, relative_offset_displace=(1.2, 0.3, 0.0)),
         "bevel modifier": _modifier("BEVEL", width=0.2, segments=3),

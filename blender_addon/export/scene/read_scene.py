@@ -186,6 +186,7 @@ def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> di
         "filter_glossy": cycles.blur_glossy,
         "clamp_indirect": cycles.sample_clamp_indirect * cycles.film_exposure,
         **{f"{kind}_bounces": getattr(cycles, f"{kind}_bounces") for kind in BOUNCES},
+        "transparent_bounces": cycles.transparent_max_bounces,
     }
 
 

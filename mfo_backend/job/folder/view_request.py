@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...metrics.display.tone_mapping import DisplayView
-from ...types.light_paths import NO_LIMIT, LightPaths
+from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from .checked_object import CheckedObject
 
 
@@ -49,9 +49,11 @@ def light_paths_from_json(data: Any, where: str) -> LightPaths | None:
     if data is None:
         return None
     counts = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
-    paths = CheckedObject(data, f"{where}: light_paths", ("filter_glossy", "clamp_indirect", *counts))
+    others = ("filter_glossy", "clamp_indirect", "transparent_bounces")
+    paths = CheckedObject(data, f"{where}: light_paths", (*others, *counts))
     return LightPaths(
         paths.number("filter_glossy", 0.0, 1e4, 0.0),
         paths.number("clamp_indirect", 0.0, 1e12, 0.0),
         *(paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts),
+        paths.integer("transparent_bounces", 0, NO_LIMIT, TRANSPARENT_BOUNCES),
     )

@@ -35,7 +35,7 @@ from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from ..transport.cycles_path import seen_world
 from ..transport.path_random import PathRandom
-from ..transport.shadow_rays import MOST_PASSAGES, ShadowRays, left_of, sample_light
+from ..transport.shadow_rays import ShadowRays, left_of, sample_light
 from ..transport.smooth_facets import seen_side
 from .tangents import Tangents
 
@@ -184,6 +184,7 @@ class TracedPaths:
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
             si = seen_side(scene.ray_intersect(ray, active))
+            active = active & ~mi.Bool(self._shadows.ends(si, s["passages"]))
             blur = self._blur(s)
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
@@ -211,8 +212,9 @@ class TracedPaths:
             active = active & si.is_valid() & (s["left"] > 1)
             # light sampled from here
             ds, value, times = sample_light(
-                scene, self._shadows, si, rng.pair(2 + 3 * depth), active, None if alpha is None else self._bsdf
-            )
+                scene, self._shadows, si, rng.pair(2 + 3 * depth), active,
+                None if alpha is None else self._bsdf, s["passages"],
+            )  # fmt: skip
             wo = si.to_local(ds.d)
             lit = active & (ds.pdf > 0.0)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
@@ -265,7 +267,7 @@ class TracedPaths:
                 "depth": depth + 1,
                 "left": s["left"] - dr.select(counts, mi.UInt32(1), 0),
                 "passages": passages,
-                "active": active & (passages <= MOST_PASSAGES),
+                "active": active,
             }
             return after | self._counted(s, kind, pdf_next, after["left"])
 

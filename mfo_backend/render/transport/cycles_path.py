@@ -20,9 +20,9 @@ import drjit as dr
 import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
-from ...types.light_paths import NO_LIMIT, LightPaths
+from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
-from .shadow_rays import MOST_PASSAGES, ShadowRays, sample_light
+from .shadow_rays import ShadowRays, sample_light
 from .smooth_facets import seen_side
 
 PLUGIN_NAME = "cycles_path"
@@ -38,13 +38,12 @@ class CyclesPath(RBIntegrator):
     A nested texture `camera_world` is what rays straight from the camera see behind everything (`camera_world`).
     """
 
-    shadows_as_cycles = True  # see `shadow_rays`
-
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.filter_glossy = float(props.get("filter_glossy", 0.0))
         self.clamp_indirect = float(props.get("clamp_indirect", 0.0))
         self.camera_world = props.get("camera_world", None)
+        self.transparent_bounces = int(props.get("transparent_bounces", TRANSPARENT_BOUNCES))
         self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
 
     @dr.syntax
@@ -101,6 +100,7 @@ class CyclesPath(RBIntegrator):
                 behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
                 si[skip] = behind
             valid |= (bounce == 0) & si.is_valid()
+            active &= ~mi.Bool(shadows.ends(si, passages))
             si = seen_side(si)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), 0)
             bsdf = si.bsdf(ray)
@@ -124,7 +124,7 @@ class CyclesPath(RBIntegrator):
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
-            ds, light, _ = sample_light(scene, shadows, si, sampler.next_2d(), goes_on)
+            ds, light, _ = sample_light(scene, shadows, si, sampler.next_2d(), goes_on, None, passages)
             lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
             if dr.hint(terminator.bends, mode="scalar"):
                 light *= terminator.bend(si, si.to_local(ds.d), lit)
@@ -163,7 +163,6 @@ class CyclesPath(RBIntegrator):
             sent = counts if shadows.lets_through else goes_on
             left[sent] -= 1
             passages[goes_on & ~counts] += 1
-            goes_on &= passages <= MOST_PASSAGES
             done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
             left = dr.select(done, dr.minimum(left, 1), left)
             least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
@@ -214,7 +213,7 @@ def clamp_factor(clamp_indirect: float, sample: Any, indirect: Any) -> Any:
 
 def light_path_properties(light_paths: LightPaths) -> dict[str, float | int]:
     """Properties of the integrator."""
-    numbers = {name: getattr(light_paths, name) for name in _LIMITS}
+    numbers = {name: getattr(light_paths, name) for name in (*_LIMITS, "transparent_bounces")}
     return {"filter_glossy": light_paths.filter_glossy, "clamp_indirect": light_paths.clamp_indirect, **numbers}
 
 

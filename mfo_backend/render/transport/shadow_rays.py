@@ -24,7 +24,6 @@ from ...material.arrays.own_memory import own_memory
 from .smooth_facets import ShadowTerminator, shape_number, shape_table
 
 SHADOW_TRANSMISSION = "shadow_transmission"
-MOST_PASSAGES = 8  # surfaces a ray goes straight through before it ends: Blender's default of Transparent bounces
 
 
 @dataclass(frozen=True)
@@ -48,14 +47,25 @@ class ShadowRays:
         # of each shape: 1 more than what it lets through, or 0 where its material says it
         values = [1.0 + shape_number(s, SHADOW_TRANSMISSION) for s in marked]
         self._marks = shape_table(marked, values, mi.Float) if marked else own_memory(np.zeros(1, np.float32), mi.Float)
-        as_cycles = getattr(scene.integrator(), "shadows_as_cycles", False)  # Mitsuba's integrators block all light
-        self.lets_through = as_cycles and any(
+        # surfaces that light goes straight through; Mitsuba's integrators block all light
+        self.most = int(getattr(scene.integrator(), "transparent_bounces", 0))
+        self.lets_through = hasattr(scene.integrator(), "transparent_bounces") and any(
             s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
         )
         self.plain = not marked and not self.lets_through and not self._shadowless
 
-    def passed(self, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f, active: Any, of: Any = None) -> Passed:
-        """What is left of the light of the sample `ds` at `si`; passages through the BSDF `of` are only counted."""
+    def passed(
+        self,
+        si: mi.SurfaceInteraction3f,
+        ds: mi.DirectionSample3f,
+        active: Any,
+        of: Any = None,
+        passages: mi.UInt32 | int = 0,
+    ) -> Passed:
+        """What is left of the light of the sample `ds` at `si`; passages through the BSDF `of` are only counted.
+
+        The path to `si` has made as many `passages` itself.
+        """
         casts = mi.Bool(active)
         for lamp in self._shadowless:
             casts &= ds.emitter != mi.EmitterPtr(lamp)
@@ -63,10 +73,18 @@ class ShadowRays:
         if not self._marked and not self.lets_through:
             hidden = self._scene.ray_test(ray, casts)
             return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0))
-        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of))
+        made, limit = mi.UInt32(passages), dr.opaque(mi.UInt32, self.most)
+        most = dr.select(limit > made, limit - made, 0)
+        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most)
+
+    def ends(self, si: mi.SurfaceInteraction3f, passages: mi.UInt32) -> mi.Bool | bool:
+        """Whether a path that has gone straight through as many surfaces as it may has met a further one."""
+        if not self.lets_through:
+            return False
+        return si.is_valid() & (passages > 0) & (passages >= dr.opaque(mi.UInt32, self.most))
 
     @dr.syntax
-    def _followed(self, ray: mi.Ray3f, end: mi.Point3f, active: mi.Bool, of: mi.BSDFPtr) -> Passed:
+    def _followed(self, ray: mi.Ray3f, end: mi.Point3f, active: mi.Bool, of: mi.BSDFPtr, most: mi.UInt32) -> Passed:
         scene, marks = self._scene, self._marks
         through, alpha, times, met = mi.Color3f(1), mi.Bool(False), mi.UInt32(0), mi.UInt32(0)
         while dr.hint(active, label="shadow rays"):
@@ -82,9 +100,9 @@ class ShadowRays:
             own &= ~marked
             alpha |= active & ~marked & (dr.max(share) > 0)
             share = dr.select(marked, mi.Color3f(mark - 1), dr.select(own, 1, share))
-            met += 1
+            met[active & ~marked] += 1
             times[own] += 1
-            share = dr.select(met > MOST_PASSAGES, 0, share)
+            share = dr.select(met > most, 0, share)
             through = dr.select(active, through * share, through)
             active &= dr.max(through) > 0
             ray = si.spawn_ray_to(end)
@@ -92,7 +110,13 @@ class ShadowRays:
 
 
 def sample_light(
-    scene: mi.Scene, shadows: ShadowRays, si: mi.SurfaceInteraction3f, u: mi.Point2f, active: mi.Bool, of: Any = None
+    scene: mi.Scene,
+    shadows: ShadowRays,
+    si: mi.SurfaceInteraction3f,
+    u: mi.Point2f,
+    active: mi.Bool,
+    of: Any = None,
+    passages: mi.UInt32 | int = 0,
 ) -> tuple[mi.DirectionSample3f, mi.Color3f, mi.UInt32]:
     """As `scene.sample_emitter_direction` with its test for obstacles, as Cycles tests for them.
 
@@ -101,7 +125,7 @@ def sample_light(
     if shadows.plain and not shadows.terminator.lifts:
         return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0)
     ds, light = scene.sample_emitter_direction(si, u, False, active)
-    passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of)
+    passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of, passages)
     ds.pdf = dr.select(dr.max(passed.through) > 0, ds.pdf, 0.0)
     return ds, light * passed.through, passed.times
 
@@ -113,8 +137,6 @@ def left_of(alpha: mi.Float | None, times: mi.UInt32) -> tuple[mi.Float | float,
     """
     if alpha is None:
         return 1.0, 0.0
-    clear, first = mi.Float(1.0), mi.Float(1.0)  # to the power of `times`, and of one less
-    for k in range(1, MOST_PASSAGES + 1):
-        first = dr.select(times >= k, clear, first)
-        clear = dr.select(times >= k, clear * (1.0 - alpha), clear)
-    return clear, -mi.Float(times) * first
+    base, power = dr.maximum(1.0 - alpha, 1e-6), mi.Float(times)
+    clear, before = (dr.select(power > less, dr.power(base, power - less), 1.0) for less in (0.0, 1.0))
+    return clear, -power * before

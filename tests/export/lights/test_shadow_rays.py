@@ -22,6 +22,7 @@ SEED = 1  # a fine ball, which no sentence names
         ("box cut-out",),
         ("box cut-out", "full shadow"),
         ("cut-out", "film transparent", "glowing box"),
+        ("stack",),
     ],
     ids=" and ".join,
 )

@@ -77,6 +77,7 @@ def test_what_stays_different_is_said(scene: Any, export: Any) -> None:
         "diffuse_bounces": 4,
         "glossy_bounces": 4,
         "transmission_bounces": 12,
+        "transparent_bounces": 8,
     }
     assert report.notes == ("Cycles removes caustics; the fit does not.",)
     assert report.request["left_out"] == ["Cycles removes caustics; the fit does not."]
