@@ -244,7 +244,8 @@ def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
     scene = bpy.context.scene
     if scene.camera is None:
         raise HeadlessError(f"The scene of {chosen.file} has no camera: add one.")
-    scene.render.engine = "CYCLES"
+    if chosen.engine == "cycles":
+        scene.render.engine = "CYCLES"
     if chosen.samples:
         scene.cycles.samples, scene.cycles.seed = chosen.samples, chosen.seed
         scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
@@ -316,6 +317,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--out", required=True, type=Path)
         command.add_argument("--samples", type=int, default=64, help="0: the scene's own")
         command.add_argument("--seed", type=int, default=0)
+        command.add_argument("--engine", default="cycles", choices=("cycles", "scene"), help="scene: the file's own")
         command.add_argument("--parent", type=int, default=0, help="end when this process is not the parent any more")
     command.add_argument("--job", required=True, type=Path)
     command.add_argument("--material", default="")

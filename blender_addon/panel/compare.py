@@ -84,3 +84,5 @@ def _draw_cycles(layout: bpy.types.UILayout, context: bpy.types.Context, runtime
         draw_sentence(line, context, runtime.cycles_text, "ERROR" if failed else "CHECKMARK")
     if previews.icon("cycles"):
         draw_pictures(column, context, ("reference", "cycles", "cycles_difference"), clickable=True)
+    if previews.icon("engine"):
+        draw_pictures(column, context, ("cycles", "engine", "engine_difference"), clickable=True)

@@ -10,8 +10,18 @@ import bpy
 from ..result import previews
 from ..sentences.translated import translated
 
-_LABELS = {"cycles": "In Cycles", "cycles_difference": "Difference"}
-_SHORT = {"reference": "Goal", "cycles_difference": "Error"}  # where three names have little room
+_LABELS = {
+    "cycles": "In Cycles",
+    "cycles_difference": "Difference",
+    "engine": "In Scene's Engine",
+    "engine_difference": "Difference",
+}
+_SHORT = {
+    "reference": "Goal",
+    "cycles_difference": "Error",
+    "engine": "In Scene",
+    "engine_difference": "Error",
+}  # where three names have little room
 _LETTERS_OF_A_ROW = 27  # of a line that holds two buttons uncut; a narrower side bar has one below the other
 
 

@@ -9,7 +9,8 @@ from . import previews
 from .job_result import JobResult, Value
 from .write_back import result_to_sockets, socket_to_parameter
 
-PICTURES = ("reference", "start", "result", "difference", "curve", "cycles", "cycles_difference")
+CHECKED = ("cycles", "cycles_difference", "engine", "engine_difference")  # by the check in Cycles
+PICTURES = ("reference", "start", "result", "difference", "curve", *CHECKED)
 _ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP"}  # others are for the report
 VERDICT_ICONS = {"same": "CHECKMARK", "close": "QUESTION", "different": "ERROR"}  # others have no verdict
 _KEPT = ("split",)  # settings of the view, not of a fit

@@ -133,6 +133,8 @@ GERMAN = {
     "A copy of '{}' cannot be made ({}).": "Eine Kopie von '{}' kann nicht gemacht werden ({}).",
     "A copy of {} cannot be made ({}).": "Eine Kopie von {} kann nicht gemacht werden ({}).",
     # panel
+    "FLIP in Cycles: {}": "FLIP in Cycles: {}",
+    "FLIP in Cycles: {}. {} shows it with {}.": "FLIP in Cycles: {}. {} zeigt es mit {}.",
     "Bar: how sure the value is.": "Balken: wie sicher der Wert ist.",
     "Not visible in the picture, kept: {}.": "Im Bild nicht zu sehen, belassen: {}.",
     # why a button is grey

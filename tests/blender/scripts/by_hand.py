@@ -189,7 +189,7 @@ def draw_part(path_field):
     """Open the part below the path, and drag a rectangle over the view; then let all of the picture count again."""
     part = bpy.context.scene.mfo.first_picture.part
     x, y = path_field
-    yield from click(x, y - 20 * scale)
+    yield from click(x, y - 28 * scale)
     yield from shot("part")
     yield from press("mfo.draw_part(")
     yield 0.5
@@ -208,7 +208,7 @@ def draw_part(path_field):
     yield from shot("part_drawn")
     yield from press("mfo.whole_picture(", part=0.95)
     assert part.is_whole
-    yield from click(x, y - 20 * scale)
+    yield from click(x, y - 28 * scale)
 
 
 def story():
