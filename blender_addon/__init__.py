@@ -15,7 +15,7 @@ from .operators import part
 from .panel import menu
 from .process import waiting_backend
 from .result import comparison, previews
-from .running import cycles_check, handlers, running_export, running_job
+from .running import cycles_check, handlers, live, running_export, running_job
 from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences_page.CLASSES, *OPERATORS, *panel.CLASSES)
@@ -39,6 +39,7 @@ def register() -> None:
 def unregister() -> None:
     """Take everything `register` added away again; a running fit is stopped first."""
     atexit.unregister(unregister)
+    live.close()
     running_export.close()
     running_job.close()
     waiting_backend.close()

@@ -216,6 +216,11 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
             ("replace", "Replace", "Put a key at the current frame, and remove drivers"),
         ),
     )
+    live: BoolProperty(
+        name="Live",
+        description="Fit again from the present values when the reference, what counts of it, a limit or a lock "
+        "changes",
+    )
     max_iterations: IntProperty(
         name="Iterations", description="Most iterations of one stage", default=300, min=1, soft_max=1000, max=100_000
     )

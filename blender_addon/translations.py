@@ -11,6 +11,8 @@ import bpy
 
 # fmt: off
 _GERMAN = {
+    "Live": "Live",
+    "Fit again from the present values when the reference, what counts of it, a limit or a lock changes": "Von den jetzigen Werten neu anpassen, wenn sich die Referenz, was von ihr zählt, eine Grenze oder eine Auswahl ändert",
     "Mark the material as an asset, with its verdict, its reference and the picture of its fit": "Das Material als Asset markieren, mit seinem Urteil, seiner Referenz und dem Bild seiner Anpassung",
     "Begin with the values of another material of this file; nodes and links stay as they are": "Mit den Werten eines anderen Materials dieser Datei beginnen; Nodes und Verbindungen bleiben, wie sie sind",
     "Material": "Material",

@@ -9,7 +9,7 @@ from ..backend.backend_section import draw_setup, has_trouble
 from ..operators.fit_options import selected_targets
 from ..result import previews, shown_result
 from ..result.job_result import must_ask
-from ..running import fit_queue, running_export, running_job
+from ..running import fit_queue, live, running_export, running_job
 from .layout import draw_pictures, draw_sentence, letters
 
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
@@ -23,6 +23,7 @@ class Run:
     def draw(self, context: bpy.types.Context) -> None:
         """Draw settings and button, or the progress."""
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
+        live.watch(context)
         if running_job.current is not None:
             _draw_progress(layout, context)
         elif running_export.current is not None:
@@ -31,6 +32,7 @@ class Run:
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         column.prop(settings, "preset")
+        column.prop(settings, "live")
         header, body = column.panel("mfo_advanced", default_closed=True)
         header.label(text="Advanced")
         if body:

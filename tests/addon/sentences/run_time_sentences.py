@@ -7,7 +7,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-ADDON = Path(__file__).resolve().parents[2] / "blender_addon"
+ADDON = Path(__file__).resolve().parents[3] / "blender_addon"
 # calls whose texts an artist reads, and which of their arguments they are
 _SAID = {"Finding": 1, "translated": 0, "draw_sentence": 2}
 _NAMED = {"said", "sentence"}  # what a sentence is called before it goes into one of them
