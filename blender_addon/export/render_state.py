@@ -84,6 +84,16 @@ def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
     return names
 
 
+def background_objects(scene: bpy.types.Scene) -> set[str]:
+    """Return the names of the objects that a scene shows of its background set, and that of its own."""
+    names: set[str] = set()
+    seen = {scene.name_full}
+    while (scene := scene.background_set) is not None and scene.name_full not in seen:
+        seen.add(scene.name_full)
+        names |= rendered_objects(next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0]))
+    return names
+
+
 def instanced_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
     """Return the names of the objects in collections that rendered objects of `view_layer` put an instance of."""
     names: set[str] = set()

@@ -273,6 +273,18 @@ def _stack(rig: Rig, draw: Draw) -> None:
     bpy.data.objects.remove(pane)
 
 
+def _background_set(rig: Rig, _: Draw) -> None:
+    """The box and a lamp of another scene."""
+    other = bpy.data.scenes.new("Set")
+    for owner in list(rig.box.users_collection):
+        owner.objects.unlink(rig.box)
+    other.collection.objects.link(rig.box)
+    lamp = bpy.data.objects.new("Other", bpy.data.lights.new("Other", "POINT"))
+    lamp.data.energy, lamp.location = 200.0, (-3.0, -2.0, 2.0)
+    other.collection.objects.link(lamp)
+    rig.scene.background_set = other
+
+
 def _all() -> Iterator[Setting]:
     exported = {
         "sheared": _sheared, "scaled scene": _scaled_scene, "stretched lamp": _stretched_lamp,
@@ -282,7 +294,7 @@ def _all() -> Iterator[Setting]:
         "curve": _curve, "text": _text, "metaball": _metaball, "simplified": _simplified, "hidden": _hidden,
         "shape key": _shape_key, "world group": _world_group, "world for camera": _world_for_camera,
         "color attribute": _color_attribute, "lamp nodes": _lamp_nodes,
-        "two-sided target": _two_sided_target, "stack": _stack, "delta": _delta,
+        "two-sided target": _two_sided_target, "stack": _stack, "background set": _background_set, "delta": _delta,
         "mirror modifier": _modifier("MIRROR", use_axis=(False, False, True), use_bisect_axis=(False, False, True)),
         "array modifier": _modifier("ARRAY", count=2, relative_offset_displace=(1.2, 0.3, 0.0)),
         "bevel modifier": _modifier("BEVEL", width=0.2, segments=3),

@@ -6,11 +6,11 @@ from __future__ import annotations
 from .rules import Named, Owner
 
 SCENE = Owner(
-    exported="camera collection compositing_node_group cycles frame_current frame_subframe node_tree objects render "
-    "use_nodes view_layers view_settings world frame_current_final frame_float unit_settings display_settings "
-    "sequence_editor",
+    exported="background_set camera collection compositing_node_group cycles frame_current frame_subframe node_tree "
+    "objects render use_nodes view_layers view_settings world frame_current_final frame_float unit_settings "
+    "display_settings sequence_editor",
     no_effect="active_clip allow_preroll annotation audio_distance_model audio_doppler_factor audio_doppler_speed "
-    "audio_volume background_set cursor cycles_curves display eevee frame_end frame_preview_end frame_preview_start "
+    "audio_volume cursor cycles_curves display eevee frame_end frame_preview_end frame_preview_start "
     "frame_start frame_step gravity grease_pencil grease_pencil_settings hydra is_nla_tweakmode keying_sets "
     "keying_sets_all lock_frame_selection_to_range playback_loop_mode rigidbody_world safe_areas "
     "sequencer_colorspace_settings show_keys_from_selected_only show_subframe simulation_frame_end "

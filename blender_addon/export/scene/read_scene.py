@@ -33,7 +33,14 @@ from ..materials.read_material import needs_bake, note_volume, read_context, rea
 from ..meshes.coincident import shared_faces
 from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
-from ..render_state import instanced_objects, layer_collections, render_state, rendered_layer, rendered_objects
+from ..render_state import (
+    background_objects,
+    instanced_objects,
+    layer_collections,
+    render_state,
+    rendered_layer,
+    rendered_objects,
+)
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
 from .scene_data import RenderSettings, SceneData, Shape, Terminator, target_bsdf, target_shape
@@ -99,7 +106,8 @@ def read_scene(
         _name_settings(scene, view_layer, findings)
         world = read_world(scene, settings.exposure, findings, bakes) if view_layer.use_sky else BLACK
         data = SceneData(camera, settings, world)
-        walk = _Walk(data, fitted, described, depsgraph, rendered_objects(view_layer), findings, bakes)
+        rendered = rendered_objects(view_layer) | background_objects(scene)
+        walk = _Walk(data, fitted, described, depsgraph, rendered, findings, bakes)
         walk.run()
         shapes = [data.target_of(number) for number in range(len(fitted))]
         for number, (each, shape) in enumerate(zip(fitted, shapes, strict=True)):

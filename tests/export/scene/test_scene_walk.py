@@ -129,3 +129,20 @@ def test_a_world_that_the_camera_does_not_see(scene: Any, export: Any, render_cy
     theirs, ours = render_cycles(), render_mitsuba(export(item))
     assert theirs[0, 0].max() == ours[0, 0].max() == 0.0
     assert np.abs(ours.mean() / theirs.mean() - 1.0) < 0.03
+
+
+def test_a_background_set_is_shown(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
+    """A glowing quad and a lamp of another scene, of which a hidden object is not shown."""
+    item = lit_quad(scene)
+    other = bpy.data.scenes.new("Set")
+    glow = add_quad("Glow", 0.5, 1.0, emission_material("Glow", (2.0, 1.0, 0.5)))
+    hidden = add_quad("Hidden", 1.0, 2.0, emission_material("Hidden", (5.0, 5.0, 5.0)))
+    hidden.hide_render = True
+    light = add_light("POINT", (1, 1, 2), energy=50.0)
+    for each in (glow, hidden, light):
+        scene.collection.objects.unlink(each)
+        other.collection.objects.link(each)
+    scene.background_set = other
+    bpy.context.view_layer.update()
+    theirs, ours = render_cycles(), render_mitsuba(export(item))
+    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)  # half of it comes from the set
