@@ -17,10 +17,15 @@ class BakeError(Exception):
 
 
 class Baker:
-    """Sends requests to a Blender of its own and waits for its answers; nothing runs before `start`."""
+    """Sends requests to another Blender and waits for its answers.
 
-    def __init__(self, scene: str, view_layer: str) -> None:
+    It is the one of `shared`, which then must not be asked anything else meanwhile, or else an own one that `start`
+    starts.
+    """
+
+    def __init__(self, scene: str, view_layer: str, shared: Probe | None = None) -> None:
         self._words = {"scene": scene, "view_layer": view_layer}
+        self._shared = shared
         self._probe: Probe | None = None
         self._asked, self._answers = 0, list[dict[str, Any] | BakeError]()
 
@@ -35,7 +40,7 @@ class Baker:
         if self._probe is not None:
             return
         try:
-            self._probe = Probe()
+            self._probe = self._shared or Probe()
             painted = _painted(self._probe.folder)
         except (ProbeError, OSError) as problem:
             self.close()
@@ -77,10 +82,10 @@ class Baker:
         return self._probe is None or self._probe.is_answered(self._asked - len(self._answers))
 
     def close(self) -> None:
-        """End the other Blender and remove its files."""
-        if self._probe is not None:
+        """End the other Blender and remove its files, unless it is shared."""
+        if self._probe is not None and self._probe is not self._shared:
             self._probe.close()
-            self._probe = None
+        self._probe = None
 
 
 def _painted(folder: Path) -> list[dict[str, Any]]:

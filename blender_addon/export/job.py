@@ -213,7 +213,7 @@ def partial_export(
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
         leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
-        with SceneBakes(context) as bakes:
+        with SceneBakes(context, probe) as bakes:
             fitted = [replace(each, leaf=leaf) for each, leaf in zip(fitted, leaves, strict=True)]
             data = read_scene(context, obj, findings, bakes, leaves[0] if leaves else None, fitted if targets else ())
             findings.raise_first()

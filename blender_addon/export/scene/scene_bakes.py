@@ -18,6 +18,7 @@ from ...bake.baker import BakeError, Baker
 from ...bake.light_path import OF_CAMERA
 from ...bake.panorama import LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
+from ...probe.client import Probe
 from ...versions import node_tree_of
 from ..camera.camera_model import Camera
 from ..files.ply_file import TriangleMesh
@@ -83,10 +84,10 @@ class _Asked:
 
 
 class SceneBakes:
-    """Requests to a Blender beside this one, which is started with the first; on leaving it ends."""
+    """Requests to a Blender beside this one: that of `probe`, or one that lives from the first of them to the end."""
 
-    def __init__(self, context: bpy.types.Context) -> None:
-        self._baker = Baker(context.scene.name, rendered_layer(context.scene, context.view_layer).name)
+    def __init__(self, context: bpy.types.Context, probe: Probe | None = None) -> None:
+        self._baker = Baker(context.scene.name, rendered_layer(context.scene, context.view_layer).name, probe)
         self._world: tuple[int, bpy.types.World] | None = None
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id

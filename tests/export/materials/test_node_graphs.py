@@ -170,6 +170,35 @@ def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[A
     return found, wanted.reshape(-1, 3)[groups.pixels]
 
 
+def test_one_blender_evaluates_and_bakes(scene: Any, export: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The target's nodes, the world's and a neighbour's; what they give is what each alone gives."""
+    from blender_addon.probe import client
+
+    lit_scene(scene)
+    scene.world = bpy.data.worlds.new("World")
+    tree = scene.world.node_tree
+    sky = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    gradient = tree.nodes.new("ShaderNodeTexGradient")
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], gradient.inputs[0])
+    tree.links.new(gradient.outputs["Color"], sky.inputs["Color"])
+    neighbour = new_material("Neighbour")
+    noise_ramp(neighbour.node_tree, principled(neighbour))
+    ball(neighbour).location = (0.0, 0.0, -3.0)
+    material = new_material("Target")
+    noise_ramp(material.node_tree, principled(material))
+    target, started = ball(material), []
+    begin = client.Probe.__init__
+    monkeypatch.setattr(client.Probe, "__init__", lambda probe: (started.append(probe), begin(probe))[1])
+    report = export(target)
+    assert len(started) == 1
+    values = np.load(report.folder / report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]["graph"])
+    tree.links.remove(sky.inputs["Color"].links[0])
+    bpy.data.objects.remove(next(o for o in scene.objects if o.active_material == neighbour))
+    alone = export(target, name="alone")
+    entry = alone.request["materials"]["target_bsdf"]["sockets"]["Base Color"]
+    np.testing.assert_array_equal(np.load(alone.folder / entry["graph"]), values)
+
+
 def test_nothing_is_left_in_the_temporary_folder() -> None:
     import os
     import tempfile
