@@ -241,7 +241,7 @@ def _part(scene: bpy.types.Scene, found: _Picture) -> list[Finding]:
         return []
     try:
         with without_pixels():
-            CountedPart(Path(found.name), part.crop, part.mask, part.use_alpha).check()
+            CountedPart(Path(found.name), part.crop, part.mask, part.use_alpha).check(thorough=False)
     except ExportError as problem:
         return [Finding(STOPS, str(problem), (Fix("whole_picture"),))]
     return []

@@ -48,6 +48,8 @@ def save_as_asset(material: bpy.types.Material) -> str:
             data.tags.new(tag)
     if show_target(material, result.folder):
         return "the object with the recovered material"
+    if bpy.app.background:  # Blender 4.3 ends where it renders a preview without a screen
+        return "nothing"
     material.asset_generate_preview()
     return "a sphere"
 

@@ -186,6 +186,7 @@ GERMAN = {
     "Material '{}' is an asset now; its preview shows {}: {}": "Material '{}' ist jetzt ein Asset; seine Vorschau zeigt {}: {}",
     "the object with the recovered material": "das Objekt mit dem gefundenen Material",
     "a sphere": "eine Kugel",
+    "nothing": "nichts",
     "save the file and add its folder as an asset library to find it in other files.": "die Datei speichern und ihren Ordner als Asset-Bibliothek hinzufügen, um es in anderen Dateien zu finden.",
     "Material {} is not in this file (any more): name the one to change.": "Material {} ist nicht (mehr) in dieser Datei: das zu ändernde nennen.",
     "Material {} is not in this file.": "Material {} ist nicht in dieser Datei.",

@@ -46,13 +46,14 @@ class CountedPart:
         """The picture's name."""
         return self.picture.name
 
-    def check(self) -> None:
-        """Raise `ExportError` for a crop that leaves nothing, and for a mask that cannot be read or is black."""
+    def check(self, *, thorough: bool = True) -> None:
+        """Raise `ExportError` for a crop that leaves nothing or a mask that cannot be read, or `thorough` is black."""
         left, top, right, bottom = self.crop
         if not (0.0 <= left < right <= 1.0 and 0.0 <= top < bottom <= 1.0):
             raise ExportError("The crop leaves nothing: left must be below right, and top below bottom.")
         if isinstance(self.mask, bpy.types.Image):
-            if not (_painted(self.mask) > PAINTED).any():
+            painted = _painted(self.mask)
+            if thorough and not (painted >= PAINTED).any():
                 raise ExportError(f"The mask '{self.mask.name}' is black everywhere: paint white what counts.")
         elif self.mask is not None and not self.mask.is_file():
             raise ExportError(f"The mask {self.mask} does not exist: choose another file.")

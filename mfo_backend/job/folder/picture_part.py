@@ -119,7 +119,7 @@ def _inside(crop: tuple[float, float, float, float], image: Image) -> NDArray[np
 
 def _painted(mask: Image) -> NDArray[np.bool_]:
     shown = mask.pixels.mean(axis=-1)
-    return (shown if mask.alpha is None else shown * mask.alpha) > PAINTED
+    return (shown if mask.alpha is None else shown * mask.alpha) >= PAINTED
 
 
 def _scaled(mask: NDArray[np.bool_], image: Image) -> NDArray[np.bool_]:

@@ -54,11 +54,12 @@ def test_a_material_that_shows_its_own_values_is_no_result(scene: SimpleNamespac
     assert applied.asset_data is None
 
 
-def test_without_pictures_blender_renders_the_preview(scene: SimpleNamespace, applied) -> None:
+def test_without_pictures_and_without_a_screen_there_is_no_preview(scene: SimpleNamespace, applied) -> None:
     from blender_addon.result.asset import save_as_asset
 
     (Path(scene.job) / "pictures" / "counted.png").unlink()
-    assert save_as_asset(applied) == "a sphere"
+    assert save_as_asset(applied) == "nothing"
+    assert applied.asset_data is not None
 
 
 def test_values_of_another_material_are_taken_without_its_links(scene: SimpleNamespace) -> None:
