@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two materials that light each other through `mfo blend`: one fit, a result for each, both written in one go."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from .conftest import run_bpy, run_mfo
+
+SIZE = 48
+# a corner of two large walls under one lamp: half of the light on each comes over the other
+BUILD = f"""
+import math
+bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+scene.render.resolution_x = scene.render.resolution_y = {SIZE}
+scene.view_settings.view_transform = "Standard"
+scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = 128, False, False
+nodes = []
+for name, turn, place in (("Floor", 0.0, (0.0, 0.0, 0.0)), ("Wall", math.pi / 2, (0.0, 2.0, 2.0))):
+    bpy.ops.mesh.primitive_plane_add(size=4.0, rotation=(turn, 0.0, 0.0), location=place)
+    item = bpy.context.object
+    item.name = name
+    material = bpy.data.materials.new(name + " Paint")
+    material.use_nodes = True
+    item.data.materials.append(material)
+    nodes.append(next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs)
+lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "AREA"))
+lamp.data.energy, lamp.data.size, lamp.location = 120.0, 1.0, (0.0, 0.6, 3.0)
+lamp.rotation_euler = (0.35, 0.0, 0.0)
+camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+camera.location, camera.rotation_euler = (0.0, -5.5, 2.6), (math.radians(76), 0.0, 0.0)
+for item in (lamp, camera):
+    scene.collection.objects.link(item)
+scene.camera = camera
+bpy.ops.wm.save_as_mainfile(filepath=argv[0], copy=True)
+for inputs, color, rough in zip(nodes, ((0.75, 0.2, 0.1, 1.0), (0.25, 0.6, 0.8, 1.0)), (0.35, 0.6)):
+    inputs["Base Color"].default_value, inputs["Roughness"].default_value = color, rough
+settings = scene.render.image_settings
+if hasattr(settings, "media_type"):
+    settings.media_type = "IMAGE"
+settings.file_format, settings.color_depth, scene.render.filepath = "OPEN_EXR", "32", argv[1]
+bpy.ops.render.render(write_still=True)
+"""
+TRUTH = {"Floor": (0.75, 0.2, 0.1), "Wall": (0.25, 0.6, 0.8)}
+READ = """
+import json
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+found = {}
+for name in ("Floor", "Wall"):
+    tree = bpy.data.objects[name].active_material.node_tree
+    inputs = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED").inputs
+    found[name] = list(inputs["Base Color"].default_value)[:3]
+open(argv[1], "w").write(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def corner(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("corner")
+    run_bpy(BUILD, folder / "start.blend", folder / "reference.exr")
+    return folder
+
+
+def test_both_are_found_in_each_others_light_and_written_in_one_go(corner: Path, tmp_path: Path) -> None:
+    job, saved = tmp_path / "job", tmp_path / "fitted.blend"
+    done = run_mfo(
+        "blend", corner / "start.blend", "--object", "Floor", "--object", "Wall@material=Wall Paint", "--preset",
+        "fast", "--reference", corner / "reference.exr", "--out", job, "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    answer = done.answer
+    assert answer["sentence"] == "2 materials: 2 look the same as the reference."
+    assert [(m["object"], m["verdict"], m["folder"]) for m in answer["materials"]] == [
+        ("Floor", "same", "targets/1"),
+        ("Wall", "same", "targets/2"),
+    ]
+    for found in answer["materials"]:
+        # fitted alone beside the other as it was, each is off by 0.1 and more
+        assert np.abs(np.subtract(found["recovered"]["base_color"], TRUTH[found["object"]])).max() < 0.03
+        own = json.loads((job / found["folder"] / "result.json").read_text("utf-8"))
+        assert own["recovered"] == found["recovered"]
+        assert (job / found["folder"] / "pictures" / "counted.png").is_file()
+    report = (job / "index.html").read_text("utf-8")
+    assert report.count("looks the same as the reference") >= 2
+    assert 'href="targets/2/index.html"' in report
+
+    run_bpy(READ, saved, tmp_path / "read.json")
+    written = json.loads((tmp_path / "read.json").read_text("utf-8"))
+    for found in answer["materials"]:
+        assert written[found["object"]] == pytest.approx(found["recovered"]["base_color"], abs=1e-5)
+
+
+def test_what_cannot_be_is_said_before_the_fit(corner: Path, tmp_path: Path) -> None:
+    words = ["blend", corner / "start.blend", "--reference", corner / "reference.exr", "--out", tmp_path / "job"]
+    twice = run_mfo(*words, "--object", "Floor", "--object", "Floor@slot=1")
+    assert (twice.code, twice.sentence.endswith("is named twice: name it once.")) == (2, True)
+    paper = run_mfo(*words, "--object", "Floor", "--object", "Wall", "--preset", "paper")
+    assert paper.code == 2
+    assert "The preset 'paper' fits one material alone" in paper.sentence
+    assert not (tmp_path / "job").exists()
