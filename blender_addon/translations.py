@@ -200,6 +200,7 @@ _GERMAN = {
 _GERMAN_OPERATORS = {
     "Save as Asset": "Als Asset sichern",
     "Start From": "Beginnen mit",
+    "Fit Together": "Zusammen anpassen",
     "Draw What Counts": "Zeichnen, was zählt",
     "Only This Region Counts": "Nur dieser Bereich zählt",
     "Paint a Mask": "Maske malen",

@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..check import preflight
 from ..result import history, shown_result
-from ..result.job_result import JobResultError, must_ask, read_job_result
+from ..result.job_result import JobResult, JobResultError, must_ask, read_job_result, result_folders
 from ..result.local_copy import unwritable
 from ..result.write_back import WriteBackError, apply_values
 from ..running import running_job
@@ -112,7 +112,7 @@ class MFO_OT_show_past(_PastResult, bpy.types.Operator):
         assert material is not None
         assert entry is not None
         try:
-            _show(Path(entry.job_folder), material.session_uid)
+            _show([(read_job_result(Path(entry.job_folder)), material.session_uid)])
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, translated(f"{error} Its values are kept here and can be applied."))
             return {"CANCELLED"}
@@ -160,19 +160,22 @@ class MFO_OT_open_job(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        """Show its result; without its material in this file there is nothing to add it to."""
-        folder = Path(bpy.path.abspath(self.directory))
+        """Show its results; without its material in this file there is nothing to add one to."""
         try:
-            found = read_job_result(folder)
-            material = bpy.data.materials.get(self.material or found.material_name)
-            _show(folder, material.session_uid if material else 0)
-            if material is not None and not unwritable(material):
-                history.record(material, found)
+            found = [read_job_result(path) for path in result_folders(Path(bpy.path.abspath(self.directory)))]
+            if len(found) > 1 and self.material:
+                raise JobResultError("The job has several materials, and one is named: leave the name out.")
+            materials = [bpy.data.materials.get(self.material or each.material_name) for each in found]
+            _show([(each, m.session_uid if m else 0) for each, m in zip(found, materials, strict=True)])
+            for each, material in zip(found, materials, strict=True):
+                if material is not None and not unwritable(material):
+                    history.record(material, each)
         except (JobResultError, WriteBackError) as error:
             self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
-        if material is None:
-            self.report({"WARNING"}, translated(f"Material {found.material_name!r} is not in this file."))
+        for each, material in zip(found, materials, strict=True):
+            if material is None:
+                self.report({"WARNING"}, translated(f"Material {each.material_name!r} is not in this file."))
         return {"FINISHED"}
 
 
@@ -180,12 +183,12 @@ def _material(context: bpy.types.Context) -> bpy.types.Material | None:
     return context.object.active_material if context.object else None
 
 
-def _show(folder: Path, uid: int) -> None:
-    found = read_job_result(folder)
+def _show(found: list[tuple[JobResult, int]]) -> None:
+    """Show results with their materials' session_uid; several were fitted together."""
     runtime = bpy.context.window_manager.mfo_runtime
     shown_result.clear(runtime)
-    shown_result.show(found, uid)
-    runtime.state, runtime.sentence = "DONE", found.sentence
+    shown_result.show_all(found)
+    runtime.state, runtime.sentence = "DONE", found[0][0].sentence
     preflight.redraw()
 
 

@@ -65,8 +65,13 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     column = layout.column(align=True)
     row = column.row(align=True)
     row.scale_y = 1.0 if running else 1.4
-    row.operator("mfo.fit", text="Add to Queue" if running else "Fit Material", icon="ADD" if running else "PLAY")
-    if len(selected_targets(context, most=2)) > 1:
+    several = bool(context.scene.mfo.targets)
+    row.operator(
+        "mfo.fit",
+        text="Add to Queue" if running else "Fit Together" if several else "Fit Material",
+        icon="ADD" if running else "PLAY",
+    )
+    if not several and len(selected_targets(context, most=2)) > 1:
         column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
 
 

@@ -89,3 +89,15 @@ def test_what_cannot_be_fitted_together_is_said_first(two: SimpleNamespace) -> N
     entries[1].use = True  # one alone is a fit of one material
     assert two.bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
     assert "targets" not in json.loads((Path(two.job) / "request.json").read_text("utf-8"))
+
+
+def test_a_finished_job_is_opened_with_all_its_results(two: SimpleNamespace) -> None:
+    bpy, runtime = two.bpy, two.bpy.context.window_manager.mfo_runtime
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    for name in ("Wood", "Glaze"):
+        bpy.data.materials[name].mfo.history.clear()
+    assert bpy.ops.mfo.open_job(directory=two.job) == {"FINISHED"}
+    assert [row.name for row in runtime.materials] == ["Wood", "Glaze"]
+    assert [len(bpy.data.materials[name].mfo.history) for name in ("Wood", "Glaze")] == [1, 1]
+    with pytest.raises(RuntimeError, match="leave the name out"):
+        bpy.ops.mfo.open_job(directory=two.job, material="Wood")

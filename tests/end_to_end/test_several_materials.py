@@ -81,7 +81,7 @@ def test_both_are_found_in_each_others_light_and_written_in_one_go(corner: Path,
         ("Wall", "same", "targets/2"),
     ]
     for found in answer["materials"]:
-        # fitted alone beside the other as it was, each is off by 0.1 and more
+        # fitted alone beside the wall as it is in the start file, the floor comes out 0.13 too dark in red
         assert np.abs(np.subtract(found["recovered"]["base_color"], TRUTH[found["object"]])).max() < 0.03
         own = json.loads((job / found["folder"] / "result.json").read_text("utf-8"))
         assert own["recovered"] == found["recovered"]
