@@ -62,7 +62,7 @@ def fit_together(
     UnrecordableError
         If one of the materials cannot be fitted.
     Interrupted
-        If it was asked to stop before every material had been fitted once.
+        If it was asked to stop before one of them had been fitted.
     """
     check_members(members, reference)
     tasks = [
@@ -105,7 +105,8 @@ def _judged_all(
     noted: bool,
 ) -> tuple[list[FitResult], tuple[Pixels, Pixels]]:
     """The results by a picture of all these vectors, and its halves."""
-    halves = _halves(members, vectors, members[0].settings.verify_spp)
+    stopped = tasks[0].should_stop()
+    halves = _halves(members, vectors, LEAST_SAMPLES if stopped else members[0].settings.verify_spp)
     end = np.mean(halves, axis=0, dtype=np.float32)
     fitted = np.any([task.mask for task in tasks], axis=0)
     judged = []

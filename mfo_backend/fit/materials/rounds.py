@@ -15,6 +15,7 @@ from ...render.pictures.renderer import Interrupted
 from ...types.errors import BadInputError, UnrecordableError
 from ...types.event import Listener
 from ...types.image import Image, Pixels
+from ...types.result import FitResult
 from ...types.status import Status
 from ..judge.checked_reference import check_reference
 from ..random_streams import Stream
@@ -31,6 +32,7 @@ MOST_ROUNDS = 4
 # Mean change of a target's pixels, relative to their mean, above which it is fitted again. Ten rooms: half of it is
 # seen as a FLIP of 0.002, the least that counts as visible. Smaller: more rounds. Larger: light that is not right.
 LIGHT_MOVED = 0.01
+NOT_YET = "The fit was stopped before it came to this material."
 LOOK_SAMPLES = 8  # of a pixel of the picture that says how far the light has moved; all have the same random numbers
 
 
@@ -106,7 +108,7 @@ def take_turns(
     UnrecordableError
         If one of the materials cannot be fitted, with its name.
     Interrupted
-        If it was asked to stop before every material had been fitted once.
+        If it was asked to stop before one of them had been fitted.
     """
     seed = members[0].settings.seed
     masks = [check_reference(reference, member.renderer.target_mask()) for member in members]
@@ -141,10 +143,32 @@ def take_turns(
             outcomes[k] = outcome
             present[k] = member.renderer.table.pack(outcome.result.recovered)
             seen[k] = _look(members, present, seed)
-    ended = [outcome for outcome in outcomes if outcome is not None]
-    if len(ended) < len(members):
+    if not any(outcomes):
         raise Interrupted
-    return Turns(tuple(ended), tuple(present), number, still)
+    ended = [outcome or _as_it_was(member) for outcome, member in zip(outcomes, members, strict=True)]
+    values = [x if outcome else m.renderer.start for x, outcome, m in zip(present, outcomes, members, strict=True)]
+    return Turns(tuple(ended), tuple(values), number, still)
+
+
+def _as_it_was(member: Member) -> FitOutcome:
+    """The outcome of a material whose turn did not come."""
+    renderer, mask = member.renderer, member.renderer.target_mask()
+    own = renderer.table.unpack(renderer.start)
+    result = FitResult(
+        status=Status.CANCELLED,
+        message=Status.CANCELLED.sentence,
+        model=renderer.model,
+        initial=own,
+        recovered=dict(own),
+        bounds={p.name: (p.lower, p.upper) for p in renderer.table},
+        stages=(),
+        errors={},
+        seconds=0.0,
+        passes=renderer.passes,
+        notes=(NOT_YET,),
+    )
+    nothing = np.zeros((*mask.shape, 3), np.float32)
+    return FitOutcome(result, nothing, nothing, mask)
 
 
 def show_all(members: Sequence[Member], vectors: Sequence[NDArray[np.float64]]) -> None:

@@ -6,14 +6,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mfo_backend.fit.materials import rounds
 from mfo_backend.fit.materials.evened_light import evened_light
-from mfo_backend.fit.materials.rounds import MOST_VALUES, Member, check_members
+from mfo_backend.fit.materials.rounds import LIGHT_MOVED, MOST_VALUES, NOT_YET, Member, check_members, take_turns
 from mfo_backend.fit.materials.whole_course import WholeCourse
+from mfo_backend.fit.result.outcome import FitOutcome
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.render.pictures.pass_counter import PassCounter
+from mfo_backend.render.pictures.renderer import Interrupted
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.event import Progress, StageEnd, Started
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.parameter import Parameter, ParameterTable
+from mfo_backend.types.result import FitResult
+from mfo_backend.types.status import Status
 
 LEFT = np.zeros((4, 8), bool)
 LEFT[:, :4] = True
@@ -27,6 +33,7 @@ class Wall:
             [Parameter("base_color", 3, 1e-3, 0.999, (0.5, 0.5, 0.5))]
             + [Parameter(f"v{k}", 1, 0.0, 1.0, 0.5) for k in range(values - 3)]
         )
+        self.model, self.counter, self.passes = "wall", PassCounter(), 0.0
         self.start = self.table.pack({})
         self._shown, self._name, self._mask = shown, name, mask
         self.show(self.start)
@@ -109,3 +116,60 @@ def test_many_fits_are_told_as_one() -> None:
     assert 0.1 < shares[0] < 0.2
     assert shares[-1] < 1.0
     assert [event.stage for event in heard if isinstance(event, StageEnd)][:2] == ["Wall: scan", "Floor: scan"]
+
+
+TRUTH = np.array([0.8, 0.3, 0.1]), np.array([0.15, 0.6, 0.9])
+SHOWN = Image(light_of(*TRUTH), Encoding.LINEAR)
+
+
+class Fits:
+    """Stands in for a fit of one wall: what it finds is exact in the light that the other gives as it is shown."""
+
+    def __init__(self, stop_after: int = 100) -> None:
+        self.calls: list[tuple[str, str, bool]] = []
+        self.stop_after = stop_after
+
+    def __call__(self, wall: Wall, reference: Image, settings: FitSettings, **options: object) -> FitOutcome:
+        self.calls.append((wall._name, settings.preset, options["begin"] is not None))
+        left = wall._name == "left"
+        bright, lamp, lamp_of_other = (SHOWN.pixels[0, 0 if left else 7], *((1.0, 0.3) if left else (0.3, 1.0)))
+        other = wall._shown["right" if left else "left"]
+        colour = bright / (lamp + 0.5 * other * (lamp_of_other + 0.5 * bright))
+        values = {"base_color": tuple(map(float, colour))}
+        own = wall.table.unpack(wall.start)
+        result = FitResult(Status.CONVERGED, "", "wall", own, values, {}, (), {}, 0.0, 0.0)
+        return FitOutcome(result, SHOWN.pixels, SHOWN.pixels, wall.target_mask())
+
+    def stopped(self) -> bool:
+        return len(self.calls) >= self.stop_after
+
+
+def turns(fits: Fits, monkeypatch: pytest.MonkeyPatch) -> rounds.Turns:
+    monkeypatch.setattr(rounds, "recover_material", fits)
+    monkeypatch.setattr(rounds, "evened_light", lambda renderers, *_: [r.start.copy() for r in renderers])
+    return take_turns(
+        members(3), SHOWN, SHOWN.pixels, display=None, listener=lambda event: None, should_stop=fits.stopped
+    )  # fmt: skip
+
+
+def test_turns_end_when_the_light_holds_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = Fits()
+    found = turns(fits, monkeypatch)
+    assert found.still
+    for vector, colour in zip(found.present, TRUTH, strict=True):
+        assert vector == pytest.approx(colour, abs=LIGHT_MOVED)
+    assert fits.calls[:2] == [("left", "fast", False), ("right", "fast", False)]
+    assert set(fits.calls[2:]) <= {("left", "balanced", True), ("right", "balanced", True)}
+    assert {name for name, *_ in fits.calls[2:4]} == {"left", "right"}  # in the preset's own way, once at least
+    assert len(fits.calls) < 2 * rounds.MOST_ROUNDS  # what sees the same light is not fitted again
+
+
+def test_what_was_found_before_a_stop_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = turns(Fits(stop_after=1), monkeypatch)
+    first, second = found.outcomes
+    assert first.result.status is Status.CONVERGED
+    assert (second.result.status, second.result.notes) == (Status.CANCELLED, (NOT_YET,))
+    assert second.result.recovered == second.result.initial
+    assert found.present[1] == pytest.approx(walls()[1].start)
+    with pytest.raises(Interrupted):
+        turns(Fits(stop_after=0), monkeypatch)
