@@ -12,11 +12,13 @@ from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...types.image import Pixels
 
 COLOR = "base_color"
-# Pictures, each of which scales all colours at once. The light between the walls of a room halves its error with each.
+# Pictures, each of which scales all colours at once. Of two diffuse walls that see half of each other the worst channel
+# was off by 0.35, 0.026, 0.007 and 0.0009 after one to four (tests/fit/materials/test_rounds.py).
 STEPS = 4
 SAMPLES = 8  # of a pixel: only means over targets are looked at
-MOST = 4.0  # times a colour may grow or shrink in one step; a target in a mirror or a shadow says little of its own
-DIM = 1e-4  # of the brightest target: below, a ratio is noise
+# Times a colour may grow or shrink in one step, so that a target in the dark does not run away. No measurement.
+MOST = 4.0
+DIM = 1e-4  # of the brightest target: below, a ratio is noise. No measurement.
 
 
 def evened_light(
