@@ -11,6 +11,7 @@ import pytest
 
 from blender_addon.result import shown_result
 
+from .check.test_libraries import from_library
 from .fake_backend import RECOVERED
 
 
@@ -101,3 +102,11 @@ def test_a_finished_job_is_opened_with_all_its_results(two: SimpleNamespace) -> 
     assert [len(bpy.data.materials[name].mfo.history) for name in ("Wood", "Glaze")] == [1, 1]
     with pytest.raises(RuntimeError, match="leave the name out"):
         bpy.ops.mfo.open_job(directory=two.job, material="Wood")
+
+
+def test_a_material_of_a_library_is_said_before_the_fit(two: SimpleNamespace, tmp_path: Path) -> None:
+    two.bpy.data.objects["Floor"].active_material = from_library(two, tmp_path, "materials", "Wood")
+    assert two.bpy.ops.mfo.list_materials() == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="Material 'Wood' comes from a library: make it local first"):
+        two.bpy.ops.mfo.fit(job_folder=two.job)
+    assert not Path(two.job).exists()
