@@ -23,11 +23,11 @@ from .job_scene import graph_notes, load_native_code, named, request_materials
 
 _MODEL = "blender_principled"
 _FROM_BEST = (Verdict.SAME, Verdict.CLOSE, Verdict.DIFFERENT)
-_SAID = {
-    Verdict.SAME: "look the same as the reference",
-    Verdict.CLOSE: "are close to it",
-    Verdict.DIFFERENT: "do not match it",
-    None: "have no verdict",
+_SAID = {  # of one, of several
+    Verdict.SAME: ("looks the same as the reference", "look the same as the reference"),
+    Verdict.CLOSE: ("is close to the reference", "are close to the reference"),
+    Verdict.DIFFERENT: ("does not match the reference", "do not match the reference"),
+    None: ("has no verdict", "have no verdict"),
 }
 ONE_CLASS = (
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does "
@@ -130,7 +130,7 @@ def _counts(results: Sequence[tuple[str, FitResult]]) -> str:
         having = [name for name, r in results if (r.judgement.verdict if r.judgement is not None else None) is verdict]
         which = "" if verdict is Verdict.SAME else f" ({', '.join(having)})"
         if having:
-            parts.append(f"{len(having)} {words}{which}")
+            parts.append(f"{len(having)} {words[len(having) > 1]}{which}")
     return ", ".join(parts)
 
 
