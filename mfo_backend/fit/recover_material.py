@@ -93,7 +93,7 @@ def recover_material(
     noted
         Whether the export has left something out, which may be why a result does not match.
     begin
-        Values of an earlier fit to go on from, where light is sampled, instead of the search for a start.
+        Values of an earlier fit to go on from, where light is sampled or traced, instead of the search for a start.
     judged
         False leaves the verdict to the caller, who has other pictures for it.
     nearer_than
@@ -139,7 +139,7 @@ def _ways(task: FitTask, plan: RecordedPlan | None, begin: Vector | None, *, han
             return
         if settings.losses is None:
             yield (
-                lambda: TracedRoute(task, ours),
+                lambda: TracedRoute(task, ours, begin=begin),
                 lambda stages: f"So whole light paths were traced, by the stages {', '.join(map(repr, stages))}.",
             )
         else:

@@ -46,7 +46,7 @@ Vector = NDArray[np.float64]
 
 
 class TracedRoute:
-    """A fit on whole light paths.
+    """A fit on whole light paths, which may `begin` at values of an earlier one instead of the search for a start.
 
     Ends of the stages are compared on paths no stage has seen, and the best of them with the scene's own values on
     path-traced pictures, by mean FLIP.
@@ -64,16 +64,18 @@ class TracedRoute:
         task: FitTask,
         renderer: MitsubaRenderer,
         plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
+        begin: Vector | None = None,
     ) -> None:
         from ...render.paths.traced_paths import TracedPaths
 
         if EMISSION in renderer.table.names:
             raise UnrecordableError("Stages on whole light paths hold the emission as it is.")
         settings, encoding = task.settings, task.reference.encoding
-        self._task, self._renderer, self._plan = task, renderer, plan
+        self._task, self._renderer, self._plan, self._begin = task, renderer, plan, begin
         self._paths = TracedPaths(renderer)
         self._seen_residuals = finishing_residuals(settings, encoding, task.light, task.mask, task.view)
-        self.stages = (*STAGES, *self._seen_residuals, *([FLIP] if settings.preset == "best" else []))
+        own = STAGES if begin is None else STAGES[2:]
+        self.stages = (*own, *self._seen_residuals, *([FLIP] if settings.preset == "best" else []))
         self.verification = Verification(
             renderer,
             task.reference,
@@ -101,8 +103,11 @@ class TracedRoute:
 
         ends: Sequence[Polished] = ()
         freest = 0
-        nodes = scan(setting)
-        raced_to = race(setting, nodes) if not should_stop() else nodes
+        if self._begin is None:
+            nodes = scan(setting)
+            raced_to = race(setting, nodes) if not should_stop() else nodes
+        else:
+            raced_to = [self._begin]
         found = [raced_to[0]]
         if not should_stop():
             self._look(raced_to[0])
