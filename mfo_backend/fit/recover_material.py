@@ -139,7 +139,7 @@ def _ways(task: FitTask, plan: RecordedPlan | None, begin: Vector | None, *, han
             return
         if settings.losses is None:
             yield (
-                lambda: TracedRoute(task, ours, begin=begin),
+                lambda: TracedRoute(task, ours, begin),
                 lambda stages: f"So whole light paths were traced, by the stages {', '.join(map(repr, stages))}.",
             )
         else:

@@ -100,9 +100,10 @@ def take_turns(
 ) -> Turns:
     """Fit each material in the light that the others give with their newest values, until that holds still.
 
-    The first round searches from nothing, quickly; the second goes on from there with the preset's plan, and those
-    after it fit again what sees other light than at its own last fit. `light` is the reference as scene-linear
-    radiance.
+    The first round searches from nothing, quickly. The second has the preset's plan and searches again what sees other
+    light than at its own first fit: in wrong light a coat or a sheen is easily missed, and no solution nearby has it.
+    Those after it fit again what sees other light than at its own last fit, from its values there. `light` is the
+    reference as scene-linear radiance.
 
     Raises
     ------
@@ -126,7 +127,8 @@ def take_turns(
             if should_stop():
                 still = False
                 break
-            if number > 2 and _moved(_look(members, present, seed), seen[k], masks[k]) <= LIGHT_MOVED:
+            moved = number > 1 and _moved(_look(members, present, seed), seen[k], masks[k]) > LIGHT_MOVED
+            if number > 2 and not moved:
                 continue
             still = False
             member = members[k]
@@ -135,7 +137,7 @@ def take_turns(
                 outcome = recover_material(
                     member.renderer, reference, quick if number == 1 else member.settings, display=display,
                     listener=course.of(k, number), should_stop=should_stop, hand_over=False,
-                    begin=None if number == 1 else present[k], judged=False,
+                    begin=None if number == 1 or (number == 2 and moved) else present[k], judged=False,
                 )  # fmt: skip
             except UnrecordableError as error:
                 raise UnrecordableError(f"Material '{member.name}' cannot be fitted with others: {error}") from error

@@ -63,8 +63,8 @@ class TracedRoute:
         self,
         task: FitTask,
         renderer: MitsubaRenderer,
-        plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
         begin: Vector | None = None,
+        plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
     ) -> None:
         from ...render.paths.traced_paths import TracedPaths
 
