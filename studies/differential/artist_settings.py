@@ -209,10 +209,11 @@ def _bumped_box(rig: Rig, _: Draw) -> None:
 
 
 def _lamp_nodes(rig: Rig, draw: Draw) -> None:
-    data = rig.light.data
+    data: Any = rig.light.data
     if data.node_tree is None:
         data.use_nodes = True
-    node = next(node for node in data.node_tree.nodes if node.type == "EMISSION")
+    tree: Any = data.node_tree
+    node = next(node for node in tree.nodes if node.type == "EMISSION")
     node.inputs["Color"].default_value = (*draw.uniform(0.3, 1.0, 3), 1.0)
     node.inputs["Strength"].default_value = float(draw.uniform(0.5, 2.0))
 

@@ -35,7 +35,7 @@ class Difference:
 
 def compare(ours: tuple[Picture, Picture], cycles: tuple[Picture, Picture]) -> Difference:
     """Compare two pictures (height, width, 3), each as two independent halves."""
-    difference = 0.5 * sum(ours) - 0.5 * sum(cycles)
+    difference = 0.5 * (ours[0] + ours[1]) - 0.5 * (cycles[0] + cycles[1])
     variance = 0.25 * ((ours[0] - ours[1]) ** 2 + (cycles[0] - cycles[1]) ** 2)  # of the means of the halves
     scale = max(float(np.mean(cycles)), 1e-6)
     count = difference.size

@@ -17,7 +17,7 @@ from ..scenes import add_camera, add_light, new_material
 
 def mesh(corners: Any) -> TriangleMesh:
     positions = np.asarray(corners, np.float32).reshape(-1, 3)
-    triangles = np.arange(len(positions), dtype=np.uint32).reshape(-1, 3)
+    triangles = np.arange(len(positions), dtype=np.int32).reshape(-1, 3)
     return TriangleMesh(positions, np.zeros_like(positions), np.zeros((len(positions), 2), np.float32), triangles)
 
 
