@@ -27,6 +27,8 @@ Variant = tuple[Sequence[Value], Sequence[str]]  # all values of a graph, and th
 # whose evaluation takes the longer; a scene's textures have those of the export
 SMALL, LARGE = (4, 1), (2, 4)
 MOST_SUBPIXELS = 400_000  # of a small picture at its scale
+# Where normals change two subpixels are too few, and certainty does not know: values were 2 to 3 % off. Up to 256 x 256
+MOST_SUBPIXELS_OF_NORMALS = 1_050_000
 FINE_SCALE, FINE_SAMPLES = 4, 4
 RECALLED = 6  # answers that are kept
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
@@ -82,7 +84,9 @@ class GraphPictures:
 
     def __init__(self, values: Sequence[NodeValue], evaluate: Evaluate, linked: Sequence[str], pixels: int = 0) -> None:
         """`linked` are all sockets that the graph gives, and `pixels` those of the whole picture."""
-        self._scale, self._samples = SMALL if pixels * SMALL[0] ** 2 <= MOST_SUBPIXELS else LARGE
+        turns = any(name in DIRECTIONS for value in values for name in value.sockets)
+        most = MOST_SUBPIXELS_OF_NORMALS if turns else MOST_SUBPIXELS
+        self._scale, self._samples = SMALL if pixels * SMALL[0] ** 2 <= most else LARGE
         self.table = table_of(values)
         self._values, self._evaluate = tuple(values), evaluate
         changed = {name for value in values for name in value.sockets}

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pytest
 
 from mfo_backend.render.models.graph_pictures import Evaluated, GraphPictures, Variant
 from mfo_backend.types.errors import BadInputError
@@ -106,3 +107,18 @@ def test_nodes_that_cannot_be_evaluated_are_known_before_the_fit() -> None:
     pictures = GraphPictures((value("Mix/A", 0.5, ("Base Color",)),), refuses, ("Base Color",))
     assert pictures.refusal() == "Too many nodes."
     assert graph(Nodes()).refusal() is None
+
+
+def test_normals_are_looked_at_more_finely() -> None:
+    """In a picture of 200 x 200 pixels; of colours two subpixels along a pixel are enough."""
+    asked = []
+
+    def evaluate(variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+        asked.append((scale, samples))
+        raise BadInputError("Enough.")
+
+    for socket in ("Roughness", "Normal"):
+        pictures = GraphPictures([value("Bump/Strength", 0.5, (socket,))], evaluate, (socket,), pixels=200 * 200)
+        with pytest.raises(BadInputError):
+            pictures.state(np.array([0.5]))
+    assert asked == [(2, 4), (4, 1)]
