@@ -35,16 +35,13 @@ class MFO_OT_take_render_region(bpy.types.Operator):
     bl_label = "Only This Region Counts"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Only with a render region."""
-        if not context.scene.render.use_border:
-            cls.poll_message_set(translated("There is no render region: draw one in the camera's view"))
-            return False
-        return True
+    # no poll: Blender asks that of every step before the first one, which draws the region
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Take the edges over."""
+        if not context.scene.render.use_border:
+            self.report({"WARNING"}, translated("There is no render region: draw one in the camera's view"))
+            return {"CANCELLED"}
         count_render_region(context.scene)
         preflight.request()
         return {"FINISHED"}
