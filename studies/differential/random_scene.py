@@ -283,7 +283,7 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("box hidden from camera", _visibility("box", "camera"), ("hidden from camera",)),
     Setting("box hidden from diffuse", _visibility("box", "diffuse"), ("hidden from diffuse",)),
     Setting("box hidden from glossy", _visibility("box", "glossy"), ("hidden from glossy",)),
-    Setting("box without shadow", _visibility("box", "shadow")),
+    Setting("box without shadow", _visibility("box", "shadow"), ("how much of its own light",)),
     Setting("target without shadow", _visibility("target", "shadow")),
     Setting("box cut-out", lambda r, d: put_socket(r.box, "Alpha", float(d.uniform(0.1, 0.8)))),
     Setting("full shadow", _full_shadow),

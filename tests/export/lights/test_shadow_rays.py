@@ -35,6 +35,15 @@ def test_the_picture_is_that_of_cycles_without_a_note(settings: tuple[str, ...],
     assert not outcome.difference.is_failure
 
 
+def test_a_glowing_object_without_shadow_is_named(tmp_path: Path) -> None:
+    from blender_addon.export.job import check_export
+    from studies.differential.random_scene import build
+
+    rig = build(("box without shadow", "glowing box"), SEED, tmp_path, size=32, samples=1)
+    (said,) = check_export(bpy.context, rig.target)[1]
+    assert said.startswith("An object of the glowing material 'Box' casts no shadows")
+
+
 def test_recorded_paths_see_the_same(mitsuba: Any, tmp_path: Path) -> None:
     """The floor, in the shadow of a box that is cut out."""
     from blender_addon.export.job import export_job
