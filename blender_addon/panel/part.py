@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import bpy
 
-from .layout import pair
+from .layout import is_narrow, pair
 
 
 def draw_part(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings of the first picture's part."""
     part = context.scene.mfo.first_picture.part
     header, body = layout.panel("mfo_part", default_closed=True)
-    header.label(text="Part That Counts", icon="NONE" if part.is_whole else "SELECT_SET")
+    header.label(text="Part That Counts", icon="NONE" if part.is_whole or is_narrow(context) else "SELECT_SET")
     if not part.is_whole:
         header.operator("mfo.whole_picture", text="", icon="X", emboss=False)
     if body is None:

@@ -34,7 +34,7 @@ class Reference:
         draw_part(column, context)
         _draw_more_pictures(column, settings)
         shown = overlay.is_shown(context.scene.camera)
-        row = layout.row(align=True)
+        row = pair(layout, context) if shown else layout.row(align=True)
         row.operator(
             "mfo.overlay_reference", text="Over the View", icon="HIDE_OFF" if shown else "HIDE_ON", depress=shown
         )
