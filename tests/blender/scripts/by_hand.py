@@ -206,7 +206,7 @@ def draw_part(path_field):
     assert 0.0 <= part.left < part.right <= 100.0, tuple(part.crop)
     assert not bpy.context.scene.render.use_border
     yield from shot("part_drawn")
-    yield from press("mfo.whole_picture(", part=0.95)
+    yield from press("mfo.whole_picture(", part=0.88)
     assert part.is_whole
     yield from click(x, y - 28 * scale)
 
