@@ -2,8 +2,8 @@
 """Fit the same scenes with each rule switched off and say what changes.
 
     python -m studies.ablate [--rules NAME ...]
-        [--scenes base=20 noise=20 parameters=10 transparency_4spp=6 cycles=6 hard=24] [--size 64] [--most 100000]
-        [--rows ablations.jsonl] [--doc docs/notebook/ablations.md]
+        [--scenes base=20 noise=20 parameters=10 transparency_4spp=6 measured=8 cycles=6 hard=24] [--size 64]
+        [--most 100000] [--rows ablations.jsonl] [--doc docs/notebook/ablations.md]
 
 The rules are those of `rules.py`, the scenes those of `mfo bench` and its hard cases: truths and starts are drawn at
 random and do not depend on each other. The preset is `balanced`. Every fit is a line of the rows' file, so a run that
@@ -25,7 +25,7 @@ from .page import page
 from .rules import RULES, switched_off
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = {"base": 20, "noise": 20, "parameters": 10, "transparency_4spp": 6, "cycles": 6, "hard": 24}
+SCENES = {"base": 20, "noise": 20, "parameters": 10, "transparency_4spp": 6, "measured": 8, "cycles": 6, "hard": 24}
 ALL_ON = ""
 SAID = "\n## "  # what people have written below the table is kept
 

@@ -73,12 +73,13 @@ def _blender() -> BlenderHost | None:
 
 
 def _wrong(row: Row) -> list[str]:
-    """Names that the fit calls determined and that are not the truth's."""
+    """Names that the fit calls determined and that are not the truth's; a measured material has no true values."""
     table = TABLES[SCENARIOS[row.scenario].model]
     return [
         name
         for name, said in row.certainty.items()
-        if said["level"] == Level.DETERMINED.value
+        if name in row.truth
+        and said["level"] == Level.DETERMINED.value
         and is_wrongly_determined(miss(row.recovered[name], row.truth[name], table[name]), said["sd"], table[name])
     ]
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 EXACT, SAMPLED, TRACED, HARD = ("base", "parameters"), ("noise", "cycles"), ("transparency_4spp",), ("hard",)
+UNREACHED = ("measured",)  # materials that no values of the model give
 
 
 @dataclass(frozen=True)
@@ -80,10 +81,12 @@ RULES = (
     Rule("few pixels that rule a value", "solve.leverage:residuals_left_out", _argument(1), (*EXACT, *SAMPLED, *HARD)),
     # perceptual stages
     Rule("all perceptual stages", "fit.recorded.perceptual_stages:perceptual_ends",
-         lambda original: lambda *given: ([], []), (*EXACT, *SAMPLED)),
-    Rule("stage itp", "fit.squares.stage_residuals:finishing_residuals", _without("itp"), (*EXACT, *SAMPLED)),
-    Rule("stage pu21", "fit.squares.stage_residuals:finishing_residuals", _without("pu21"), (*EXACT, *SAMPLED)),
-    Rule("none at the noise", "fit.recorded.fit:AT_NOISE", _number(0.0), SAMPLED),
+         lambda original: lambda *given: ([], []), (*EXACT, *SAMPLED, *UNREACHED)),
+    Rule("stage itp", "fit.squares.stage_residuals:finishing_residuals", _without("itp"),
+         (*EXACT, *SAMPLED, *UNREACHED)),
+    Rule("stage pu21", "fit.squares.stage_residuals:finishing_residuals", _without("pu21"),
+         (*EXACT, *SAMPLED, *UNREACHED)),
+    Rule("none at the noise", "fit.recorded.fit:AT_NOISE", _number(0.0), (*SAMPLED, *UNREACHED)),
 )  # fmt: skip
 
 
