@@ -85,9 +85,23 @@ def verdicts(kind: str, name: str, scene: int, size: int) -> BlenderRow:
     )
 
 
+def materials(scene: int, size: int) -> BlenderRow:
+    """A room of six materials fitted together; its errors are those of the material that ends furthest away."""
+    from ..materials.__main__ import measure
+
+    with tempfile.TemporaryDirectory() as temporary:
+        row = measure(scene, Path(temporary), size, "balanced")
+    name, worst = max(row["materials"].items(), key=lambda item: item[1]["fitted"] - item[1]["floor"])
+    return BlenderRow(
+        "materials", scene, f"six, furthest: {name}", row["verdict"], worst["fitted"], worst["floor"],
+        seconds=row["seconds"],
+    )  # fmt: skip
+
+
 SCENARIOS: dict[str, Callable[[int, int], BlenderRow]] = {
     "graphs": graphs,
     "views": views,
+    "materials": materials,
     "classes": partial(verdicts, "classes", "classes"),
     "wrong": partial(verdicts, "planted", "wrong"),
 }

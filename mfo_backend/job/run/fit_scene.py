@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from ...metrics.display.tone_mapping import View
 from ...render.models.graph_pictures import GraphPictures
@@ -36,6 +38,7 @@ from .material_classes import (
 from .more_pictures import JobPicture
 
 if TYPE_CHECKING:
+    from ...fit.pictures.one_sheet import SheetTask
     from ...render.pictures.mitsuba_renderer import MitsubaRenderer
     from ...render.pictures.renderer import Renderer
 
@@ -96,121 +99,170 @@ def fit_scene(
     """
     if request.targets:
         return fit_materials(folder, request, reference, view, listener=listener, should_stop=should_stop)
-    pictures = [JobPicture(folder, request, reference, view), *more]
+    pictures = (JobPicture(folder, request, reference, view), *more)
     with evaluated_graph(folder, request, () if more else blender) as (graph, notes):
-        return _fit_scene(pictures, graph, notes, listener, should_stop)
+        variant = load_native_code()
+        job = _OneMaterial(pictures, _materials_of(pictures), graph, listener, should_stop)
+        if request.fit.preset == "paper":
+            fitted = job.fit_on_own_thread()
+        else:
+            fitted, said = _fit_and_other_classes(job)
+            notes = (*notes, *said)
+    result = fitted.result
+    if request.light_paths is not None and result.model == "mitsuba_principled":
+        result = with_notes(result, (_WITHOUT_LIGHT_PATHS,))
+    result = replace(result, notes=(*notes, *result.notes, *graph_notes(request, result)), **named(request))
+    return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
 
 
-def _fit_scene(
-    pictures: Sequence[JobPicture],
-    graph: GraphPictures | None,
-    notes: tuple[str, ...],
-    listener: Listener,
-    should_stop: Callable[[], bool],
-) -> JobOutcome:
-    request, reference, view = pictures[0].request, pictures[0].reference, pictures[0].view
-    variant = load_native_code()
-    from ...fit.pictures.one_sheet import SheetTask, one_sheet
-    from ...fit.recover_material import recover_material
-    from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
-    from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
+def _materials_of(pictures: Sequence[JobPicture]) -> tuple[dict[str, dict[str, Any]], ...]:
+    """The materials of each picture's scene; the target's is the first picture's."""
+    target = pictures[0].request.target.bsdf_id
+    first, *others = (request_materials(picture.folder, picture.request) for picture in pictures)
+    own = ({target: of_one_material(first.get(target), here[target])} if target in here else {} for here in others)
+    return (first, *(here | target_there for here, target_there in zip(others, own, strict=True)))
 
-    target, fit_of = request.target.bsdf_id, request.fit
-    all_materials = [request_materials(picture.folder, picture.request) for picture in pictures]
-    first = all_materials[0]
-    for others in all_materials[1:]:
-        if target in others:
-            others[target] = of_one_material(first.get(target), others[target])
 
-    inside = () if graph is None else graph.table.names
+@dataclass(frozen=True)
+class _OneMaterial:
+    """The fit of one material to all pictures of a job, which may begin from several starts.
+
+    `materials` are those of each picture's scene. The steps of presets other than `paper` are short, and need Mitsuba's
+    scene on their own thread.
+    """
+
+    pictures: Sequence[JobPicture]
+    materials: Sequence[dict[str, dict[str, Any]]]
+    graph: GraphPictures | None
+    listener: Listener
+    should_stop: Callable[[], bool]
+
+    @property
+    def request(self) -> Request:
+        """What the first picture's job asks for."""
+        return self.pictures[0].request
+
+    @property
+    def start(self) -> dict[str, Any] | None:
+        """The target's material in the first picture's scene."""
+        return self.materials[0].get(self.request.target.bsdf_id)
 
     def load(
-        change: Callable[[Any], Any], parameters: str | Sequence[str], graph: GraphPictures | None = graph
+        self,
+        parameters: str | Sequence[str],
+        graph: GraphPictures | None,
+        change: Callable[[Any], Any] = lambda material: material,
     ) -> list[MitsubaRenderer]:
-        renderers = []
-        for picture, materials in zip(pictures, all_materials, strict=True):
+        """A renderer of each picture, with the target's material changed."""
+        from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
+
+        inside = () if self.graph is None else self.graph.table.names
+        target, renderers = self.request.target.bsdf_id, []
+        for picture, materials in zip(self.pictures, self.materials, strict=True):
             asked = picture.request
-            changed_ones = materials | {target: change(materials[target])} if target in materials else materials
             renderer = load_mitsuba_renderer(
                 picture.folder.root / asked.scene,
                 asked.target.shape_id,
-                model=fit_of.model,
+                model=self.request.fit.model,
                 parameters=parameters if isinstance(parameters, str) else [n for n in parameters if n not in inside],
                 graph=graph,
-                materials=changed_ones,
+                materials=materials | ({target: change(materials[target])} if target in materials else {}),
                 light_paths=asked.light_paths,
             )
-            renderer.table = narrowed(renderer.table, fit_of.bounds)
+            renderer.table = narrowed(renderer.table, self.request.fit.bounds)
             renderer.start = renderer.table.clip(renderer.start)
             renderers.append(renderer)
         return renderers
 
-    def task_of(renderers: Sequence[MitsubaRenderer]) -> SheetTask | None:
+    def together(self, renderers: Sequence[MitsubaRenderer]) -> SheetTask | None:
+        """All pictures as one; None of a single one."""
+        from ...fit.pictures.one_sheet import one_sheet
+
         if len(renderers) == 1:
             return None
-        labels = [picture.label for picture in pictures]
-        return one_sheet(renderers, [p.reference for p in pictures], [p.view for p in pictures], labels)
+        of = self.pictures
+        return one_sheet(renderers, [p.reference for p in of], [p.view for p in of], [p.label for p in of])
 
-    def fit(
-        renderer: Renderer, together: SheetTask | None, *, hand_over: bool = True, nearer_than: float | None = None
-    ) -> Fitted:
-        heard, shown, display = listener, reference, view
+    def fit(self, renderers: Sequence[MitsubaRenderer], *, nearer_than: float | None = None) -> Fitted:
+        """The fit from the renderers' material; one that has to come `nearer_than` another is no hand-over to `paper`.
+
+        Raises
+        ------
+        NoNearerError
+            If it does not.
+        """
+        together = self.together(renderers)
+        return self._fit(renderers[0] if together is None else together.renderer, together, nearer_than)
+
+    def fit_on_own_thread(self) -> Fitted:
+        """The same, stopped within one of its long steps."""
+        from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
+
+        thread = NativeThread(self.should_stop)
+        renderers = thread.call(lambda: self.load(self.request.fit.parameters, self.graph))
+        together = thread.call(lambda: self.together(renderers))
+        renderer = renderers[0] if together is None else together.renderer
+        return self._fit(InterruptibleRenderer(renderer, thread), together, None)
+
+    def _fit(self, renderer: Renderer, together: SheetTask | None, nearer_than: float | None) -> Fitted:
+        from ...fit.recover_material import recover_material
+
+        heard, shown, display = self.listener, self.pictures[0].reference, self.pictures[0].view
         if together is not None:
-            shown, display = together.reference, together.display or view
-            heard = partial(_of_first, listener, together.renderer.sheet)
+            shown, display = together.reference, together.display or display
+            heard = partial(_of_first, heard, together.renderer.sheet)
         outcome = recover_material(
-            renderer, shown, fit_of, display=display, listener=heard, should_stop=should_stop,
-            hand_over=hand_over, noted=any(p.request.left_out for p in pictures), nearer_than=nearer_than,
+            renderer, shown, self.request.fit, display=display, listener=heard, should_stop=self.should_stop,
+            hand_over=nearer_than is None, noted=any(p.request.left_out for p in self.pictures),
+            nearer_than=nearer_than,
         )  # fmt: skip
         result = outcome.result if together is None else with_notes(outcome.result, together.notes)
         sheet = None if together is None else together.renderer.sheet
         return Fitted(result, outcome.start_image, outcome.result_image, outcome.counted, sheet)
 
-    def renderer_of(renderers: Sequence[MitsubaRenderer], together: SheetTask | None) -> Renderer:
-        return renderers[0] if together is None else together.renderer
 
-    if request.fit.preset == "paper":
-        thread = NativeThread(should_stop)
-        renderers = thread.call(lambda: load(lambda material: material, fit_of.parameters))
-        together = thread.call(lambda: task_of(renderers))
-        fitted = fit(InterruptibleRenderer(renderer_of(renderers, together), thread), together)
-    else:  # the steps of the other presets are short, and they need Mitsuba's scene on their own thread
-        renderers = load(lambda material: material, fit_of.parameters)
-        if graph is not None and (refused := graph.refusal()) is not None:
-            if not fit_of.parameters:
-                raise BadInputError(refused)
-            notes = (*notes, f"Values inside nodes stayed as they were. {refused}")
-            renderers = load(lambda material: material, fit_of.parameters, None)
-        together = task_of(renderers)
-        fitted = fit(renderer_of(renderers, together), together)
-        table = renderers[0].table
-        del renderers, together
+def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
+    """The fit from the scene's material, or a better one from another class of material; and what else is to be said.
 
-        def fit_from(other: MaterialClass) -> Fitted:
-            # values inside nodes are those of the material in the scene
-            loaded = load(lambda material: changed(material, other), parameters_of(other, table.names), None)
-            again = task_of(loaded)
-            judgement = fitted.result.judgement
-            nearer_than = None if judgement is None else judgement.target.visible
-            return fit(renderer_of(loaded, again), again, hand_over=False, nearer_than=nearer_than)
+    Raises
+    ------
+    BadInputError
+        If values inside nodes are all that is to be fitted, and Blender refuses them.
+    """
+    request, notes = job.request, ()
+    renderers = job.load(request.fit.parameters, job.graph)
+    if job.graph is not None and (refused := job.graph.refusal()) is not None:
+        if not request.fit.parameters:
+            raise BadInputError(refused)
+        notes = (f"Values inside nodes stayed as they were. {refused}",)
+        renderers = job.load(request.fit.parameters, None)
+    fitted, names = job.fit(renderers), renderers[0].table.names
+    del renderers  # their scenes are large
+    if job.start is None:
+        return fitted, notes
+    before = fitted.result.judgement
+    visible = np.inf if before is None else before.target.visible
 
-        def is_wanted(found: Fitted) -> bool:
-            # no class of material makes up for a wrong light
-            agree = found.result.contradiction is None
-            return agree and not should_stop() and is_worth_another(found.result, request.fit.parameters)
+    def fit_from(other: MaterialClass, nearer_than: float) -> Fitted:
+        # values inside nodes are those of the material in the scene
+        again = job.load(parameters_of(other, names), None, lambda material: changed(material, other))
+        return job.fit(again, nearer_than=nearer_than)
 
-        if target in first:
-            counted = fitted.counted if fitted.sheet is None else fitted.sheet.cut(fitted.counted, 0)
-            glow = brightest_glow(reference, view, counted) / request.film_exposure
-            classes = other_classes(first[target], glow)
-            fitted = with_other_classes(fitted, first[target], classes, fit_from, is_wanted)
-            if is_rich(fitted.result, request.fit.parameters) and not should_stop():
-                fitted = with_plainer_glow(fitted, first[target], classes, fit_from)
-    result = fitted.result
-    if request.light_paths is not None and result.model == "mitsuba_principled":
-        result = replace(result, notes=(*result.notes, _WITHOUT_LIGHT_PATHS))
-    result = replace(result, notes=(*notes, *result.notes, *graph_notes(request, result)), **named(request))
-    return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
+    def is_wanted(found: Fitted) -> bool:
+        # no class of material makes up for a wrong light
+        agree = found.result.contradiction is None
+        return agree and not job.should_stop() and is_worth_another(found.result, request.fit.parameters)
+
+    first = job.pictures[0]
+    counted = fitted.counted if fitted.sheet is None else fitted.sheet.cut(fitted.counted, 0)
+    glow = brightest_glow(first.reference, first.view, counted) / request.film_exposure
+    classes = other_classes(job.start, glow)
+    nearer = partial(fit_from, nearer_than=visible)
+    fitted = with_other_classes(fitted, job.start, classes, nearer, is_wanted)
+    if is_rich(fitted.result, request.fit.parameters) and not job.should_stop():
+        any_distance = partial(fit_from, nearer_than=np.inf)  # what is plainer need not be nearer
+        fitted = with_plainer_glow(fitted, job.start, classes, any_distance)
+    return fitted, notes
 
 
 def with_notes(result: FitResult, notes: Sequence[str]) -> FitResult:
