@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Property-based tests draw the same examples in every run; MFO_EXAMPLES asks for that many new ones each."""
+"""The add-on for all tests of a process, and the same examples in every run of property-based tests.
+
+MFO_EXAMPLES asks for that many new examples of each.
+"""
 
 from __future__ import annotations
 
+import importlib.util
 import os
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -24,3 +29,15 @@ class _RootIsAFolder:
 
 def pytest_configure(config) -> None:
     config.pluginmanager.register(_RootIsAFolder())
+
+
+@pytest.fixture(scope="session")
+def addon() -> Iterator[object]:
+    """The package, registered for the session."""
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("the bpy module is not installed for this Python")
+    import blender_addon
+
+    blender_addon.register()
+    yield blender_addon
+    blender_addon.unregister()

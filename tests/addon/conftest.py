@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,18 +11,6 @@ import pytest
 from . import fake_backend
 
 WIDTH, HEIGHT = 96, 64  # of the fake backend's pictures
-
-
-@pytest.fixture(scope="session")
-def addon() -> Iterator[object]:
-    """The package, registered for the session."""
-    if importlib.util.find_spec("bpy") is None:
-        pytest.skip("the bpy module is not installed for this Python")
-    import blender_addon
-
-    blender_addon.register()
-    yield blender_addon
-    blender_addon.unregister()
 
 
 @pytest.fixture

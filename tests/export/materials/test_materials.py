@@ -289,17 +289,3 @@ def test_a_tangent_along_the_uv_map_is_the_fits_own(scene: Any) -> None:
     node.direction_type = "UV_MAP"
     material.node_tree.links.new(node.outputs[0], principled(material).inputs["Tangent"])
     assert check_export(bpy.context, target) == ([], [])
-
-
-@pytest.mark.parametrize(
-    ("alpha", "transparent", "named"), [(0.5, True, True), (0.5, False, False), (1.0, False, False)]
-)
-def test_a_shadow_through_alpha_is_named_where_cycles_lets_light_pass(
-    scene: Any, alpha: float, transparent: bool, named: bool
-) -> None:
-    world_color(scene, 1.0)
-    add_camera("ORTHO", ortho_scale=2.0)
-    material = new_material("Lace", Alpha=alpha)
-    material.use_transparent_shadow = transparent
-    notes = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))[1]
-    assert any("shadow" in note for note in notes) is named

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -37,16 +36,6 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         {"Mix Shader/Factor": 0.2, "Mix Shader.001/Factor": 0.6, "Principled BSDF/Base Color": RED},
     ),
 }
-
-
-@pytest.fixture(scope="module")
-def addon() -> Iterator[None]:
-    """The package, registered: a material keeps what is fitted of it, and what it was."""
-    import blender_addon
-
-    blender_addon.register()
-    yield
-    blender_addon.unregister()
 
 
 def named(request: dict[str, Any]) -> list[str]:
