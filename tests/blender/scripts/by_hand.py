@@ -243,7 +243,7 @@ def story():
     yield from key("Z", *over, ctrl=True, shift=True)
     yield 0.5
     assert roughness() == 0.3125, "Ctrl+Shift+Z"
-    yield from press("mfo.revert(", part=0.3 if width < 300 else 0.7)
+    yield from press("mfo.revert(", part=0.7)  # beside A/B, or below it
     assert roughness() == before
     yield from press("mfo.apply_past(", "7_history")
     assert roughness() == 0.3125, "from the history"
