@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Verdict(Enum):
-    """What an eye would say of result and reference side by side; the value is the word in JSON."""
+    """What an eye would say of result and reference side by side, from the best on; the value is the word in JSON."""
 
     SAME = "same"
     CLOSE = "close"
@@ -85,6 +86,13 @@ class Judgement:
         """Verdict and cause for a user."""
         verdict = self.verdict.sentence if self.picture is None else f"Picture {self.picture}: {self.verdict.sentence}"
         return verdict if self.cause is None else f"{verdict} {self.cause.sentence}"
+
+
+def worst(judgements: Iterable[Judgement | None]) -> Judgement | None:
+    """The worst verdict, of equal ones that with the most to see; None where there is none."""
+    order = list(Verdict)
+    judged = [judgement for judgement in judgements if judgement is not None]
+    return max(judged, key=lambda found: (order.index(found.verdict), found.target.visible), default=None)
 
 
 _SENTENCES = {

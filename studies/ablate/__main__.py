@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import tempfile
 from contextlib import nullcontext
 from pathlib import Path
+
+from mfo_backend.bench.runs.machine import source_commit
 
 from .one_fit import OneFit
 from .page import page
@@ -40,7 +41,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("ablations.jsonl"))
     parser.add_argument("--doc", type=Path, default=ROOT / "docs" / "notebook" / "ablations.md")
     chosen = parser.parse_args()
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout
+    commit = source_commit()
     rules = [rule for rule in RULES if chosen.rules is None or rule.name in chosen.rules]
     counts = {name: int(count) for name, _, count in (part.partition("=") for part in chosen.scenes)}
     places = [(name, scene) for scene in range(max(counts.values())) for name in counts if scene < counts[name]]
@@ -59,7 +60,7 @@ def main() -> None:
                     found = fit(scenario, scene)
                 row = {"rule": rule.name if rule else ALL_ON, "scenario": scenario, "scene": scene, **found}
                 with chosen.rows.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row | {"size": chosen.size, "commit": commit.strip()}) + "\n")
+                    file.write(json.dumps(row | {"size": chosen.size, "commit": commit}) + "\n")
                 written += 1
     _, heading, said = chosen.doc.read_text("utf-8").partition(SAID) if chosen.doc.exists() else ("", "", "")
     chosen.doc.write_text(page(rows_of(chosen.rows)) + heading + said, "utf-8")

@@ -11,16 +11,14 @@ Needs a Python with `bpy`.
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 from mfo_backend.bench.rows.blender_row import BlenderRow, add_blender_row, read_blender_rows
+from mfo_backend.bench.runs.machine import source_commit
 
 from .scenarios import SCENARIOS
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def main() -> None:
@@ -31,7 +29,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=10, help="of each scenario")
     parser.add_argument("--size", type=int, default=96, help="pixels along each side, where the scenario has none")
     chosen = parser.parse_args()
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout
+    commit = source_commit()
     done = {(row.scenario, row.scene) for row in read_blender_rows(chosen.folder)}
     for scene in range(chosen.scenes):
         for name in chosen.scenario:
@@ -41,7 +39,7 @@ def main() -> None:
                 row = SCENARIOS[name](scene, chosen.size)
             except Exception as error:  # a failure is a row
                 row = BlenderRow(name, scene, "", error=str(error) or type(error).__name__)
-            add_blender_row(chosen.folder, replace(row, commit=commit.strip()))
+            add_blender_row(chosen.folder, replace(row, commit=commit))
             print(f"{name} {scene}: {row.verdict} {row.excess:.3f} above the noise {row.error}", file=sys.stderr)
 
 

@@ -11,9 +11,12 @@ from pathlib import Path
 
 from mfo_backend.bench.rows.blender_row import BlenderRow
 
+from ..child_module import run_module
+from ..materials.measure import measure as measure_room
 from ..verdicts.measure import flips
 from ..verdicts.measure import measure as measure_verdict
 from ..verdicts.summary import determined
+from ..views.measure import TURNS, fit, rendered
 
 OTHER_NOISE = 7  # seed of the pictures that a result is judged by
 
@@ -24,7 +27,7 @@ def graphs(scene: int, size: int) -> BlenderRow:
 
     import blender_addon
 
-    from ..graphs.__main__ import LIGHTS, is_wrong, row
+    from ..graphs.measure import LIGHTS, is_wrong, row
     from ..graphs.values import FITTED
 
     if not hasattr(bpy.types.Material, "mfo"):
@@ -44,8 +47,6 @@ def graphs(scene: int, size: int) -> BlenderRow:
 
 def views(scene: int, size: int) -> BlenderRow:
     """A material by two pictures, the second from where the result of the first proposes; judged in the first."""
-    from ..views.__main__ import TURNS, fit, rendered, run_module
-
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         run_module("studies.views.scene", "build", scene, folder)
@@ -87,10 +88,8 @@ def verdicts(kind: str, name: str, scene: int, size: int) -> BlenderRow:
 
 def materials(scene: int, size: int) -> BlenderRow:
     """A room of six materials fitted together; its errors are those of the material that ends furthest away."""
-    from ..materials.__main__ import measure
-
     with tempfile.TemporaryDirectory() as temporary:
-        row = measure(scene, Path(temporary), size, "balanced")
+        row = measure_room(scene, Path(temporary), size, "balanced")
     name, worst = max(row["materials"].items(), key=lambda item: item[1]["fitted"] - item[1]["floor"])
     return BlenderRow(
         "materials", scene, f"six, furthest: {name}", row["verdict"], worst["fitted"], worst["floor"],

@@ -11,68 +11,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import resource
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from .measure import measure
 
-from mfo_backend.metrics.display.tone_mapping import DisplayView
-from mfo_backend.metrics.flip.flip_error import flip_error
-from mfo_backend.scene.image_file import read_image
-from mfo_backend.types.image import Image
-
-ROOT = Path(__file__).resolve().parents[2]
-OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
 WITHIN = 0.01  # FLIP above the floor
-ROOMS = "studies.materials.scene"
-_ENDS = (0, 5)  # exit codes of a fit that came to its end: matched or not
-
-
-def measure(number: int, folder: Path, size: int, preset: str) -> dict[str, Any]:
-    """The row of one room."""
-    _run(ROOMS, "build", number, folder, "--size", size)
-    pictures = {}
-    for name, file, seed in (("reference", "truth", 3), ("floor", "truth", 4)):
-        pictures[name] = folder / f"{name}.exr"
-        _run(ROOMS, "render", folder / f"{file}.blend", pictures[name], seed)
-    words = [word for name in OBJECTS for word in ("--object", name)]
-    began, cpu = time.monotonic(), _child_seconds()
-    result = _run(
-        "mfo_backend", "blend", folder / "start.blend", *words, "--reference", pictures["reference"],
-        "--preset", preset, "--out", folder / "job", "--apply", "--force", "--save-as",
-        folder / "fitted.blend", "--json",
-    )  # fmt: skip
-    seconds, cpu = time.monotonic() - began, _child_seconds() - cpu
-    pictures["fitted"] = folder / "fitted.exr"
-    _run(ROOMS, "render", folder / "fitted.blend", pictures["fitted"], 5)
-    images = {name: read_image(path, None) for name, path in pictures.items()}
-    row: dict[str, Any] = {"number": number, "size": size, "preset": preset, "seconds": seconds, "cpu": cpu}
-    row["fit_seconds"], row["verdict"], row["materials"] = result["seconds"], result["verdict"], {}
-    for found in result["materials"]:
-        seen = read_image(folder / "job" / found["folder"] / "pictures" / "counted.png", None).pixels[..., 0] > 0.5
-        floor, fitted = (_flip(images["reference"], images[name], seen) for name in ("floor", "fitted"))
-        row["materials"][found["object"]] = {
-            "pixels": int(seen.sum()), "floor": floor, "fitted": fitted, "verdict": found["verdict"],
-            "recovered": found["recovered"],
-        }  # fmt: skip
-    row["truth"] = json.loads((folder / "truth.json").read_text("utf-8"))
-    return row
-
-
-def _flip(reference: Image, test: Image, mask: np.ndarray) -> float:
-    view = DisplayView.for_scene(reference.pixels, mask)
-    return float(flip_error(reference, test, display=view).map[mask].mean(dtype=np.float64))
-
-
-def _child_seconds() -> float:
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime
 
 
 def summary(rows: list[dict[str, Any]]) -> str:
@@ -92,17 +37,6 @@ def summary(rows: list[dict[str, Any]]) -> str:
             f"{row['seconds']:.0f} | {row['cpu']:.0f} |"
         )
     return "\n".join([*lines, "", f"All materials within {WITHIN} of the floor in {good} of {len(rows)} rooms."])
-
-
-def _run(module: str, *words: Any) -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, "-m", module, *map(str, words)],
-        capture_output=True, text=True, cwd=ROOT, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    if done.returncode not in _ENDS:
-        raise RuntimeError(f"{module} ended with {done.returncode}: {done.stderr[-500:]}")
-    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    return json.loads(lines[-1]) if lines else {}
 
 
 def main() -> None:

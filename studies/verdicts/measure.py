@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..child_module import MATCHED_OR_NOT, run_module
 from .cases import KINDS, Case, sockets_of
-
-ROOT = Path(__file__).resolve().parents[2]
-DIFFERENT = 5  # exit code of `mfo` for a result that does not match
 
 
 @dataclass(frozen=True)
@@ -59,13 +54,14 @@ def measure(kind: str, number: int, folder: Path) -> Row:
 
 def _measured(kind: str, case: Case, folder: Path) -> Row:
     if not (folder / "floor.exr").is_file():
-        run("studies.verdicts.scene", kind, case.number, folder)
+        run_module("studies.verdicts.scene", kind, case.number, folder)
     picture = folder / f"reference.{case.picture}"
     words = ("--object", "Target", "--reference", picture, "--out", folder / "job", "--json")
     baked = ("--reference-view", "scene") if case.picture == "png" else ()
-    code, result = run("mfo_backend", "blend", folder / "start.blend", *words, *baked, allowed=(0, DIFFERENT))
+    asked = (folder / "start.blend", *words, *baked)
+    code, result = run_module("mfo_backend", "blend", *asked, allowed=MATCHED_OR_NOT)
     after = folder / "after.exr"
-    run("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job", "--out", after,
+    run_module("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job", "--out", after,
         "--samples", case.samples, "--seed", 2)  # fmt: skip
     truth = {"metallic": 0.0} | {name.lower().replace(" ", "_"): value for name, value in sockets_of(case).items()}
     values = {
@@ -93,19 +89,3 @@ def flips(folder: Path) -> tuple[float, float, float, float]:
     maps = [flip_error(reference, picture).map for picture in (after, floor)]
     flip, base = (float(of.mean()) for of in maps)
     return flip, base, *(float(of[mask].mean()) for of in maps)
-
-
-def run(module: str, *words: Any, allowed: tuple[int, ...] = (0,)) -> Any:
-    """The JSON object on the last line of a Python module's output, with the exit code where several are allowed.
-
-    Raises
-    ------
-    RuntimeError
-        With the sentence or the last lines of a program that failed.
-    """
-    done = subprocess.run([sys.executable, "-m", module, *map(str, words)], capture_output=True, text=True, cwd=ROOT)
-    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    answer = json.loads(lines[-1]) if lines else {}
-    if done.returncode not in allowed or not lines:
-        raise RuntimeError(f"{module} ended with {done.returncode}: {answer.get('sentence', done.stderr[-500:])}")
-    return (done.returncode, answer) if len(allowed) > 1 else answer

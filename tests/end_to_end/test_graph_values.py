@@ -11,7 +11,7 @@ import pytest
 from .conftest import run_bpy, run_mfo
 
 BUILD = """
-from studies.graphs.__main__ import build_scene
+from studies.graphs.measure import build_scene
 target, node = build_scene("ramp", "lamp", 48)
 stops = target.active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
 scene = bpy.context.scene

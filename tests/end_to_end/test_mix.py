@@ -11,7 +11,7 @@ import pytest
 from .conftest import run_bpy, run_mfo
 
 BUILD = """
-from studies.graphs.__main__ import build_scene
+from studies.graphs.measure import build_scene
 target, _ = build_scene("factor", "lamp", 48)
 nodes = target.active_material.node_tree.nodes
 values = nodes["Mix Shader"].inputs[0], nodes["Diffuse BSDF"].inputs["Color"], nodes["Glossy BSDF"].inputs["Roughness"]

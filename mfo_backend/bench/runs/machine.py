@@ -28,7 +28,7 @@ def machine_facts(variant: str, *, threads: int, import_seconds: float) -> dict[
         "device": "GPU" if variant.startswith("cuda") else _processor(),
         "threads": threads,
         "import_seconds": import_seconds,
-        "commit": _commit(),
+        "commit": source_commit(),
     }
 
 
@@ -42,7 +42,7 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def _commit() -> str:
+def source_commit() -> str:
     """Short commit id, ``+changes`` where sources differ from it, empty outside of a checkout."""
     root = Path(__file__).resolve().parents[3]
 

@@ -15,7 +15,7 @@ from ...metrics.flip.block_means import block_side, block_sums
 from ...render.camera.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
 from ...types.result import PictureResult
-from ...types.verdict import Difference, Judgement, Verdict
+from ...types.verdict import Difference, Judgement, Verdict, worst
 from .beyond_noise import NEXT, beyond_noise
 from .likely_cause import likely_cause
 
@@ -31,8 +31,6 @@ BESIDE = 3  # pixels next to the target that are not its surroundings
 PLAIN = 0.004  # deviation of display values: so even a background was cut out, not rendered
 BRIGHTEST = 4.0  # times a display's white: fireflies count as if they were so bright
 WORSE = 0.01  # FLIP more than that of the start from which on a result is worse
-
-_FROM_BEST = (Verdict.SAME, Verdict.CLOSE, Verdict.DIFFERENT)
 
 Mask = NDArray[np.bool_]
 
@@ -72,11 +70,10 @@ def judge(
 
 def worst_judgement(pictures: tuple[PictureResult, ...]) -> Judgement | None:
     """The verdict on all pictures: the worst one, with the name of its picture; None where there is none."""
-    judged = [(p.label, p.judgement) for p in pictures if p.judgement is not None]
-    if not judged:
-        return None
-    label, worst = max(judged, key=lambda pair: (_FROM_BEST.index(pair[1].verdict), pair[1].target.visible))
-    return worst if worst.verdict is Verdict.SAME else replace(worst, picture=label)
+    found = worst(picture.judgement for picture in pictures)
+    if found is None or found.verdict is Verdict.SAME:
+        return found
+    return replace(found, picture=next(picture.label for picture in pictures if picture.judgement is found))
 
 
 def is_worse(reference: Image, start: Pixels, result: Pixels, mask: Mask, view: View) -> bool:

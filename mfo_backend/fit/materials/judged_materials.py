@@ -23,7 +23,7 @@ from .rounds import MOST_ROUNDS, Member, Turns, check_members, show_all, take_tu
 
 # Paths of the picture that is judged, and samples of a pixel at least: as `judge.verification` takes of a whole one
 MOST_PATHS, LEAST_SAMPLES = 1 << 21, 4
-START_SAMPLES = 8
+START_SAMPLES = 8  # of a pixel of the picture before the fit, which only says from where its errors came
 NOT_STILL = (
     "The light between the materials still moved after {rounds} rounds: fit again from the applied values, or fit "
     "fewer at once."

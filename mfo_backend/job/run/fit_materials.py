@@ -15,14 +15,13 @@ from ...types.image import Encoding, Image
 from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
 from ...types.status import Status
-from ...types.verdict import Judgement, Verdict
+from ...types.verdict import Verdict, worst
 from ..folder.job_folder import JobFolder, clear_outputs
 from ..folder.request import Request
 from .job_outcome import JobOutcome
 from .job_scene import graph_notes, load_native_code, named, request_materials
 
 _MODEL = "blender_principled"
-_FROM_BEST = (Verdict.SAME, Verdict.CLOSE, Verdict.DIFFERENT)
 _SAID = {  # of one, of several
     Verdict.SAME: ("looks the same as the reference", "look the same as the reference"),
     Verdict.CLOSE: ("is close to the reference", "are close to the reference"),
@@ -98,7 +97,6 @@ def fit_materials(
 
 def _whole(results: Sequence[tuple[str, FitResult]], pixels: Sequence[int]) -> FitResult:
     """What is said of all materials by their names: the worst status and verdict, mean errors over their `pixels`."""
-    worst = _worst([result.judgement for _, result in results])
     statuses = [result.status for _, result in results]
     status = next((s for s in (Status.CANCELLED, Status.DIFFERENT) if s in statuses), statuses[0])
     names = results[0][1].errors
@@ -119,7 +117,7 @@ def _whole(results: Sequence[tuple[str, FitResult]], pixels: Sequence[int]) -> F
         },  # type: ignore[arg-type]  # of two numbers
         seconds=sum(result.seconds for _, result in results),
         passes=sum(result.passes for _, result in results),
-        judgement=worst,
+        judgement=worst(result.judgement for _, result in results),
     )
 
 
@@ -132,10 +130,3 @@ def _counts(results: Sequence[tuple[str, FitResult]]) -> str:
         if having:
             parts.append(f"{len(having)} {words[len(having) > 1]}{which}")
     return ", ".join(parts)
-
-
-def _worst(judgements: Sequence[Judgement | None]) -> Judgement | None:
-    judged = [judgement for judgement in judgements if judgement is not None]
-    if not judged:
-        return None
-    return max(judged, key=lambda found: (_FROM_BEST.index(found.verdict), found.target.visible))

@@ -17,6 +17,7 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import steps
+from steps import material, plain_picture, roughness, runtime
 
 addon_id, folder, scale, width = sys.argv[sys.argv.index("--") + 1 :]
 folder, scale, width = Path(folder), float(scale), int(width)
@@ -142,18 +143,6 @@ def until(condition, seconds):
         yield 0.05
 
 
-def runtime():
-    return bpy.context.window_manager.mfo_runtime
-
-
-def material():
-    return bpy.data.objects["Cube"].active_material
-
-
-def roughness():
-    return next(n for n in material().node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs["Roughness"].default_value
-
-
 def widen():
     """Drag the sidebar's edge, as its width is no property."""
     region = side_bar()
@@ -169,11 +158,7 @@ def widen():
 
 
 def set_the_scene():
-    render = bpy.context.scene.render
-    render.engine = "CYCLES"
-    bpy.context.scene.cycles.samples = 1
-    render.resolution_x, render.resolution_y = 96, 64
-    bpy.context.scene.view_settings.view_transform = "Standard"
+    plain_picture()
     os.environ["MFO_FAKE"] = json.dumps({"seconds": 4})
     with bpy.context.temp_override(window=window(), area=area(), region=view()):
         bpy.ops.screen.screen_full_area(use_hide_panels=False)

@@ -19,6 +19,7 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import steps
+from steps import material, plain_picture, roughness, runtime
 
 addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
@@ -103,24 +104,8 @@ def shot(name):
         subprocess.run(["import", "-window", "root", target])
 
 
-def runtime():
-    return bpy.context.window_manager.mfo_runtime
-
-
-def material():
-    return bpy.data.objects["Cube"].active_material
-
-
-def roughness():
-    return next(n for n in material().node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs["Roughness"].default_value
-
-
 def settings():
-    render = bpy.context.scene.render
-    render.engine = "CYCLES"
-    bpy.context.scene.cycles.samples = 1
-    render.resolution_x, render.resolution_y = 96, 64
-    bpy.context.scene.view_settings.view_transform = "Standard"
+    plain_picture()
     bpy.context.scene.mfo.reference_path = str(folder / "reference.png")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Take the steps of a walk through Blender's windows, one after another, and quit."""
+"""Take the steps of a walk through Blender's windows, one after another, and quit; and what walks look at."""
 
 import sys
 import traceback
@@ -24,3 +24,27 @@ def take(steps):
         return None
 
     bpy.app.timers.register(tick, first_interval=FIRST_SECONDS, persistent=True)
+
+
+def runtime():
+    """What the add-on knows of the running fit."""
+    return bpy.context.window_manager.mfo_runtime
+
+
+def material():
+    """The material that is fitted."""
+    return bpy.data.objects["Cube"].active_material
+
+
+def roughness():
+    """The value that the fake backend recovers."""
+    return next(n for n in material().node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs["Roughness"].default_value
+
+
+def plain_picture():
+    """A small picture, quick to render, under the plain view."""
+    render = bpy.context.scene.render
+    render.engine = "CYCLES"
+    bpy.context.scene.cycles.samples = 1
+    render.resolution_x, render.resolution_y = 96, 64
+    bpy.context.scene.view_settings.view_transform = "Standard"

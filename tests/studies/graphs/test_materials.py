@@ -10,8 +10,8 @@ bpy = pytest.importorskip("bpy")
 from blender_addon.export.findings import Findings  # noqa: E402
 from blender_addon.export.materials.node_graph import names_by_graph  # noqa: E402
 from blender_addon.export.materials.read_material import read_target  # noqa: E402
-from studies.graphs.__main__ import build_scene  # noqa: E402
 from studies.graphs.materials import GRAPHS  # noqa: E402
+from studies.graphs.measure import build_scene  # noqa: E402
 from studies.graphs.values import FITTED, SOCKETS, Drawn  # noqa: E402
 
 

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One room of `studies.materials`: its fit, and what Cycles says of each material."""
+
+from __future__ import annotations
+
+import json
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.flip.flip_error import flip_error
+from mfo_backend.scene.image_file import read_image
+from mfo_backend.types.image import Image
+
+from ..child_module import MATCHED_OR_NOT, run_module
+
+OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
+ROOMS = "studies.materials.scene"
+
+
+def measure(number: int, folder: Path, size: int, preset: str) -> dict[str, Any]:
+    """The row of one room."""
+    run_module(ROOMS, "build", number, folder, "--size", size)
+    pictures = {}
+    for name, file, seed in (("reference", "truth", 3), ("floor", "truth", 4)):
+        pictures[name] = folder / f"{name}.exr"
+        run_module(ROOMS, "render", folder / f"{file}.blend", pictures[name], seed)
+    words = [word for name in OBJECTS for word in ("--object", name)]
+    began, cpu = time.monotonic(), _child_seconds()
+    result = run_module(
+        "mfo_backend", "blend", folder / "start.blend", *words, "--reference", pictures["reference"],
+        "--preset", preset, "--out", folder / "job", "--apply", "--force", "--save-as",
+        folder / "fitted.blend", "--json", allowed=MATCHED_OR_NOT,
+    ).answer  # fmt: skip
+    seconds, cpu = time.monotonic() - began, _child_seconds() - cpu
+    pictures["fitted"] = folder / "fitted.exr"
+    run_module(ROOMS, "render", folder / "fitted.blend", pictures["fitted"], 5)
+    images = {name: read_image(path, None) for name, path in pictures.items()}
+    row: dict[str, Any] = {"number": number, "size": size, "preset": preset, "seconds": seconds, "cpu": cpu}
+    row["fit_seconds"], row["verdict"], row["materials"] = result["seconds"], result["verdict"], {}
+    for found in result["materials"]:
+        seen = read_image(folder / "job" / found["folder"] / "pictures" / "counted.png", None).pixels[..., 0] > 0.5
+        floor, fitted = (_flip(images["reference"], images[name], seen) for name in ("floor", "fitted"))
+        row["materials"][found["object"]] = {
+            "pixels": int(seen.sum()), "floor": floor, "fitted": fitted, "verdict": found["verdict"],
+            "recovered": found["recovered"],
+        }  # fmt: skip
+    row["truth"] = json.loads((folder / "truth.json").read_text("utf-8"))
+    return row
+
+
+def _flip(reference: Image, test: Image, mask: np.ndarray) -> float:
+    view = DisplayView.for_scene(reference.pixels, mask)
+    return float(flip_error(reference, test, display=view).map[mask].mean(dtype=np.float64))
+
+
+def _child_seconds() -> float:
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
