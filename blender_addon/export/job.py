@@ -218,6 +218,7 @@ def partial_export(
             data = read_scene(context, obj, findings, bakes, leaves[0] if leaves else None, fitted if targets else ())
             findings.raise_first()
             assert data is not None
+            assert obj is not None
             fits = []
             for number, each in enumerate(fitted):
                 fits.append(_read_values(data, context, each, number, fit, values, of_mix, findings))

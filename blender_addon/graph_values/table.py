@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import bpy
 
@@ -27,7 +27,9 @@ _AXES = ("X", "Y", "Z", "W")
 
 
 class HasName(Protocol):
-    """A value that is called by its node's label and its own name."""
+    """A value that is called by its node's label and its own name: a data class."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     def name(self) -> str:

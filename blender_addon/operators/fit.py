@@ -54,11 +54,11 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         if not bpy.app.background and needs_setup():
             cls.poll_message_set(translated("The backend is not installed yet: press Install below"))
             return False
-        listed = bool(context.scene.mfo.targets)
-        if not bpy.app.background and context.object is None and not listed:
+        by_active = not bpy.app.background and not context.scene.mfo.targets
+        if by_active and context.object is None:
             cls.poll_message_set(translated("Select the object whose material is to be fitted"))
             return False
-        if not bpy.app.background and not listed and context.object.active_material is None:
+        if by_active and context.object and context.object.active_material is None:
             cls.poll_message_set(
                 translated("The object has no material in its active slot; give it one with a Principled BSDF")
             )

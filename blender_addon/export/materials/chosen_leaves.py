@@ -29,13 +29,13 @@ def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple
     ExportError
         If one is named that the mix does not have, or that no fit can change.
     """
-    wanted = fit.get("parameters", "all")
+    asked = fit.get("parameters", "all")
     target = None if obj is None else target_shader(obj.active_material)
-    if target is None or not target.is_mixed or isinstance(wanted, str):
+    if target is None or not target.is_mixed or isinstance(asked, str):
         return [], fit
     label = one_word(target.node.label or target.node.name)
     own = {plain_name(f"{label}/{target.own_name(name)}"): name for name in target.places}
-    wanted = [own.get(plain_name(name), name) for name in wanted]
+    wanted: list[str] = [own.get(plain_name(name), str(name)) for name in asked]
     inside = [name for name in wanted if "/" in name]
     problem = why_no_mix_values(target)
     if inside and problem is not None:

@@ -163,8 +163,8 @@ def evaluate_graph(
         weight = seen(leaf.weight, found["weight"]) if leaf.weight.by_graph else leaf.weight
         return replace(leaf, sockets=sockets, weight=weight)
 
-    fitted, *held = map(evaluated, leaves, answer["leaves"])
-    return replace(fitted, leaves=tuple(held)), NodeGraph(answer["camera"], files[0], tuple(files), depths)
+    first, *held = map(evaluated, leaves, answer["leaves"])
+    return replace(first, leaves=tuple(held)), NodeGraph(answer["camera"], files[0], tuple(files), depths)
 
 
 def _own_name(leaf: Material, name: str) -> str:

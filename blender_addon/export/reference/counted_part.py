@@ -51,12 +51,12 @@ class CountedPart:
         left, top, right, bottom = self.crop
         if not (0.0 <= left < right <= 1.0 and 0.0 <= top < bottom <= 1.0):
             raise ExportError("The crop leaves nothing: left must be below right, and top below bottom.")
-        if isinstance(self.mask, bpy.types.Image):
-            painted = _painted(self.mask)
-            if thorough and not (painted >= PAINTED).any():
-                raise ExportError(f"The mask '{self.mask.name}' is black everywhere: paint white what counts.")
-        elif self.mask is not None and not self.mask.is_file():
-            raise ExportError(f"The mask {self.mask} does not exist: choose another file.")
+        mask = self.mask
+        if isinstance(mask, Path):
+            if not mask.is_file():
+                raise ExportError(f"The mask {mask} does not exist: choose another file.")
+        elif mask is not None and thorough and not (_painted(mask) >= PAINTED).any():
+            raise ExportError(f"The mask '{mask.name}' is black everywhere: paint white what counts.")
 
     def write(self, folder: Path) -> dict[str, Any]:
         """Write the mask into `folder`; returns what request.json says of the part.

@@ -52,8 +52,8 @@ def light_paths_from_json(data: Any, where: str) -> LightPaths | None:
     others = ("filter_glossy", "clamp_indirect", "transparent_bounces")
     paths = CheckedObject(data, f"{where}: light_paths", (*others, *counts))
     return LightPaths(
-        paths.number("filter_glossy", 0.0, 1e4, 0.0),
-        paths.number("clamp_indirect", 0.0, 1e12, 0.0),
-        *(paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts),
-        paths.integer("transparent_bounces", 0, NO_LIMIT, TRANSPARENT_BOUNCES),
+        filter_glossy=paths.number("filter_glossy", 0.0, 1e4, 0.0),
+        clamp_indirect=paths.number("clamp_indirect", 0.0, 1e12, 0.0),
+        transparent_bounces=paths.integer("transparent_bounces", 0, NO_LIMIT, TRANSPARENT_BOUNCES),
+        **{name: paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts},
     )
