@@ -63,17 +63,37 @@ class TruePictures:
 
 
 class Judge:
-    """Judges values against a scene's truth; without `pictures` it renders them first."""
+    """Judges values against a scene's truth; without `pictures` it renders them when they are needed."""
 
     def __init__(self, scene: BenchScene, pictures: TruePictures | None = None) -> None:
         self._scene = scene
-        self._renderers = [self._load(file) for file in (scene.file, *scene.relit)]
-        self._renderer = self._renderers[0]
+        self._renderer = self._load(scene.file)
         self._seed = _JUDGE_STREAM + scene.number
         self._spp = JUDGE_SPP if scene.truth and not scene.given else UNPAIRED_SPP
         table = self._renderer.table
         self.truth = table.clip(table.pack(scene.truth)) if scene.truth else None
-        self.pictures = pictures or self._render()
+        self._known = pictures
+
+    @functools.cached_property
+    def pictures(self) -> TruePictures:
+        """The scene's true pictures and what is measured on them once."""
+        return self._known or self._render()
+
+    @functools.cached_property
+    def _true_picture(self) -> Pixels:
+        """The truth under the reference's light: all that a score alone needs."""
+        if self._known:
+            return self._known.truth[0]
+        if self._scene.given:
+            return read_image(self._scene.given[1]).pixels
+        if self.truth is None:
+            return PlainScene(self._scene.true_files[0]).image(seed=self._seed, spp=self._spp)
+        return self._picture(self._renderer, self.truth)
+
+    @functools.cached_property
+    def _relit_renderers(self) -> list[Renderer]:
+        """Those of the lights that no fit sees."""
+        return [self._load(file) for file in self._scene.relit]
 
     @property
     def reference(self) -> Image:
@@ -88,7 +108,7 @@ class Judge:
         """What a row is scored on: the truth and these values, with `Row.judge_spp` samples a pixel."""
         picture = self.picture(values)
         if spp is None or spp <= self._spp or self.truth is None:
-            return self.pictures.truth[0], picture
+            return self._true_picture, picture
         return self._finer_truth, self._finer(self._renderer.table.pack(values), picture)
 
     def difference(self, values: Mapping[str, Value]) -> Difference:
@@ -97,14 +117,14 @@ class Judge:
 
     def difference_of(self, picture: Pixels) -> Difference:
         """Of a picture of the judge's and the true one."""
-        return _difference(self.pictures.truth[0], picture, self.pictures.mask)
+        return _difference(self._true_picture, picture, self.pictures.mask)
 
     def settled(self, difference: Difference, values: Mapping[str, Value], picture: Pixels) -> tuple[Difference, int]:
         """The difference of a `picture` of the values with scores that the judge's own noise does not lower, and the
         samples a pixel of the pictures they are for."""
         if difference.jod is None or difference.jod >= DOUBTED_JOD or self.truth is None or self._scene.given:
             return difference, self._spp
-        itself = _difference(self.pictures.truth[0], self._second_truth, self.pictures.mask).jod
+        itself = _difference(self._true_picture, self._second_truth, self.pictures.mask).jod
         if itself is None or itself >= CLEAR_JOD:
             return difference, self._spp
         found = self._finer(self._renderer.table.pack(values), picture)
@@ -120,7 +140,7 @@ class Judge:
     @functools.cached_property
     def _finer_truth(self) -> Pixels:
         assert self.truth is not None
-        return self._finer(self.truth, self.pictures.truth[0], self._second_truth)
+        return self._finer(self.truth, self._true_picture, self._second_truth)
 
     def _finer(self, vector: NDArray[np.float64], *parts: Pixels) -> Pixels:
         """The mean of `MORE_PARTS` pictures, the first of which are there."""
@@ -132,7 +152,7 @@ class Judge:
 
     def flip(self, values: Mapping[str, Value]) -> float:
         """Mean FLIP alone, without the judges' scores."""
-        return self._flip(self.pictures.truth[0], self._renderer.table.pack(values), self.pictures.mask)
+        return self._flip(self._true_picture, self._renderer.table.pack(values), self.pictures.mask)
 
     def reference_flip(self, picture: Pixels) -> float:
         """Mean FLIP of a picture of the judge's and the reference, whose noise is in it."""
@@ -141,7 +161,7 @@ class Judge:
     def relit(self, values: Mapping[str, Value]) -> list[Difference]:
         """The same under the lights no fit sees."""
         found = []
-        for renderer, truth in zip(self._renderers[1:], self.pictures.truth[1:], strict=True):
+        for renderer, truth in zip(self._relit_renderers, self.pictures.truth[1:], strict=True):
             picture = self._picture(renderer, renderer.table.pack(values))
             found.append(_difference(truth, picture, self.pictures.mask, judges=False))
         return found
@@ -161,19 +181,19 @@ class Judge:
     def _render(self) -> TruePictures:
         scene, spp = self._scene, self._scene.scenario.reference_spp
         seed = _REFERENCE_STREAM + scene.number
+        relit = []
         if scene.given:
-            reference, true = (read_image(file).pixels for file in scene.given)
-            truth = (true,)
+            reference = read_image(scene.given[0]).pixels
         elif self.truth is None:
-            plain = [PlainScene(file) for file in scene.true_files]
-            reference = plain[0].image(seed=seed, spp=spp)
-            truth = tuple(one.image(seed=self._seed, spp=self._spp) for one in plain)
+            reference = PlainScene(scene.true_files[0]).image(seed=seed, spp=spp)
+            relit = [PlainScene(file).image(seed=self._seed, spp=self._spp) for file in scene.true_files[1:]]
         else:
             reference = self._renderer.image(self.truth, seed=seed, spp=spp)
-            truth = tuple(self._picture(renderer, self.truth) for renderer in self._renderers)
+            relit = [self._picture(renderer, self.truth) for renderer in self._relit_renderers]
+        truth = (self._true_picture, *relit)
         mask = self._renderer.target_mask()
-        floor = _difference(truth[0], reference, mask)
-        start = _difference(truth[0], self._picture(self._renderer, self._renderer.start), mask)
+        floor = _difference(truth[0], reference, mask, judges=False)
+        start = _difference(truth[0], self._picture(self._renderer, self._renderer.start), mask, judges=False)
         gap = self._flip(truth[0], self.truth, mask) if scene.given and self.truth is not None else None
         return TruePictures(reference, truth, mask, floor, start, gap)
 

@@ -116,8 +116,9 @@ class FitRunner:
             self._scene = self._write(SCENARIOS[task.scenario], task.scene, folder)
             self._judge = Judge(self._scene, pictures)
             self._at = at
-            self._keep_picture(Task(*at, "reference"), self._judge.pictures.reference)
-            self._keep_picture(Task(*at, "truth"), self._judge.pictures.truth[0])
+            if self._kept_at is not None:
+                self._keep_picture(Task(*at, "reference"), self._judge.pictures.reference)
+                self._keep_picture(Task(*at, "truth"), self._judge.pictures.truth[0])
 
     def _write(self, scenario: Scenario, number: int, folder: Path) -> BenchScene:
         if not scenario.cycles:

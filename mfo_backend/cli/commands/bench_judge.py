@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ...bench.judge.q_jod import scored, without_score
 from ...bench.rows.method import METHODS
+from ...bench.rows.row import Row
 from ...bench.rows.row_file import RowFile
 from ...bench.scenes.assets import Assets
 from ...bench.scenes.scenario import SCENARIOS
@@ -17,6 +18,7 @@ from ...job.output.progress_bar import terminal_columns
 from ...job.run.stop import StopSignal
 from ...metrics.judges.hdr_vdp_program import find_code, find_program
 from ...types.errors import BadInputError, MfoError
+from ...types.image import Pixels
 from ...types.status import Status
 from ..blender_host import find_blender_host
 
@@ -50,9 +52,13 @@ def run_judge(arguments: argparse.Namespace) -> int:
     runner = FitRunner(arguments.folder / "scenes", _size(arguments.folder), Assets.find(), host=_host())
     stop = StopSignal()
     with file.only_writer(), stop.watching(), tqdm(total=len(left), unit="row", ncols=terminal_columns()) as bar:
-        for batch in scored(left, runner.judged_pair, stop.requested):
+
+        def pair(row: Row) -> tuple[Pixels, Pixels]:
+            bar.update()  # a batch takes minutes
+            return runner.judged_pair(row)
+
+        for batch in scored(left, pair, stop.requested):
             file.replace(batch)
-            bar.update(len(batch))
     return Status.CANCELLED.exit_code if stop.requested() else 0
 
 

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from mfo_backend.bench.judge import judge as judge_module
-from mfo_backend.bench.judge.judge import DOUBTED_JOD, MORE_PARTS
+from mfo_backend.bench.judge.judge import DOUBTED_JOD, MORE_PARTS, Judge
 from mfo_backend.bench.rows.method import method_settings
 from mfo_backend.bench.rows.row import Task
 from mfo_backend.bench.rows.summary import SOLVED_FLIP
 from mfo_backend.bench.runs import fit_runner
 from mfo_backend.bench.runs.fit_runner import FitRunner
 from mfo_backend.bench.scenes.assets import Assets
+from mfo_backend.metrics.compare import compare_images
+from mfo_backend.types.image import Encoding, Image
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +64,18 @@ def test_the_truth_itself_has_no_error(runner):
     assert (difference.flip, difference.relative_rmse) == (0.0, 0.0)  # the same picture twice
     assert judge.relit(judge.true_values())[0].relative_rmse == 0.0
     assert judge.pictures.floor.relative_rmse > 0
+
+
+def test_a_score_alone_renders_the_truth_and_the_values_and_nothing_else(runner, monkeypatch):
+    row = runner(Task("parameters", 0, "fast"), never)
+    pictures = runner._judge.pictures
+    runner._at = None
+    monkeypatch.setattr(Judge, "_render", lambda _judge: pytest.fail("all true pictures were rendered"))
+    truth, found = runner.judged_pair(row)
+    np.testing.assert_array_equal(truth, pictures.truth[0])
+    assert compare_images(Image(truth, Encoding.LINEAR), Image(found, Encoding.LINEAR), mask=pictures.mask).metrics[
+        "flip"
+    ] == pytest.approx(row.flip, rel=1e-5)
 
 
 @dataclass(frozen=True)
