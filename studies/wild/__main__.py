@@ -100,6 +100,7 @@ def recover(chosen: argparse.Namespace, material: Row) -> Row:
     blender, samples = "studies.wild.in_blender", f"--samples={chosen.samples}"
     try:
         prepare = [str(chosen.folder / material["file"]), target, f"--slot={material['slot']}", f"--seed={SEED}"]
+        prepare.append(f"--view={material['view']}")
         child([blender, "prepare", *prepare, f"--out={folder}", f"--size={chosen.size}", samples], RENDER_SECONDS)
         began = time.monotonic()
         fit = [f"{folder}/start.blend", target, f"--reference={folder}/reference.exr", f"--out={job}"]

@@ -2,7 +2,7 @@
 """Blender's part of the study: what the export says of each material of a file, and a recovery prepared from it.
 
     python -m studies.wild.in_blender read FILE
-    python -m studies.wild.in_blender prepare FILE --object NAME --slot N --seed N --out DIR [--size 96] [--samples 64]
+    python -m studies.wild.in_blender prepare FILE --object NAME --slot N --view N --seed N --out DIR [--size 96]
     python -m studies.wild.in_blender render FILE --out EXR --seed N [--samples 64]
 
 Needs bpy. The answer is the last line of stdout, one JSON object.
@@ -25,28 +25,43 @@ from mathutils import Vector
 from blender_addon.export.job import export_findings
 from blender_addon.headless import _open
 
+from .rows import how_read
+
 # Principled values that are moved for the start, with the range they are drawn from
 MOVED = {
     "Base Color": (0.1, 0.9),
     "Roughness": (0.2, 0.8),
     "Metallic": (0.0, 0.6),
 }
-VIEW = Vector((0.6, -1.0, 0.5))  # from where a camera looks that the study has to add
+OWN = -1  # the view of the file's own camera; others are those of VIEWS
+# from where a camera looks that the study has to add
+VIEWS = [Vector(v) for v in ((0.6, -1.0, 0.5), (-0.6, 1.0, 0.5), (1.0, 0.6, -0.5), (-1.0, -0.6, -0.5), (0.1, 0.0, 1.0))]
+CANDIDATES = 4  # objects of a material that are tried, the largest first
 FIELD = 40.0  # degrees, of that camera
 LEAST_SHARE = 0.05  # of the frame's width and height that a target's bounds must span
 
 
 def read(path: Path) -> dict[str, Any]:
-    """What the export says of every material on a rendered mesh of a file, each once, on its largest object."""
+    """What the export says of every material on a rendered mesh of a file, each once, where a camera sees it best.
+
+    The file's own camera comes first, over the material's objects from large to small, then cameras around them.
+    """
     _open(path)
     context = bpy.context
+    own = context.scene.camera
     rows = []
-    for material, (obj, slot) in sorted(_seen(context).items(), key=lambda item: item[0].name):
-        row = {"material": material.name, "object": obj.name, "slot": slot, "sort": _sort(material)}
-        obj.active_material_index = slot
-        added = _look_at(context.scene, obj)
-        findings = export_findings(context, obj)
-        rows.append({**row, "camera_added": added, "errors": findings.errors, "notes": findings.notes})
+    for material, users in sorted(_users(context).items(), key=lambda item: item[0].name):
+        for view, (obj, slot) in [(v, user) for v in (OWN, *range(len(VIEWS))) for user in users]:
+            context.scene.camera = own
+            obj.active_material_index = slot
+            if not _look_at(context.scene, obj, view):
+                continue
+            findings = export_findings(context, obj)
+            row = {"material": material.name, "object": obj.name, "slot": slot, "sort": _sort(material), "view": view}
+            row |= {"errors": findings.errors, "notes": findings.left_out}
+            if how_read(row) != "not seen":
+                break
+        rows.append(row)
     return {"version": list(bpy.data.version), "engine": context.scene.render.engine, "materials": rows}
 
 
@@ -56,7 +71,7 @@ def prepare(chosen: argparse.Namespace) -> dict[str, Any]:
     scene, obj = bpy.context.scene, bpy.data.objects[chosen.object]
     obj.active_material_index = chosen.slot
     material = obj.material_slots[chosen.slot].material
-    added = _look_at(scene, obj)
+    _look_at(scene, obj, chosen.view)
     _make_small(scene, chosen.size)
     chosen.out.mkdir(parents=True, exist_ok=True)
     for name, seed in (("reference", 0), ("floor", 1)):
@@ -64,7 +79,7 @@ def prepare(chosen: argparse.Namespace) -> dict[str, Any]:
     moved = _move_values(material, random.Random(chosen.seed))
     _render(scene, chosen.out / "before.exr", chosen.samples, 2)
     bpy.ops.wm.save_as_mainfile(filepath=str(chosen.out / "start.blend"), copy=True, relative_remap=True)
-    return {"moved": moved, "camera_added": added}
+    return {"moved": moved}
 
 
 def render(chosen: argparse.Namespace) -> dict[str, Any]:
@@ -74,20 +89,16 @@ def render(chosen: argparse.Namespace) -> dict[str, Any]:
     return {}
 
 
-def _seen(context: bpy.types.Context) -> dict[bpy.types.Material, tuple[bpy.types.Object, int]]:
-    """Materials of rendered meshes, each with the slot of the largest object that has faces of it."""
-    best: dict[bpy.types.Material, tuple[float, bpy.types.Object, int]] = {}
-    for obj in context.view_layer.objects:
-        if obj.type != "MESH" or obj.hide_render or not obj.data.polygons:
-            continue
+def _users(context: bpy.types.Context) -> dict[bpy.types.Material, list[tuple[bpy.types.Object, int]]]:
+    """Materials of rendered meshes, each with the slots of the largest objects that have faces of it."""
+    found: dict[bpy.types.Material, list[tuple[bpy.types.Object, int]]] = {}
+    meshes = [o for o in context.view_layer.objects if o.type == "MESH" and not o.hide_render and o.data.polygons]
+    for obj in sorted(meshes, key=lambda obj: -obj.dimensions.length):
         used = {polygon.material_index for polygon in obj.data.polygons}
         for slot, entry in enumerate(obj.material_slots):
-            size = obj.dimensions.length
-            if entry.material is None or slot not in used:
-                continue
-            if entry.material not in best or best[entry.material][0] < size:
-                best[entry.material] = (size, obj, slot)
-    return {material: (obj, slot) for material, (_, obj, slot) in best.items()}
+            if entry.material is not None and slot in used:
+                found.setdefault(entry.material, []).append((obj, slot))
+    return {material: users[:CANDIDATES] for material, users in found.items()}
 
 
 def _sort(material: bpy.types.Material) -> str:
@@ -101,18 +112,18 @@ def _sort(material: bpy.types.Material) -> str:
     return {"mixshader": "mix", "addshader": "mix"}.get(kind, kind)
 
 
-def _look_at(scene: bpy.types.Scene, obj: bpy.types.Object) -> bool:
-    """Give the scene a camera that sees the object unless its own does; returns whether one was added."""
+def _look_at(scene: bpy.types.Scene, obj: bpy.types.Object, view: int) -> bool:
+    """Give the scene the camera of a view; False where it is the file's own and does not show enough of the object."""
     corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
-    if scene.camera is not None and _spans(scene, corners):
-        return False
+    if view == OWN:
+        return scene.camera is not None and scene.camera.type == "CAMERA" and _spans(scene, corners)
     centre = sum(corners, Vector()) / len(corners)
     radius = max((corner - centre).length for corner in corners) or 1.0
     camera = bpy.data.objects.new("Study Camera", bpy.data.cameras.new("Study Camera"))
-    scene.collection.objects.link(camera)
+    _link(scene, camera)
     camera.data.angle = FIELD * 3.14159265 / 180
     camera.data.clip_start, camera.data.clip_end = radius * 0.01, radius * 100
-    direction = VIEW.normalized()
+    direction = VIEWS[view].normalized()
     camera.location = centre + direction * radius * 2.6
     camera.rotation_euler = direction.to_track_quat("Z", "Y").to_euler()
     scene.camera = camera
@@ -120,14 +131,24 @@ def _look_at(scene: bpy.types.Scene, obj: bpy.types.Object) -> bool:
         sun = bpy.data.objects.new("Study Sun", bpy.data.lights.new("Study Sun", "SUN"))
         sun.data.energy = 3.0
         sun.rotation_euler = (0.6, 0.3, 0.5)
-        scene.collection.objects.link(sun)
+        _link(scene, sun)
     bpy.context.view_layer.update()
     return True
 
 
+def _link(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    """Put an object into the scene, also where the scene's own collection comes from another file."""
+    collections = (scene.collection, *scene.collection.children_recursive)
+    own = next((c for c in collections if c.library is None and not scene.library), None)
+    (own or scene.collection).objects.link(obj)
+
+
 def _spans(scene: bpy.types.Scene, corners: list[Vector]) -> bool:
+    """Whether the bounds of an object fill enough of the frame, and no corner is behind the camera."""
     from bpy_extras.object_utils import world_to_camera_view
 
+    if abs(scene.camera.matrix_world.determinant()) < 1e-12:
+        return False
     seen = [world_to_camera_view(scene, scene.camera, corner) for corner in corners]
     if any(point.z <= 0 for point in seen):
         return False
@@ -181,6 +202,7 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--object", default="")
     parser.add_argument("--slot", type=int, default=0)
+    parser.add_argument("--view", type=int, default=OWN)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, default=64)

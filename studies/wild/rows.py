@@ -13,6 +13,8 @@ from typing import Any
 Row = dict[str, Any]
 # FLIP above the floor up to which a recovery counts as found, and from which on "same" is a wrong verdict
 FOUND, WRONG = 0.02, 0.05
+UNSEEN = "The camera does not see"  # how the export says that there is no picture of a target
+EXACT = "magenta, as in Cycles"  # of a missing picture: the fit has it as the render does
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -30,26 +32,30 @@ def add_row(path: Path, row: Row) -> None:
 
 
 def how_read(material: Row) -> str:
-    """`fully`, `with gaps` (something of this material is named as left out or approximated) or `refused`."""
+    """`fully`, `with gaps` (something of it is named as left out or approximated), `refused` or `not seen`."""
+    if any(error.startswith(UNSEEN) for error in material["errors"]):
+        return "not seen"
     if material["errors"]:
         return "refused"
     return "with gaps" if gaps_of(material) else "fully"
 
 
 def gaps_of(material: Row) -> list[str]:
-    """Notes on the material itself; the others are on the scene around it."""
+    """Notes on what is left out or approximated of the material itself; the others are on the scene around it."""
     name = f"aterial '{material['material']}'"
-    return [note for note in material["notes"] if name in note]
+    return [note for note in material["notes"] if name in note and EXACT not in note]
 
 
 def reading_table(rows: Iterable[Row]) -> str:
     """Shares of materials by how they were read, bare emission apart, and the sentences that stand most often."""
     files = list(rows)
-    materials = [m for row in files for m in row.get("materials", ()) if m["sort"] != "emission"]
+    every = [m for row in files for m in row.get("materials", ()) if m["sort"] != "emission"]
+    materials = [m for m in every if how_read(m) != "not seen"]
     counts = Counter(how_read(m) for m in materials)
     failed = sum("materials" not in row for row in files)
     lines = [
-        f"{len(files)} files ({failed} could not be opened), {len(materials)} materials (bare emission apart).",
+        f"{len(files)} files ({failed} could not be opened), {len(materials)} materials (bare emission apart, and "
+        f"{len(every) - len(materials)} that no camera saw).",
         "",
         "| read | materials | share |",
         "| --- | --: | --: |",

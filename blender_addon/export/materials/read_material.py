@@ -25,7 +25,7 @@ from ..images.color_space import to_rec709
 from ..images.image_pixels import without_pixels
 from ..material_model import Material, Socket, grey
 from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
-from ..nodes.graph_findings import graph_problem
+from ..nodes.graph_findings import graph_problem, note_missing_pictures
 from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, WITHOUT_SPECULAR, inputs_of, only_nearest
 from ..nodes.shader_graph import (
     MissingPictureError,
@@ -86,6 +86,7 @@ def read_target(
         findings.error(why_no_target(material), Fix("principled"))
         return None
     note_volume(material, findings)
+    note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
     shared = target.shared_group([name for name, place in target.places.items() if not place.socket.is_linked])
     if shared is not None:
         findings.note(
@@ -324,6 +325,8 @@ def _read(name: str, place: Place, material: str, is_target: bool, findings: Fin
         read = read_socket(place.socket)
         if is_target:
             _refuse(name, place, material, findings, is_copied=False)
+            if place.socket.is_linked and not read.linked:  # by a link that Cycles leaves out: nothing is written here
+                return replace(read, linked=True)
         return read
     except UnsupportedNodeError as problem:
         if is_target:

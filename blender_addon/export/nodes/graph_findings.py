@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What feeds a socket and cannot be evaluated by a second Blender on a copy of the file; known before one starts."""
+"""What feeds a socket and cannot be evaluated by a second Blender on a copy of the file, and what is missing in it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import bpy
 
+from ...versions import active_output
+from ..findings import Findings
 from .shader_graph import Links
 
 GROUP, GROUP_INPUT = "ShaderNodeGroup", "NodeGroupInput"
+PICTURES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
 _Groups = tuple[bpy.types.Node, ...]
 _Place = tuple[int, ...]  # pointers: the same node in two places of a group is two
 
@@ -35,12 +38,12 @@ def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copi
                 good.add(way.place)
             continue
         link = links.any_into(further)
-        if link is None or link.is_muted:
+        if link is None or link.is_muted or _is_of_wrong_kind(link):
             continue
         node, output = link.from_node, link.from_socket
         place = (*(group.as_pointer() for group in within), node.as_pointer(), output.as_pointer())
         if not link.is_valid or place in on_the_way:
-            return f"the node '{node.name}' by a link in a circle or of a wrong kind"
+            return f"the node '{node.name}' by a link in a circle"
         if place in good:
             continue
         problem = _problem(node, is_copied)
@@ -49,6 +52,11 @@ def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copi
         on_the_way.add(place)
         ways.append(_Way(place, iter(feeding(node, output, within))))
     return None
+
+
+def _is_of_wrong_kind(link: bpy.types.NodeLink) -> bool:
+    """Whether a link ties a shader to a value, which Cycles leaves out (ShaderGraph::connect)."""
+    return (link.from_socket.type == "SHADER") != (link.to_socket.type == "SHADER")
 
 
 @dataclass(frozen=True)
@@ -100,7 +108,44 @@ def _problem(node: bpy.types.Node, is_copied: bool) -> str | None:
 def _image_problem(image: bpy.types.Image, is_copied: bool) -> str | None:
     if is_copied and image.is_dirty and image.packed_file is None and image.source in ("FILE", "GENERATED"):
         return f"the image '{image.name}' with changes that are not saved (save or pack it)"
-    if image.source != "TILED" and not image.has_data and not image.packed_file and not any(image.size):
-        where = "use File > External Data > Find Missing Files"
-        return f"the image '{image.name}' that has no pixels (is its file missing? {where})"
     return None
+
+
+def note_missing_pictures(owner: str, tree: bpy.types.NodeTree | None, findings: Findings) -> None:
+    """Name pictures without pixels that feed the output of a material or world, which Cycles shows as magenta."""
+    output = active_output(tree)
+    for node in _nodes_before(output.inputs) if output is not None else ():
+        if node.bl_idname not in PICTURES or not _is_missing(node.image):
+            continue
+        named = "image" if node.image is None else f"image '{node.image.name}'"
+        findings.note(
+            f"{owner}: the {named} of the node '{node.name}' is missing; it is magenta, as in Cycles. If the reference "
+            "shows it, find it first: File > External Data > Find Missing Files."
+        )
+
+
+def _is_missing(image: bpy.types.Image | None) -> bool:
+    if image is None:
+        return True
+    if image.source == "TILED":  # has no size before it is rendered
+        return False
+    return not image.has_data and not image.packed_file and not any(image.size)
+
+
+def _nodes_before(sockets: Iterable[bpy.types.NodeSocket]) -> Iterator[bpy.types.Node]:
+    """Every node that is not muted and feeds `sockets`, each once for each place it is used in."""
+    left: list[tuple[bpy.types.NodeSocket, _Groups]] = [(socket, ()) for socket in sockets]
+    links = Links()
+    met: set[_Place] = set()
+    while left:
+        socket, within = left.pop()
+        link = links.any_into(socket)
+        if link is None or link.is_muted or not link.is_valid:
+            continue
+        node, output = link.from_node, link.from_socket
+        place = (*(group.as_pointer() for group in within), node.as_pointer(), output.as_pointer())
+        if place not in met:
+            met.add(place)
+            if not node.mute:
+                yield node
+            left += feeding(node, output, within)

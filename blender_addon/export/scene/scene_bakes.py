@@ -30,6 +30,7 @@ from ..materials.baked_material import Baked
 from ..materials.read_material import read_context
 from ..meshes.mesh_arrays import CornerMesh, world_mesh
 from ..meshes.read_mesh import material_of_slot
+from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .scene_data import SceneData, Shape
 
@@ -104,7 +105,7 @@ class SceneBakes:
 
     def ask_world(self, world: bpy.types.World, findings: Findings) -> None:
         """Have the world rendered; `finish` puts it into the scene."""
-        _note_missing(f"World '{world.name}'", node_tree_of(world), findings)
+        note_missing_pictures(f"World '{world.name}'", node_tree_of(world), findings)
         try:
             self._world = self._baker.ask("world", width=_panorama_width(world)), world
         except BakeError as problem:
@@ -116,7 +117,7 @@ class SceneBakes:
         key = (item.name_full, item.data.as_pointer(), surface.slot)
         if key not in self._ids:
             material = surface.material
-            _note_missing(f"Material '{material.name}'", node_tree_of(material), findings)
+            note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
             identifier = f"baked_{len(self._ids) + 1:04d}"
             try:
                 if len(self._surfaces) >= MOST_SURFACES:
@@ -242,19 +243,6 @@ def _texels(camera: Camera, mesh: TriangleMesh) -> int:
     pixels_a_metre = np.linalg.norm(moved - places[seen], axis=1) / step
     side = TEXELS_A_PIXEL * float(np.quantile(pixels_a_metre, 0.9)) * total**0.5 / USED
     return int(np.clip(2 ** math.ceil(math.log2(max(side, 1.0))), LEAST_SIZE, MOST_SIZE))
-
-
-def _note_missing(owner: str, tree: bpy.types.NodeTree | None, findings: Findings) -> None:
-    """Name images without pixels, which Cycles shows as magenta."""
-    for node in tree.nodes if tree is not None else []:
-        if node.bl_idname == "ShaderNodeGroup":
-            _note_missing(owner, node.node_tree, findings)
-        if node.bl_idname not in ("ShaderNodeTexImage", "ShaderNodeTexEnvironment"):
-            continue
-        image, is_used = node.image, any(output.is_linked for output in node.outputs)
-        if is_used and (image is None or (image.source == "FILE" and not min(image.size))):
-            named = "image" if image is None else f"image '{image.name}'"
-            findings.note(f"{owner}: the {named} of the node '{node.name}' is missing; it is magenta, as in Blender.")
 
 
 def _give_up(

@@ -247,7 +247,7 @@ def test_working_space_is_converted(scene: Any, export: Any) -> None:
 
 
 def test_picture_files_of_a_saved_blend(scene: Any, export: Any, tmp_path: Any) -> None:
-    """Files that Blender has not loaded yet are loaded; missing ones are refused on the target."""
+    """Files that Blender has not loaded yet are loaded; missing ones are magenta, as in Cycles, and named."""
     from blender_addon.export.files.png_file import write_png
 
     write_png(tmp_path / "grey.png", np.full((4, 4, 3), 188, np.uint8))
@@ -267,11 +267,17 @@ def test_picture_files_of_a_saved_blend(scene: Any, export: Any, tmp_path: Any) 
     np.testing.assert_allclose(value, 0.5028865, atol=1e-5)  # sRGB 188
     (tmp_path / "grey.png").unlink()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    errors, _ = check_export(bpy.context, bpy.data.objects["Target"])
-    assert errors == [
-        "Base Color of material 'Target' is linked to the image 'grey.png' that has no pixels (is its file missing? "
-        "use File > External Data > Find Missing Files): mend or unlink it."
-    ]
+    target = bpy.data.objects["Target"]
+    said = (
+        "Material 'Target': the image 'grey.png' of the node 'Image Texture' is missing; it is magenta, as in Cycles. "
+        "If the reference shows it, find it first: File > External Data > Find Missing Files."
+    )
+    assert check_export(bpy.context, target) == ([], [said])
+    report = export(target)
+    assert said in report.request["left_out"]  # if it does not match, this may be why
+    magenta = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]
+    assert magenta["linked"]
+    np.testing.assert_allclose(magenta["value"], (1.0, 0.0, 1.0), atol=1e-4)
 
 
 def test_no_socket_is_dropped_in_silence(scene: Any) -> None:

@@ -23,6 +23,19 @@ LAMP = {"material": "Lamp", "sort": "emission", "errors": ["Material 'Lamp' has 
 def test_notes_on_the_scene_or_another_material_are_no_gap_of_this_one():
     assert [how_read(m) for m in (FINE, GAP, REFUSED)] == ["fully", "with gaps", "refused"]
     assert how_read({**FINE, "notes": GAP["notes"]}) == "fully"
+    assert (
+        how_read({**GAP, "notes": ["Material 'Gold': the image is missing; it is magenta, as in Cycles."]}) == "fully"
+    )
+
+
+def test_what_no_camera_sees_has_no_picture_and_does_not_count():
+    hidden = {**FINE, "errors": ["The camera does not see 'Cube': it is hidden behind 'Wall'."]}
+    assert how_read(hidden) == "not seen"
+    text = reading_table([{"file": "a/x.blend", "materials": [FINE, hidden, REFUSED]}])
+    assert text.startswith(
+        "1 files (0 could not be opened), 2 materials (bare emission apart, and 1 that no camera saw)"
+    )
+    assert "| fully | 1 | 50 % |" in text
 
 
 def test_bare_emission_does_not_count_and_sentences_of_one_kind_count_together():
@@ -30,7 +43,7 @@ def test_bare_emission_does_not_count_and_sentences_of_one_kind_count_together()
     text = reading_table(
         [{"file": "a/x.blend", "materials": [FINE, GAP, REFUSED, ice, LAMP]}, {"file": "b", "failed": "x"}]
     )
-    assert text.startswith("2 files (1 could not be opened), 4 materials")
+    assert text.startswith("2 files (1 could not be opened), 4 materials (bare emission apart, and 0")
     assert "| fully | 1 | 25 % |" in text
     assert "| refused | 2 | 50 % |" in text
     assert "| Material '...' has no Principled BSDF. | 2 |" in text
@@ -59,4 +72,4 @@ def test_a_file_is_read_in_a_process_of_its_own(tmp_path):
     code = f"import bpy, os; bpy.ops.wm.save_as_mainfile(filepath={str(path)!r}); os._exit(0)"
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     (row,) = child(["studies.wild.in_blender", "read", str(path)], 60.0)["materials"]
-    assert (row["object"], row["sort"], row["errors"], row["camera_added"]) == ("Cube", "principled", [], False)
+    assert (row["object"], row["sort"], row["errors"], row["view"]) == ("Cube", "principled", [], -1)
