@@ -7,6 +7,7 @@ import importlib.util
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "blender_addon" / "headless.py"
 NODE_SERVER = ROOT / "blender_addon" / "probe" / "server.py"
 MODULE = "blender_addon.headless"
+SHELL_SIGNALS = 128  # a shell gives this and the signal's number for a program that a signal ended
 ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
 
@@ -53,11 +55,26 @@ class BlenderHost:
         done = subprocess.run(words, capture_output=True, text=True, env=environment, errors="replace")
         answer = _last_json_object(done.stdout)
         if answer is None:
-            tail = " | ".join((done.stderr + done.stdout).strip().splitlines()[-4:])
-            raise MfoError(f"{self.name} ended with code {done.returncode} and no answer: {tail}")
+            raise MfoError(self._without_answer(done, arguments))
         if answer["status"] != "ok":
             raise ERRORS.get(Status(answer["status"]), MfoError)(answer["sentence"])
         return answer
+
+    def _without_answer(self, done: subprocess.CompletedProcess[str], arguments: tuple[str | Path, ...]) -> str:
+        """The sentence for a Blender that ended without a word of its own; a crash is Blender's, not the user's."""
+        tail = " | ".join((done.stderr + done.stdout).strip().splitlines()[-4:])
+        code = done.returncode
+        if 0 <= code <= SHELL_SIGNALS:
+            return f"{self.name} ended with code {code} and no answer: {tail}"
+        try:
+            name = signal.Signals(-code if code < 0 else code - SHELL_SIGNALS).name
+        except ValueError:  # Windows has codes of its own
+            name = f"code {code}"
+        what = " of ".join(str(word) for word in arguments[:2])
+        return (
+            f"{self.name} crashed ({name}) in the {what}. Open the file in Blender and render it once: if that crashes "
+            f"as well, remove what crashes it (a simulation's cache, an add-on's data). It said last: {tail}"
+        )
 
 
 def find_blender_host(program: str | None = None) -> BlenderHost:
