@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from mathutils import Vector
+from mathutils import Vector  # pyright: ignore[reportMissingImports]
 
 from blender_addon.export.job import export_findings
 from blender_addon.headless import _open
@@ -51,17 +51,17 @@ def read(path: Path) -> dict[str, Any]:
     own = context.scene.camera
     rows = []
     for material, users in sorted(_users(context).items(), key=lambda item: item[0].name):
+        rows.append({"material": material.name, "sort": _sort(material)})
         for view, (obj, slot) in [(v, user) for v in (OWN, *range(len(VIEWS))) for user in users]:
             context.scene.camera = own
             obj.active_material_index = slot
             if not _look_at(context.scene, obj, view):
                 continue
             findings = export_findings(context, obj)
-            row = {"material": material.name, "object": obj.name, "slot": slot, "sort": _sort(material), "view": view}
-            row |= {"errors": findings.errors, "notes": findings.left_out}
-            if how_read(row) != "not seen":
+            rows[-1] |= {"object": obj.name, "slot": slot, "view": view}
+            rows[-1] |= {"errors": findings.errors, "notes": findings.left_out}
+            if how_read(rows[-1]) != "not seen":
                 break
-        rows.append(row)
     return {"version": list(bpy.data.version), "engine": context.scene.render.engine, "materials": rows}
 
 
@@ -108,7 +108,7 @@ def _sort(material: bpy.types.Material) -> str:
     links = output.inputs["Surface"].links if output else ()
     if not links:
         return "none"
-    kind = links[0].from_node.bl_idname.removeprefix("ShaderNode").removeprefix("Bsdf").lower()
+    kind = str(links[0].from_node.bl_idname).removeprefix("ShaderNode").removeprefix("Bsdf").lower()
     return {"mixshader": "mix", "addshader": "mix"}.get(kind, kind)
 
 
@@ -145,7 +145,7 @@ def _link(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
 
 def _spans(scene: bpy.types.Scene, corners: list[Vector]) -> bool:
     """Whether the bounds of an object fill enough of the frame, and no corner is behind the camera."""
-    from bpy_extras.object_utils import world_to_camera_view
+    from bpy_extras.object_utils import world_to_camera_view  # pyright: ignore[reportMissingImports]
 
     if abs(scene.camera.matrix_world.determinant()) < 1e-12:
         return False
