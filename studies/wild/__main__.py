@@ -93,8 +93,10 @@ def in_turn(rows: list[Row]) -> list[Row]:
 
 
 def recover(chosen: argparse.Namespace, material: Row) -> Row:
-    """Recover one material of one file from its own render."""
+    """Recover one material of one file from its own render; what is refused is not tried."""
     row = {"file": material["file"], "material": material["material"], "read": how_read(material)}
+    if material["errors"]:
+        return row | {"why": material["errors"][0]}
     folder = Path(tempfile.mkdtemp(prefix="mfo-wild-"))
     job, fitted, target = folder / "job", folder / "fitted.blend", f"--object={material['object']}"
     blender, samples = "studies.wild.in_blender", f"--samples={chosen.samples}"

@@ -72,11 +72,11 @@ def at_vertices(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
 def shape_of(report: Any) -> tuple[str, np.ndarray, np.ndarray]:
     """The BSDF of the one shape that is baked, its vertices and their UV."""
     scene = ElementTree.parse(report.folder / "scene.xml").getroot()
-    shape = next(shape for shape in scene.iterfind("shape") if given(shape, "ref", "id").startswith("baked"))
-    return given(shape, "ref", "id"), *read_ply(report.folder / given(shape, "string", "value"))
+    shape = next(shape for shape in scene.iterfind("shape") if attribute(shape, "ref", "id").startswith("baked"))
+    return attribute(shape, "ref", "id"), *read_ply(report.folder / attribute(shape, "string", "value"))
 
 
-def given(element: ElementTree.Element, path: str, name: str) -> str:
+def attribute(element: ElementTree.Element, path: str, name: str) -> str:
     """What an element below this one gives under a name."""
     found = element.find(path)
     assert found is not None
@@ -124,7 +124,7 @@ def test_instances_share_one_bake_and_say_so(stage: Any, export: Any) -> None:
         bpy.context.scene.collection.objects.link(empty)
     report = export(target)
     scene = ElementTree.parse(report.folder / "scene.xml").getroot()
-    refs = [given(shape, "ref", "id") for shape in scene.iterfind("shape")]
+    refs = [attribute(shape, "ref", "id") for shape in scene.iterfind("shape")]
     assert refs.count("baked_0001") == 2
     said = "Geometry may differ between the 2 instances of 'Ball'; all have the bake of the first."
     assert f"Material 'Ball': {said}" in report.notes
@@ -211,7 +211,7 @@ def test_mix_in_a_group_becomes_a_blend(stage: Any, export: Any) -> None:
     blend = next(element for element in scene.iterfind("bsdf") if element.get("id") == bsdf)
     assert blend.get("type") == "blendbsdf"
     assert [ref.get("id") for ref in blend.iterfind("ref")] == [f"{bsdf}_0", f"{bsdf}_1"]
-    weight = np.asarray(read_image(report.folder / given(blend, "texture/string", "value")).pixels)
+    weight = np.asarray(read_image(report.folder / attribute(blend, "texture/string", "value")).pixels)
     found = at_vertices(weight, uv)[:, 0]
     assert np.sqrt(np.mean((found - (0.5 * positions[:, 0] + 0.5)) ** 2)) < 0.01
     sockets = report.request["materials"][f"{bsdf}_1"]["sockets"]
@@ -238,7 +238,7 @@ def test_a_tilted_normal_is_tilted_in_the_frame_of_the_map(stage: Any, export: A
     scene = ElementTree.parse(report.folder / "scene.xml").getroot()
     bumped = next(element for element in scene.iterfind("bsdf") if element.get("id") == bsdf)
     assert bumped.get("type") == "normalmap"
-    normals = 2.0 * np.asarray(read_image(report.folder / given(bumped, "texture/string", "value")).pixels) - 1.0
+    normals = 2.0 * np.asarray(read_image(report.folder / attribute(bumped, "texture/string", "value")).pixels) - 1.0
     found = at_vertices(normals, uv)[:, 2]
     np.testing.assert_allclose(np.median(found), np.cos(np.arctan(0.5)), atol=0.005)
 
