@@ -53,7 +53,8 @@ def child(words: list[str], seconds: float) -> dict[str, Any]:
         return json.loads(lines[-1])
     except (IndexError, ValueError):
         last = (done.stderr.strip().splitlines() or ["no word"])[-1]
-        raise ChildError(f"ended with {done.returncode}: {last[:200]}") from None
+        said = json.loads(last)["sentence"] if last.startswith('{"') else last[:200]
+        raise ChildError(f"ended with {done.returncode}: {said}") from None
 
 
 def read_files(chosen: argparse.Namespace) -> None:
@@ -106,7 +107,9 @@ def recover(chosen: argparse.Namespace, material: Row) -> Row:
         child([blender, "prepare", *prepare, f"--out={folder}", f"--size={chosen.size}", samples], RENDER_SECONDS)
         began = time.monotonic()
         fit = [f"{folder}/start.blend", target, f"--reference={folder}/reference.exr", f"--out={job}"]
-        said = child(["mfo_backend", "blend", *fit, "--apply", f"--save-as={fitted}", "--json"], FIT_SECONDS)
+        said = child(
+            ["mfo_backend", "blend", *fit, "--apply", "--make-local", f"--save-as={fitted}", "--json"], FIT_SECONDS
+        )
         row["seconds"] = round(time.monotonic() - began, 2)
         if not (job / "result.json").is_file():
             return row | {"why": said.get("sentence", "no result")}
