@@ -153,6 +153,7 @@ def _stage(
         mesh.materials.clear()
         for number in range(last + 1):
             mesh.materials.append(material if number == slot else blank)
+        mesh.polygons.foreach_set("material_index", np.clip(faces, 0, last))  # clear() has set them to 0
         yield _Stage(stage, item, corners)
     finally:
         window.scene, window.view_layer = before, view_layer

@@ -110,6 +110,25 @@ def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
     assert report.request["materials"][bsdf]["sockets"]["IOR"] == {"value": 1.5, "linked": False}
 
 
+def test_a_material_in_a_later_slot_is_baked_like_one_in_the_first(stage: Any, export: Any) -> None:
+    """Two materials of nodes on one ball, half of its faces each."""
+    target, ball, nodes = stage
+    ball.data.materials.append(new_material("Other"))
+    other = Nodes(ball.data.materials[1])
+    for each in (nodes, other):
+        each.tree.links.new(each.place(), each.principled.inputs["Base Color"])
+    count = len(ball.data.polygons)
+    ball.data.polygons.foreach_set("material_index", 2 * np.arange(count, dtype=np.int32) // count)
+    report = export(target)
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    shapes = [shape for shape in scene.iterfind("shape") if attribute(shape, "ref", "id").startswith("baked")]
+    assert len(shapes) == 2
+    for shape in shapes:
+        positions, uv = read_ply(report.folder / attribute(shape, "string", "value"))
+        found = at_vertices(texture(report, attribute(shape, "ref", "id"), "Base Color"), uv)
+        assert np.sqrt(np.mean((found - 0.5 * positions - 0.5) ** 2)) < 0.03
+
+
 def test_instances_share_one_bake_and_say_so(stage: Any, export: Any) -> None:
     target, ball, nodes = stage
     nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
