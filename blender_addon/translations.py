@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's texts in other languages, for `bpy.app.translations`; a test holds them against what is shown.
 
-Blender looks up what it draws: labels, names, tooltips. Sentences put together at run time stay in English. Another
+Blender looks up what it draws: labels, names, tooltips; sentences put together at run time are in `sentences`. Another
 language is another entry of `LANGUAGES`.
 """
 
@@ -65,7 +65,6 @@ _GERMAN = {
     "Show the reference over the camera's view, or take it away": "Die Referenz über der Kameraansicht zeigen oder wegnehmen",
     "Use as Reference of Material Fit": "Als Referenz von Material Fit nehmen",
     "Allow Online Access": "Online-Zugriff erlauben",
-    "Install downloads packages, for which Blender needs your leave.": "Installieren lädt Pakete herunter, wofür Blender deine Erlaubnis braucht.",
     "Cycles prepares the scene": "Cycles bereitet die Szene vor",
     "Fit this shader of the material's mix and hold the others": "Diesen Shader der Mischung des Materials anpassen und die anderen festhalten",
     "Its node, after the groups it lies in": "Sein Node, nach den Gruppen, in denen er liegt",
@@ -106,7 +105,6 @@ _GERMAN = {
     "File": "Datei",
     "Fit the active material of every selected object, one after the other": "Das aktive Material jedes ausgewählten Objekts anpassen, eines nach dem anderen",
     "Fit": "Anpassen",
-    "Fits run beside Blender, in a Python environment of their own. Blender's Python stays as it is.": "Anpassungen laufen neben Blender, in einer eigenen Python-Umgebung. Blenders Python bleibt, wie es ist.",
     "Folder of downloaded packages to install from without network; empty: download them": "Ordner mit heruntergeladenen Paketen für eine Installation ohne Netz; leer: herunterladen",
     "Folder that gets one folder per fit; empty: the user folder of this extension": "Ordner, der je Anpassung einen Ordner bekommt; leer: der Benutzerordner dieser Erweiterung",
     "Give the active material the values back that it had before Apply": "Dem aktiven Material die Werte zurückgeben, die es vor dem Anwenden hatte",

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Put the pictures of `docs/user/artists.md` together: the set-up as the tests in windows show it, a real fit.
+"""Put the pictures of README and `docs/user/artists.md` together: set-up as the tests show it, a real fit, its film.
 
     MFO_SCREENSHOTS=SHOTS MFO_BLENDER_WINDOWS=BLENDER python -m pytest tests/blender/test_windows.py -k set_up
-    (tests/blender/scripts/artists_walk.py into SHOTS)
+    (tests/blender/scripts/artists_walk.py into SHOTS, tests/blender/scripts/film.py into SHOTS/film)
     python tools/artists_pictures.py SHOTS
 
 The screen is 1600x1000 (`xvfb-run -s "-screen 0 1600x1000x24"`), the sidebar at its default place.
@@ -11,10 +11,13 @@ The screen is 1600x1000 (`xvfb-run -s "-screen 0 1600x1000x24"`), the sidebar at
 
 from __future__ import annotations
 
+import json
 import sys
+from itertools import pairwise
 from pathlib import Path
 
-from PIL import Image
+import numpy as np
+from PIL import Image, ImageDraw
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 SIDEBAR = (1028, 82, 1284, 906)  # left, top, right, bottom in pixels
@@ -25,8 +28,15 @@ PICTURES = {
 }
 
 
+FILM = "material_fit.png"  # an animated PNG: a GIF's 256 colours would band the renders
+MOST_BYTES = 3_000_000
+ARROW = ((0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (13, 12))  # the mouse, in pixels from its tip
+
+
 def main(shots: Path) -> None:
-    """Write each picture as sidebars side by side, all as high as the highest content."""
+    """Write each picture as sidebars side by side, all as high as the highest content; and the film."""
+    if (shots / "film" / "film.json").is_file():
+        _write_film(shots / "film")
     for name, patterns in PICTURES.items():
         found = [sorted(shots.glob(pattern + ".png")) for pattern in patterns]
         if not all(found):
@@ -39,6 +49,32 @@ def main(shots: Path) -> None:
             strip.paste(part, (left, 0))
             left += part.width + GAP
         strip.save(OUT / name, optimize=True)  # a palette would turn the small swatches grey
+
+
+def _write_film(folder: Path) -> None:
+    """The pictures with the mouse drawn in, which a screenshot leaves out; ends on the last one and begins again."""
+    taken = json.loads((folder / "film.json").read_text("utf-8"))
+    frames = []
+    for each in taken:
+        frame = Image.open(folder / each["file"]).convert("RGB")
+        corners = [(each["mouse"][0] + x, each["mouse"][1] + y) for x, y in ARROW]
+        ImageDraw.Draw(frame).polygon(corners, fill="white", outline="black")
+        frames.append(frame)
+    durations = [each["milliseconds"] for each in taken]
+    others = [_changed(before, after) for before, after in pairwise(frames)]
+    first = frames[0].convert("RGBA")
+    first.save(OUT / FILM, save_all=True, append_images=others, duration=durations, loop=0, blend=1, optimize=True)
+    size = (OUT / FILM).stat().st_size
+    print(f"{FILM}: {len(frames)} frames, {sum(durations) / 1000:.1f} s, {size / 1e6:.2f} MB")
+    assert size < MOST_BYTES, "too large for a README: film fewer frames"
+
+
+def _changed(before: Image.Image, after: Image.Image) -> Image.Image:
+    """What is drawn over the frame before: transparent, and so nearly free, where nothing changed."""
+    same = np.all(np.asarray(before) == np.asarray(after), axis=2)
+    drawn = np.dstack([np.asarray(after), np.full(same.shape, 255, np.uint8)])
+    drawn[same] = 0
+    return Image.fromarray(drawn)
 
 
 def _sidebar(path: Path) -> Image.Image:

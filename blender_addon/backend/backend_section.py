@@ -7,6 +7,7 @@ import textwrap
 
 import bpy
 
+from ..sentences.translated import translated
 from . import backend_state
 from .backend_install import SIZE
 from .preferences import preference
@@ -41,14 +42,12 @@ def draw_setup(layout: bpy.types.UILayout, *, width: int) -> None:
     box.alert = False
     if state.name == "INSTALLING":
         row = box.row(align=True)
-        row.progress(factor=state.fraction, type="BAR", text=state.step)
+        row.progress(factor=state.fraction, type="BAR", text=translated(state.step))
         row.operator("mfo.cancel_install", text="", icon="X")
         _lines(box, state.log, width)
         return
     if state.name == "NOT_INSTALLED":
-        text = bpy.app.translations.pgettext_iface(
-            "Fits run beside Blender, in a Python environment of their own. Blender's Python stays as it is."
-        )
+        text = "Fits run beside Blender, in a Python environment of their own. Blender's Python stays as it is."
         _wrapped(box, text, width)
         _wrapped(box, SIZE[:1].upper() + SIZE[1:] + ".", width)
     else:
@@ -74,15 +73,14 @@ def _draw_network(layout: bpy.types.UILayout, width: int) -> None:
     """Blender's own switch, where an installation would need it."""
     if bpy.app.online_access or bpy.app.online_access_override or preference(bpy.context, "wheels"):
         return
-    text = bpy.app.translations.pgettext_iface("Install downloads packages, for which Blender needs your leave.")
-    _wrapped(layout, text, width)
+    _wrapped(layout, "Install downloads packages, for which Blender needs your leave.", width)
     layout.prop(bpy.context.preferences.system, "use_online_access", text="Allow Online Access")
 
 
 def _wrapped(layout: bpy.types.UILayout, text: str, width: int) -> None:
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for line in textwrap.wrap(text, width):
+    for line in textwrap.wrap(translated(text), width):
         column.label(text=line, translate=False)
 
 

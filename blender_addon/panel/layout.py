@@ -62,6 +62,7 @@ def draw_pictures(
         label = _LABELS.get(name, name.title())
         if is_narrow(context) and len(names) > 2:
             label = _SHORT.get(name, label)
+        label = translated(label)
         if clickable:
             column.operator("mfo.show_pictures", text=label).show = name
         else:
@@ -83,7 +84,7 @@ def draw_numbers(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection
     grid = layout.box().column(align=True)
     for name, *numbers in (("Error", "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
         split = grid.split(factor=0.46)
-        split.label(text=name)
+        split.label(text=translated(name))
         columns = split.split(factor=0.5)
         for number in numbers:
             columns.label(text=number)

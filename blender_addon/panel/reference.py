@@ -9,6 +9,7 @@ from ..check import preflight
 from ..check.checks import asks_view
 from ..result import overlay
 from ..running import running_job
+from ..sentences.translated import translated
 from .layout import pair
 from .part import draw_part
 
@@ -62,7 +63,7 @@ def _draw_what_it_shows(
     box: bpy.types.UILayout, picture: bpy.types.PropertyGroup, number: str, index: int | None = None
 ) -> None:
     row = box.row(align=True)
-    row.prop(picture, "use", text=f"Picture {number}")
+    row.prop(picture, "use", text=translated(f"Picture {number}"))
     row.prop(picture, "exposure", text="EV")
     if index is not None:
         row.operator("mfo.remove_picture", text="", icon="X").index = index

@@ -10,6 +10,7 @@ from ..operators.fit_options import selected_targets
 from ..result import previews, shown_result
 from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
+from ..sentences.translated import translated
 from .layout import draw_pictures, draw_sentence, letters
 
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
@@ -91,10 +92,10 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     column = layout.column()
     row = column.row(align=True)
     row.scale_y = 1.4
-    row.progress(factor=runtime.fraction, type="BAR", text=runtime.progress_text)
+    row.progress(factor=runtime.fraction, type="BAR", text=translated(runtime.progress_text))
     row.operator("mfo.cancel", text="", icon="X")
     if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
-        column.label(text=f"Of material {runtime.material}", icon="MATERIAL")
+        column.label(text=translated(f"Of material {runtime.material}"), icon="MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:
         draw_pictures(column, context, shown)
@@ -104,7 +105,8 @@ def _draw_queue(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not fit_queue.waiting and not fit_queue.finished:
         return
     box = layout.box()
-    box.label(text=f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended", icon="SEQUENCE")
+    said = translated(f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended")
+    box.label(text=said, icon="SEQUENCE")
     for ended in fit_queue.finished:
         draw_sentence(box, context, f"{ended.material_name}: {ended.sentence}", ended.icon)
     for index, fit in enumerate(fit_queue.waiting):

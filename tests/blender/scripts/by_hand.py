@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Walk the main way by simulated mouse and keys alone: choose the reference, check, fit, apply, undo, history, asset.
 
-Started with `--enable-event-simulate`. Buttons are found as a hand finds them: the mouse goes down the sidebar, and
-Blender says what lies under it. Pictures of the screen go to the folder MFO_SCREENSHOTS, where it is set.
+Started with `--enable-event-simulate`. Pictures of the screen go to the folder MFO_SCREENSHOTS, where it is set.
 """
 
 import importlib
@@ -17,6 +16,7 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import steps
+from hand import area, click, find, key, move, side_bar, typed, view, wheel, widen, window
 from steps import material, plain_picture, roughness, runtime
 
 addon_id, folder, scale, width = sys.argv[sys.argv.index("--") + 1 :]
@@ -25,97 +25,10 @@ running_job, preflight, shown_result, waiting_backend = (
     importlib.import_module(f"{addon_id}.blender_addon.{name}")
     for name in ("running.running_job", "check.preflight", "result.shown_result", "process.waiting_backend")
 )
-STEP = 9  # pixels between two looks of the mouse, less than half a button's height at scale 1
 HEIGHT = 1000  # of the screen
 preferences = bpy.context.preferences
 preferences.view.show_splash = False
 preferences.view.ui_scale = scale
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def area():
-    return next(a for a in window().screen.areas if a.type == "VIEW_3D")
-
-
-def side_bar():
-    return next(r for r in area().regions if r.type == "UI")
-
-
-def view():
-    return next(r for r in area().regions if r.type == "WINDOW")
-
-
-def move(x, y):
-    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=int(x), y=int(y))
-
-
-def click(x, y):
-    """Press and release; Blender needs a moment in between, as with a hand."""
-    move(x, y)
-    yield 0.1
-    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x), y=int(y))
-    yield 0.1
-    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x), y=int(y))
-    yield 0.3
-
-
-def key(kind, x, y, text="", **held):
-    window().event_simulate(type=kind, value="PRESS", x=int(x), y=int(y), unicode=text, **held)
-    yield 0.05
-    window().event_simulate(type=kind, value="RELEASE", x=int(x), y=int(y), **held)
-    yield 0.05
-
-
-def typed(text, x, y):
-    for letter in text:
-        kind = letter.upper() if letter.isalpha() and letter.isascii() else "ZERO"
-        yield from key(kind, x, y, letter)
-    yield from key("RET", x, y)
-
-
-def under_mouse():
-    """What Blender would do if the button under the mouse were pressed, as Python; empty where there is none."""
-    bpy.context.window_manager.clipboard = ""
-    with bpy.context.temp_override(window=window(), area=area(), region=side_bar()):
-        for copy in (bpy.ops.ui.copy_python_command_button, bpy.ops.ui.copy_data_path_button):
-            if copy.poll():
-                copy()
-                if bpy.context.window_manager.clipboard:
-                    return bpy.context.window_manager.clipboard
-    return ""
-
-
-def wheel(turns):
-    """Over the sidebar; the wheel's events are as a mouse sends them."""
-    region = side_bar()
-    x, y = region.x + region.width // 3, region.y + region.height // 2
-    for _ in range(abs(turns)):
-        kind = "WHEELDOWNMOUSE" if turns > 0 else "WHEELUPMOUSE"
-        window().event_simulate(type=kind, value="PRESS", x=x, y=y)
-        yield 0.03
-    yield 0.4
-
-
-def find(words, place, part=0.3, turns=12):
-    """Move down the sidebar until a button's command has these words; `place` gets x and y.
-
-    What is in sight is looked at first, then all of the sidebar from its top.
-    """
-    place.clear()
-    for turn in range(turns):
-        region = side_bar()
-        x = region.x + part * (region.width - 24 * scale)
-        for y in range(int(region.y + region.height - 8 * scale), region.y + 4, -int(STEP * scale)):
-            move(x, y)
-            yield 0.01
-            if words in under_mouse():
-                place.extend((x, y))
-                return
-        yield from wheel(6 if turn else -60)
-    raise AssertionError(f"no button for {words}")
 
 
 def press(words, label="", part=0.3):
@@ -143,20 +56,6 @@ def until(condition, seconds):
         yield 0.05
 
 
-def widen():
-    """Drag the sidebar's edge, as its width is no property."""
-    region = side_bar()
-    y, target = region.y + region.height // 2, region.x + region.width - width
-    move(region.x, y)
-    yield 0.2
-    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=region.x, y=y)
-    for share in (0.3, 0.6, 1.0):
-        yield 0.1
-        move(region.x + share * (target - region.x), y)
-    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(target), y=y)
-    yield 0.5
-
-
 def set_the_scene():
     plain_picture()
     os.environ["MFO_FAKE"] = json.dumps({"seconds": 4})
@@ -167,7 +66,7 @@ def set_the_scene():
     yield 0.5
     side_bar().active_panel_category = "Material Fit"
     yield 0.8
-    yield from widen()
+    yield from widen(width)
 
 
 def draw_part(path_field):

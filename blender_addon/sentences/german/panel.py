@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the add-on says at run time, in German: `{}` are the parts put in, numbered where their order differs."""
+"""What panel, check and buttons say at run time, in German: `{}` are the parts put in, numbered where their order differs."""
 
 # fmt: off
-GERMAN = {
+PANEL = {
     # verdicts
     "The result looks the same as the reference.": "Das Ergebnis sieht aus wie die Referenz.",
     "The result is close to the reference: compare before applying.": "Das Ergebnis ist nahe an der Referenz: vor dem Anwenden vergleichen.",
@@ -228,4 +228,21 @@ GERMAN = {
     "{} is gone: install the backend again.": "{} ist weg: das Backend neu installieren.",
     "Material '{}' does not show recovered values: apply a result first.": "Material '{}' zeigt keine gefundenen Werte: erst ein Ergebnis anwenden.",
     "Material {} comes from a library: make it local first (Make Local, --make-local).": "Material {} stammt aus einer Bibliothek: erst lokal machen (Lokal machen, --make-local).",
+    # names of pictures
+    "Reference": "Referenz",
+    "Start": "Anfang",
+    "Result": "Ergebnis",
+    "Current": "Jetzt",
+    "Difference": "Unterschied",
+    "Goal": "Ziel",
+    "Error": "Fehler",
+    "In Cycles": "In Cycles",
+    "In Scene": "In Szene",
+    "In Scene's Engine": "In der Engine der Szene",
+    # the reference in the check
+    "scene-linear Rec.709": "szenenlineares Rec.709",
+    "scene-linear {}, converted to Rec.709": "szenenlineares {}, umgerechnet in Rec.709",
+    "taken as a photograph or a render under Standard": "genommen als Foto oder Rendering unter Standard",
+    "display colours under the view {}": "Anzeigefarben unter der Ansicht {}",
+    "taken as rendered in this scene, display colours under the view {}": "genommen als in dieser Szene gerendert, Anzeigefarben unter der Ansicht {}",
 }
