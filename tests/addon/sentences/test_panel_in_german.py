@@ -126,7 +126,7 @@ def drawn(scene: SimpleNamespace) -> list[str]:
     preflight.check_now(context.scene, context.view_layer)
     shown: list[str] = []
     for body in (reference.Reference, *_BODIES):
-        panel = SimpleNamespace(layout=Layout(shown))
+        panel: Any = SimpleNamespace(layout=Layout(shown))
         if hasattr(body, "draw_header"):
             body.draw_header(panel, wide)
         body.draw(panel, wide)

@@ -19,8 +19,8 @@ import steps
 from hand import area, click, find, key, move, side_bar, typed, view, wheel, widen, window
 from steps import material, plain_picture, roughness, runtime
 
-addon_id, folder, scale, width = sys.argv[sys.argv.index("--") + 1 :]
-folder, scale, width = Path(folder), float(scale), int(width)
+addon_id, *words = sys.argv[sys.argv.index("--") + 1 :]
+folder, scale, width = Path(words[0]), float(words[1]), int(words[2])
 running_job, preflight, shown_result, waiting_backend = (
     importlib.import_module(f"{addon_id}.blender_addon.{name}")
     for name in ("running.running_job", "check.preflight", "result.shown_result", "process.waiting_backend")
