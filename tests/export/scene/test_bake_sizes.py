@@ -22,7 +22,7 @@ CAMERA = Camera(
 def square(side: float, x: float = 0.0) -> TriangleMesh:
     """A horizontal square around (x, 0, 0)."""
     corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32) * side / 2 + (x, 0, 0)
-    up = np.tile(np.float32([0, 0, 1]), (4, 1))
+    up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))
     return TriangleMesh(
         corners.astype(np.float32), up, np.zeros((4, 2), np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.int32)
     )
