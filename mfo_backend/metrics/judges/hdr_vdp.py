@@ -78,14 +78,15 @@ def _write_pairs(path: Path, pairs: Iterable[tuple[Array, Array]]) -> tuple[tupl
 def _run(program: str, folder: Path, job: Path, seconds: float) -> str:
     """What the program said. Whether it did its work is told by the scores: Octave may fail while it ends."""
     if Path(program).stem.lower() == "matlab":
-        command = [program, "-batch", _DRIVER.stem]
-    else:
+        command, working = [program, "-batch", _DRIVER.stem], _DRIVER.parent
+    else:  # Octave that is ended from outside writes all its variables into the working folder
+        working = job
         command = [program, "--no-gui", "--quiet", str(_DRIVER)]
     environment = {**os.environ, FOLDER_VARIABLE: str(folder), f"{FOLDER_VARIABLE}_JOB": str(job)}
     try:
         done = subprocess.run(
             command,
-            cwd=_DRIVER.parent,
+            cwd=working,
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,

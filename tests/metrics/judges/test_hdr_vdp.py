@@ -25,6 +25,7 @@ import numpy as np
 job = Path(os.environ["MFO_HDRVDP3_JOB"])
 assert sys.argv[-1].endswith("hdr_vdp_driver.m") and Path(sys.argv[-1]).is_file()
 assert Path(os.environ["MFO_HDRVDP3"], "hdrvdp3.m").is_file()
+assert Path.cwd().samefile(job)  # what Octave leaves behind goes with it
 width, height, count, ppd = (job / "pairs.txt").read_text().split()
 pixels = np.fromfile(job / "pairs.raw", "<f4").reshape(int(count), 2, int(height), int(width), 3)
 with (job / "scores.txt").open("w") as file:
