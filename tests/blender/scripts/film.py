@@ -28,7 +28,7 @@ from steps import runtime
 ADDON = "bl_ext.user_default.material_fit_mfo.blender_addon"
 SCREEN = 1000  # pixels high
 REFERENCE_WIDTH, PANEL_WIDTH = 0.325, 272  # share of the window, pixels
-CONVERGED = 45.0  # seconds that Cycles gets for the view
+CONVERGED = 120.0  # seconds that Cycles gets for the view
 SPLITS = [0.5, 0.42, 0.34, 0.26, 0.18, 0.26, 0.34, 0.42, 0.5, 0.58, 0.66, 0.74, 0.82, 0.74, 0.66, 0.58, 0.5]
 blend, reference, film = sys.argv[sys.argv.index("--") + 1 :]
 running_job, preflight = (importlib.import_module(f"{ADDON}.{n}") for n in ("running.running_job", "check.preflight"))
