@@ -10,6 +10,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from blender_addon.export.findings import ExportError  # noqa: E402
+
 from ..scenes import diffuse_material, new_material  # noqa: E402
 from .test_node_graphs import ball, lit_scene, noise_ramp, principled, recorded_and_cycles  # noqa: E402
 
@@ -73,3 +75,17 @@ def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: 
     found, truth = recorded_and_cycles(export, render_cycles, ball(build()))
     assert abs(found.mean() / truth.mean() - 1.0) < 0.003
     assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.01
+
+
+def test_a_shader_without_a_value_to_fit_is_refused_by_its_names(scene: Any, export: Any) -> None:
+    lit_scene(scene)
+    material = rough_diffuse()
+    node, tree = principled(material), material.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeRGB").outputs[0], node.inputs["Color"])
+    tree.links.new(tree.nodes.new("ShaderNodeValue").outputs[0], node.inputs["Roughness"])
+    with pytest.raises(ExportError) as caught:
+        export(ball(material), fit={"parameters": "reduced"})  # which takes no value of the nodes
+    assert str(caught.value) == (
+        "A Diffuse BSDF has Color (base_color) and Roughness (diffuse_roughness) alone, and none of them is left to "
+        "fit: choose one that has no link."
+    )
