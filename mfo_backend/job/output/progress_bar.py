@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 
@@ -41,7 +42,7 @@ class ProgressBar:
             left = f"{event.remaining_seconds:.0f} s left"
             self._bar.set_postfix_str(f"loss {event.best:.3g}, iteration {event.iteration}, {left}", refresh=False)
             self._bar.update(max(0.0, min(1.0, event.fraction) - self._bar.n))
-        elif isinstance(event, StageEnd):
+        elif isinstance(event, StageEnd) and math.isfinite(event.loss_best):  # not one that ended before its first step
             tqdm.write(
                 f"{event.stage}: {event.loss_start:.4g} -> {event.loss_best:.4g} "
                 f"in {event.iterations} iterations. {event.sentence}",

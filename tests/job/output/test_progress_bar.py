@@ -8,7 +8,7 @@ import sys
 import time
 
 from mfo_backend.job.output.progress_bar import ProgressBar
-from mfo_backend.types.event import Progress, Started
+from mfo_backend.types.event import Progress, StageEnd, Started
 
 REDRAWN_AFTER = 0.15  # seconds; tqdm draws no more than ten times a second
 
@@ -32,3 +32,10 @@ def test_a_fit_that_begins_again_has_a_bar_that_begins_again(monkeypatch) -> Non
     bar.close()
     assert " 30%" in shown
     assert " 90%" not in shown
+
+
+def test_a_stage_that_was_ended_before_its_first_step_leaves_no_line(capsys) -> None:
+    bar = ProgressBar()
+    bar.show(StageEnd("scan", "converged", "The fit converged.", 3, 0.5, 0.25))
+    bar.show(StageEnd("race", "cancelled", "Cancelled.", 0, float("nan"), float("inf")))
+    assert capsys.readouterr().err.splitlines() == ["scan: 0.5 -> 0.25 in 3 iterations. The fit converged."]
