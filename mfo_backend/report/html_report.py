@@ -13,7 +13,7 @@ from ..types.result import FitResult
 from ..types.status import Status
 from ..types.verdict import Verdict
 from .loss_plot import loss_plot
-from .value_table import value_rows
+from .value_table import as_text, value_rows
 
 _CAPTIONS = {
     "reference": ("Reference", "the picture to match"),
@@ -172,9 +172,11 @@ def _value_table(result: FitResult) -> str:
     if result.certainty:
         heads.append("How sure")
     table = _table(heads, value_rows(result))
+    lines = f"<details><summary>As text, to copy</summary><pre>{escape(as_text(result))}</pre></details>"
     weak = "".join(f"<li>{escape(weak.sentence)}</li>" for weak in result.weak_combinations)
     weak = f"<ul>{weak}</ul>" if weak else ""
-    return f'{table}<p class="soft">Colours: the hex code on a display, then linear Rec.709.</p>{weak}' if table else ""
+    colours = '<p class="soft">Colours: the hex code on a display, then linear Rec.709.</p>'
+    return f"{table}{colours}{weak}{lines}" if table else ""
 
 
 def _plot(result: FitResult) -> str:

@@ -20,6 +20,17 @@ def value_rows(result: FitResult) -> str:
     return "".join(_row(name, result) for name in result.recovered)
 
 
+def as_text(result: FitResult) -> str:
+    """Verdict and values as lines for a mail: colours as hex codes of a display, others with four digits."""
+    lines = [result.message]
+    for name, value in result.recovered.items():
+        shown = swatch_colour(value) if len(_components(value)) == 3 else value_text(value)
+        sure = result.certainty.get(name)
+        words = f" ({sure.words})" if sure is not None else ""
+        lines.append(f"{result.labels.get(name) or socket_name(name)}: {shown}{words}")
+    return "\n".join(lines)
+
+
 def value_text(value: Value) -> str:
     """A value with four significant digits, components separated by spaces."""
     return " ".join(f"{component:.4g}" for component in _components(value))

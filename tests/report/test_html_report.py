@@ -145,6 +145,22 @@ def test_values_have_the_names_of_blenders_sockets() -> None:
     assert [socket_name(name) for name in names] == ["Base Color", "Specular IOR Level", "IOR"]
 
 
+def test_verdict_and_values_are_there_as_text(content: ReportContent) -> None:
+    text = re.search(r"<pre>(.*?)</pre>", report_html(content), re.DOTALL)
+    assert text is not None
+    lines = text[1].splitlines()
+    assert lines[0] == content.result.message
+    assert len(lines) == 1 + len(content.result.recovered)
+    colour = next(line for line in lines if line.startswith("Base Color: "))
+    assert re.match(r"Base Color: #[0-9a-f]{6}\b", colour)
+
+
+def test_paper_is_light_whatever_the_screen_is(content: ReportContent) -> None:
+    page = report_html(content)
+    assert "@media screen and (prefers-color-scheme: dark)" in page
+    assert "@media (prefers-color-scheme: dark)" not in page
+
+
 def test_nothing_is_loaded_from_elsewhere(content: ReportContent) -> None:
     page = parsed(content)
     assert not re.search(r"https?:|//[a-z]|@import|url\(", report_html(content))
@@ -170,8 +186,8 @@ def test_text_cannot_break_out(content: ReportContent, result: FitResult) -> Non
         ),
     )
     assert "<script" not in report_html(wicked)
-    # head and heading, subtitle, sentence, value, plot, stage, error, note, and twice a version
-    assert parsed(wicked).text.lower().count("alert('x')") == 11
+    # head and heading, subtitle, sentence, value, both as text, plot, stage, error, note, and twice a version
+    assert parsed(wicked).text.lower().count("alert('x')") == 13
 
 
 def test_a_cancelled_fit_without_stages_has_a_report(content: ReportContent, result: FitResult) -> None:
