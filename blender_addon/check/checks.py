@@ -199,6 +199,8 @@ def _more_pictures(scene: bpy.types.Scene) -> list[Finding]:
         elif not scene.frame_start <= entry.frame <= scene.frame_end:
             frames = f"{scene.frame_start} to {scene.frame_end}"
             found.append(Finding(STOPS, f"Picture {number}: frame {entry.frame} is outside of the frames {frames}."))
+        elif problem := _part_problem(entry.part, path):
+            found.append(Finding(STOPS, f"Picture {number}: {problem}"))
         else:
             found.append(Finding(FINE, f"Picture {number}: {path.name}, frame {entry.frame}."))
     return found
@@ -236,15 +238,19 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
 
 def _part(scene: bpy.types.Scene, found: _Picture) -> list[Finding]:
     """What keeps the part of the picture that counts from being used."""
-    part = scene.mfo.first_picture.part
+    problem = _part_problem(scene.mfo.first_picture.part, Path(found.name))
+    return [Finding(STOPS, problem, (Fix("whole_picture"),))] if problem else []
+
+
+def _part_problem(part: bpy.types.PropertyGroup, path: Path) -> str:
     if part.is_whole:
-        return []
+        return ""
     try:
         with without_pixels():
-            CountedPart(Path(found.name), part.crop, part.mask, part.use_alpha).check(thorough=False)
+            CountedPart(path, part.crop, part.mask, part.use_alpha).check(thorough=False)
     except ExportError as problem:
-        return [Finding(STOPS, str(problem), (Fix("whole_picture"),))]
-    return []
+        return str(problem)
+    return ""
 
 
 def _part_words(scene: bpy.types.Scene) -> list[Finding]:

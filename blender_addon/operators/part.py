@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The part of the reference that counts: `mfo.draw_part`, `mfo.paint_mask` and `mfo.whole_picture`."""
 
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations
+
 import bpy
+from bpy.props import IntProperty
 
 from ..check import preflight
 from ..export.camera.read_camera import picture_size
@@ -99,9 +103,18 @@ class MFO_OT_whole_picture(bpy.types.Operator):
     bl_label = "Whole Picture"
     bl_options = {"REGISTER", "UNDO"}
 
+    number: IntProperty(
+        name="Number", description="Of several pictures, from 1", default=1, min=1, options={"HIDDEN", "SKIP_SAVE"}
+    )
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put every setting of the part back."""
-        count_all(context.scene.mfo.first_picture.part)
+        settings = context.scene.mfo
+        pictures = (settings.first_picture, *settings.pictures)
+        if self.number > len(pictures):
+            self.report({"ERROR"}, translated(f"There is no picture {self.number}: the last is {len(pictures)}."))
+            return {"CANCELLED"}
+        count_all(pictures[self.number - 1].part)
         preflight.request()
         return {"FINISHED"}
 

@@ -32,8 +32,7 @@ class Reference:
             column.prop(settings, "reference_path", text="")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
-        draw_part(column, context)
-        _draw_more_pictures(column, settings)
+        _draw_pictures(column, context, settings)
         shown = overlay.is_shown(context.scene.camera)
         row = pair(layout, context) if shown else layout.row(align=True)
         row.operator(
@@ -47,15 +46,19 @@ class Reference:
             pair(question, context).prop(settings, "reference_view", expand=True)
 
 
-def _draw_more_pictures(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    """What the first picture shows and the further ones, where there are some; a button to add one."""
-    pictures = settings.pictures
+def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+    """What counts of the picture; of several what each shows, too; a button to add one."""
+    first, pictures = settings.first_picture, settings.pictures
+    box = column
     if pictures:
-        _draw_what_it_shows(column.box().column(align=True), settings.first_picture, "1")
+        box = column.box().column(align=True)
+        _draw_what_it_shows(box, first, "1")
+    draw_part(box, context, first.part)
     for index, picture in enumerate(pictures):
         box = column.box().column(align=True)
         _draw_what_it_shows(box, picture, str(index + 2), index)
         box.prop(picture, "path", text="")
+        draw_part(box, context, picture.part, index + 2)
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
 
 

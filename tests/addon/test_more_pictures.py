@@ -68,6 +68,23 @@ def test_a_picture_that_is_not_used_is_left_out_and_keeps_its_number(scene: Simp
         scene.bpy.ops.mfo.fit(job_folder=scene.job, object="Väse")
 
 
+def test_each_picture_has_a_part_that_counts(scene: SimpleNamespace) -> None:
+    settings = listed(scene)
+    part = settings.pictures[0].part
+    part.right = 50.0
+    request = fit(scene)
+    more = json.loads((Path(scene.job) / "more_pictures" / "2" / "request.json").read_text("utf-8"))
+    assert more["reference"]["crop"] == [0.0, 0.0, 0.5, 1.0]
+    assert "crop" not in request["reference"]
+    part.left = 60.0
+    said = [f.sentence for f in quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer) if f.level == STOPS]
+    assert said == ["Picture 2: The crop leaves nothing: left must be below right, and top below bottom."]
+    assert scene.bpy.ops.mfo.whole_picture(number=2) == {"FINISHED"}
+    assert part.is_whole
+    with pytest.raises(RuntimeError, match="There is no picture 3: the last is 2"):
+        scene.bpy.ops.mfo.whole_picture(number=3)
+
+
 def test_what_is_missing_is_said_before_the_fit(scene: SimpleNamespace) -> None:
     bpy, settings = scene.bpy, listed(scene)
 
