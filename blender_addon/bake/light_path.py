@@ -23,13 +23,20 @@ def light_path_outputs(tree: bpy.types.NodeTree) -> set[str]:
     return found
 
 
-def answer_light_paths(tree: bpy.types.NodeTree, answers: dict[str, float]) -> list[bpy.types.NodeTree]:
-    """Replace every Light Path output by its number in `answers`, or 0; returns the groups that were copied for it."""
+def answer_light_paths(
+    tree: bpy.types.NodeTree, answers: dict[str, float], *, own_groups: bool = False
+) -> list[bpy.types.NodeTree]:
+    """Replace every Light Path output by its number in `answers`, or 0; returns the groups that were copied for it.
+
+    None is where the tree has its `own_groups` already.
+    """
     copied: list[bpy.types.NodeTree] = []
     for node in list(tree.nodes):
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and light_path_outputs(node.node_tree):
-            node.node_tree = node.node_tree.copy()
-            copied += [node.node_tree, *answer_light_paths(node.node_tree, answers)]
+            if not own_groups:
+                node.node_tree = node.node_tree.copy()
+                copied.append(node.node_tree)
+            copied += answer_light_paths(node.node_tree, answers, own_groups=own_groups)
         if node.bl_idname != "ShaderNodeLightPath":
             continue
         for output in node.outputs:

@@ -36,7 +36,8 @@ class Socket:
     """A socket's value (float, bool or three linear Rec.709 numbers), whether it is linked, and to which picture.
 
     `by_graph` says that nodes give it which Cycles has to evaluate; `seen` is the file with what they give where the
-    camera sees the surface, and `value` their mean, once that is done.
+    camera sees the surface, `elsewhere` that for other rays if it hangs on the ray, and `value` the mean of the first,
+    once that is done.
     """
 
     value: Any
@@ -44,6 +45,7 @@ class Socket:
     texture: Texture | None = None
     by_graph: bool = False
     seen: Path | None = None
+    elsewhere: Path | None = None
 
 
 @dataclass

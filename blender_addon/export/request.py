@@ -117,6 +117,8 @@ def _socket(socket: Socket, files: SceneFiles, seen: bool) -> dict[str, Any]:
         described["texture"] = files.texture(socket.texture)
     if seen and socket.seen is not None:
         described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
+        if socket.elsewhere is not None:
+            described["elsewhere"] = f"{GRAPH_FOLDER}/{socket.elsewhere.name}"
     return described
 
 

@@ -22,6 +22,7 @@ from .aov_render import Frame, frame_of, render_outputs, world_to_frame
 from .closure_tree import ClosureTree, Leaf
 from .depths import at_depth, peeled
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
+from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
 from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
@@ -51,9 +52,12 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples` of
     each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the second
     what it would see were that away, and so on; files have one below the other. Answered are for each of the `leaves`
-    the `sockets` by name and the `weight`, each a `file` and its `mean` over what the camera sees, the file
+    the `sockets` by name and the `weight`, each a `file` and its `mean` over what the camera sees; the file
     `positions`, and `camera`, the (3, 4) matrix from the world to columns and rows of the files. Colours are linear
     Rec.709, directions unit vectors of the world or zero.
+
+    Where `elsewhere` is requested and nodes ask for the ray, sockets and weights have a file of that name, too: one
+    below the other what rays from elsewhere find at `other_views.ANGLES` angles, a place a pixel.
 
     Raises
     ------
@@ -61,39 +65,56 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         If the camera does not see the target, or Blender cannot render.
     """
     target = Target.of(request)
-    scene, obj, material = target.scene, target.obj, target.material
-    copy, depths = own_copy(material), int(request.get("depths", 1))
-    try:
-        outputs = _leaf_outputs(copy.node_tree, request["leaves"])
-        make_opaque(copy, ours=True)
-        wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
-        at_depths = peeled(copy.node_tree, wanted, depths)
-        frame = frame_of(scene, obj, request["scale"], len(at_depths))
-        widen_bumps(copy.node_tree, frame.scale)
-        rendered = target.outputs(copy, at_depths, frame, request["samples"])
-    finally:
-        remove_copy(copy)
-    found = {name: np.concatenate([rendered[at_depth(name, k)] for k in range(depths)]) for name, _ in wanted}
+    material, depths = target.material, int(request.get("depths", 1))
+    outputs, found, frame = _rendered(target, request, request["scale"])
+    by_ray = bool(request.get("elsewhere")) and asks_ray(material.node_tree)
+    cosines = [cosine_of(angle) for angle in range(ANGLES)] if by_ray else []
+    elsewhere = [_rendered(target, request, ELSEWHERE_SCALE, cosine)[1] for cosine in cosines]
     mask = found[MASK]
     seen = mask[..., 0] > SEEN
     first = seen & (np.arange(len(seen)) < len(seen) // depths)[:, None]
     if not first.any():
-        raise ProbeRequestError(NOT_SEEN.format(obj=obj.name, material=material.name))
+        raise ProbeRequestError(NOT_SEEN.format(obj=target.obj.name, material=material.name))
     folder = Path(request["folder"])
     leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
     for number, each in enumerate(outputs):
-        values = cleaned(found[each.name] / np.maximum(mask, SEEN), seen, each.socket or "", each.kind)
+        values = whole(found, each.name, each.socket or "", each.kind)
         file = f"socket_{number:02d}.npy"
         np.save(folder / file, values)
-        said = {"file": file, "mean": values[first].mean(axis=0, dtype=np.float64).tolist()}
+        said: dict[str, Any] = {"file": file, "mean": values[first].mean(axis=0, dtype=np.float64).tolist()}
+        if elsewhere:
+            said["elsewhere"] = f"elsewhere_{number:02d}.npy"
+            ways = [whole(way, each.name, each.socket or "", each.kind) for way in elsewhere]
+            np.save(folder / said["elsewhere"], np.concatenate(ways))
         if each.socket is None:
             leaves[each.leaf]["weight"] = said
         else:
             leaves[each.leaf]["sockets"][each.socket] = said
     positions = np.where(seen[..., None], found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
     np.save(folder / "positions.npy", positions.astype(np.float32))
-    camera = world_to_frame(scene, frame).tolist()
+    camera = world_to_frame(target.scene, frame).tolist()
     return {"leaves": leaves, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
+
+
+def _rendered(
+    target: Target, request: Mapping[str, Any], scale: int, cosine: float | None = None
+) -> tuple[list[_Output], dict[str, NDArray[np.float32]], Frame]:
+    """The outputs, what Cycles writes into them for the camera's rays or for others at an angle, and their frame."""
+    copy, depths = own_copy(target.material), int(request.get("depths", 1))
+    try:
+        if cosine is not None:
+            see_from_elsewhere(copy.node_tree, cosine)
+        outputs = _leaf_outputs(copy.node_tree, request["leaves"])
+        make_opaque(copy, ours=True)
+        wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
+        at_depths = peeled(copy.node_tree, wanted, depths)
+        frame = frame_of(target.scene, target.obj, scale, len(at_depths))
+        widen_bumps(copy.node_tree, frame.scale)
+        rendered = target.outputs(copy, at_depths, frame, request["samples"])
+    finally:
+        remove_copy(copy)
+    found = {name: np.concatenate([rendered[at_depth(name, k)] for k in range(depths)]) for name, _ in wanted}
+    return outputs, found, frame
 
 
 @dataclass(frozen=True)
@@ -219,6 +240,12 @@ def widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
         width = node.inputs.get("Filter Width") if node.bl_idname == "ShaderNodeBump" else None
         if width is not None and not width.is_linked:
             width.default_value *= scale
+
+
+def whole(found: Mapping[Any, NDArray[np.float32]], key: Any, name: str, kind: str) -> NDArray[np.float32]:
+    """The clean values of a socket from rendered outputs, as if each place were all on the target."""
+    mask = found[MASK]
+    return cleaned(found[key] / np.maximum(mask, SEEN), mask[..., 0] > SEEN, name, kind)
 
 
 def cleaned(values: NDArray[np.float32], seen: NDArray[np.bool_], name: str, kind: str) -> NDArray[np.float32]:

@@ -18,8 +18,20 @@ from numpy.typing import NDArray
 from ..graph_values.place import Place, write
 from .aov_render import Frame, frame_of, world_to_frame
 from .graph_copy import own_copy, remove_copy, variant_of
+from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
 from .server import ProbeRequestError
-from .socket_pictures import MASK, NOT_SEEN, POSITION, SEEN, Target, cleaned, make_opaque, widen_bumps, write_outputs
+from .socket_pictures import (
+    MASK,
+    NOT_SEEN,
+    POSITION,
+    SEEN,
+    Target,
+    cleaned,
+    make_opaque,
+    whole,
+    widen_bumps,
+    write_outputs,
+)
 
 # of the nodes in one render: more overflow the memory that Cycles has for a material's nodes, at 128 noises all of it
 MOST_VARIANTS = 32
@@ -34,8 +46,9 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     Requested are `scene`, `layer`, `object`, `slot` and the shader's `node` as of the command `sockets`, the `places`
     of the values (entries of request.json), `variants`, each with a number or colour for every place in `values` and
     with the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder`
-    for the files. Answered are `files`, by socket for each variant, and of the target the file `positions`, NaN beside
-    it, and the `camera` of the command `sockets`.
+    for the files; `elsewhere` where the files of that name are asked for, too, for the first variant. Answered are
+    `files`, by socket for each variant, `elsewhere`, by socket as of the command `sockets`, and of the target the file
+    `positions`, NaN beside it, and the `camera` of that command.
 
     Raises
     ------
@@ -57,7 +70,11 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     positions = np.where(seen[..., None], positions / np.maximum(mask, SEEN), np.float32(np.nan))
     np.save(Path(request["folder"]) / "positions.npy", positions.astype(np.float32))
     camera = world_to_frame(target.scene, frame).tolist()
-    return {"files": files, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
+    elsewhere = {}
+    if request.get("elsewhere") and asks_ray(target.material.node_tree):
+        elsewhere = _elsewhere(target, request, places, variants[:1])
+    of_target = {"positions": "positions.npy", "camera": camera, "scale": frame.scale}
+    return {"files": files, "elsewhere": elsewhere, **of_target}
 
 
 class _TooManyError(Exception):
@@ -87,9 +104,33 @@ def _all(
     return files, mask, positions
 
 
-def _rendered(target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets, frame: Frame) -> _Found:
+def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets) -> dict[str, str]:
+    """Files by socket of what rays from elsewhere find of a variant, at each angle."""
+    names, kinds = variants[0][1], _kinds(target.material, request["node"])
+    frame = frame_of(target.scene, target.obj, ELSEWHERE_SCALE, len(names) + 2)
+    ways = []
+    for angle in range(ANGLES):
+        found, mask, _ = _rendered(target, request, places, variants, frame, cosine=cosine_of(angle))
+        ways.append({MASK: mask} | {name: found[0, name] for name in names})
+    files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(names)}
+    for name, file in files.items():
+        np.save(Path(request["folder"]) / file, np.concatenate([whole(way, name, name, kinds[name]) for way in ways]))
+    return files
+
+
+def _rendered(
+    target: Target,
+    request: Mapping[str, Any],
+    places: list[Place],
+    variants: _Sets,
+    frame: Frame,
+    *,
+    cosine: float | None = None,
+) -> _Found:
     copy, base = own_copy(target.material), own_copy(target.material)
     try:
+        if cosine is not None:
+            see_from_elsewhere(base.node_tree, cosine)
         make_opaque(copy)
         widen_bumps(base.node_tree, frame.scale)
         wanted = [(MASK, False), (POSITION, True)]

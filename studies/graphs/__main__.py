@@ -18,8 +18,9 @@ import argparse
 import json
 from pathlib import Path
 
+from .head import LIGHTS
 from .materials import GRAPHS
-from .measure import LIGHTS, SERIES, row
+from .measure import SERIES, row
 from .mixes import MIXES
 from .values import FITTED
 

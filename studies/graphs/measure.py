@@ -21,56 +21,23 @@ from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.image import Encoding, Image, Pixels
 
 from ..verdicts.summary import DEVIATIONS, OFF
+from .head import head_scene
 from .materials import GRAPHS
 from .mixes import MIXES, DrawnMix, put_mix
 from .values import FITTED, SOCKETS, Drawn
 
-LIGHTS = ("lamp", "probe")
 SERIES = ("sockets", "values", "mixes")
 NODE_SERVER = (sys.executable, "-m", "blender_addon.probe.server")
 SAMPLES = {"lamp": 128, "probe": 256}
 
 
 def build_scene(graph: str, light: str, size: int) -> Any:
-    """A head with the graph's material, its Principled node and the scene's light; returns object and node."""
-    import bpy
-
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x = scene.render.resolution_y = size
-    scene.cycles.device = "CPU"
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.location, camera.rotation_euler = (0.0, -4.2, 0.9), (math.radians(78.0), 0.0, 0.0)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    if light == "lamp":
-        lamp = bpy.data.lights.new("Lamp", "POINT")
-        lamp.energy, lamp.shadow_soft_size = 700.0, 0.0
-        item = bpy.data.objects.new("Lamp", lamp)
-        item.location = (2.0, -3.0, 3.0)
-        scene.collection.objects.link(item)
-    else:
-        scene.world = bpy.data.worlds.new("World")
-        tree = scene.world.node_tree
-        picture = tree.nodes.new("ShaderNodeTexEnvironment")
-        folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
-        picture.image = bpy.data.images.load(str(folder / "courtyard.exr"))
-        background = next(node for node in tree.nodes if node.type == "BACKGROUND")
-        tree.links.new(picture.outputs[0], background.inputs["Color"])
-    bpy.ops.mesh.primitive_monkey_add()
-    target = bpy.context.object
-    modifier = target.modifiers.new("Smooth", "SUBSURF")
-    modifier.levels = modifier.render_levels = 2
-    bpy.ops.object.shade_smooth()
-    material = bpy.data.materials.new(graph)
-    target.data.materials.append(material)
-    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    """The head with the graph's material; returns object and Principled node."""
+    target, node = head_scene(light, size)
     if graph in MIXES:
         put_mix(graph, target)
     else:
-        GRAPHS[graph](material.node_tree, node)
+        GRAPHS[graph](target.active_material.node_tree, node)
     return target, node
 
 

@@ -91,7 +91,7 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot) -
     if len(leaves) < 2 or chosen_leaf(material) or not any(leaf.is_linked for leaf in leaves):
         return None
     asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
-    _send(probe, context, fitted, asked, 1, probe.folder)
+    _send(probe, context, fitted, asked, 1, probe.folder, elsewhere=False)
     answer = probe.receive()  # waited for: the scene is read by it, and must be as in the copy that was asked
     shares = [
         found["weight"]["mean"][0] if leaf.is_linked else leaf.share
@@ -108,11 +108,13 @@ def _send(
     scale: int,
     folder: Path,
     depths: int = 1,
+    *,
+    elsewhere: bool = True,
 ) -> None:
     probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=fitted.object.name, slot=fitted.slot,
-        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths,
+        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths, elsewhere=elsewhere,
     )  # fmt: skip
 
 
@@ -152,9 +154,10 @@ def evaluate_graph(
     files = [folder / answer["positions"]]
 
     def seen(socket: Socket, found: dict[str, Any]) -> Socket:
-        files.append(folder / found["file"])
-        mean = found["mean"]
-        return replace(socket, value=mean if len(mean) > 1 else mean[0], seen=files[-1])
+        here, mean = folder / found["file"], found["mean"]
+        elsewhere = folder / found["elsewhere"] if "elsewhere" in found else None
+        files.extend(path for path in (here, elsewhere) if path is not None)
+        return replace(socket, value=mean if len(mean) > 1 else mean[0], seen=here, elsewhere=elsewhere)
 
     def evaluated(leaf: Material, found: dict[str, Any]) -> Material:
         sockets = dict(leaf.sockets)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,17 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ...types.errors import BadInputError
+from .graph_request import NodeGraph
 from .job_folder import JobFolder
 
 LARGEST_SIDE = 4 * 16384  # subpixels
 _VALUES = np.dtype("<f4")
 
 
-def check_graph_files(folder: JobFolder, positions: str | None, depths: int, sockets: Mapping[str, str]) -> None:
-    """Check the file of `positions`, which holds so many `depths`, and those of the values by socket.
+def check_graph_files(
+    folder: JobFolder, graph: NodeGraph | None, sockets: Sequence[tuple[str, str, str | None]]
+) -> None:
+    """Check the files of positions and of values: a socket, what the camera sees of it, and what other rays find.
 
     Raises
     ------
@@ -26,28 +29,37 @@ def check_graph_files(folder: JobFolder, positions: str | None, depths: int, soc
         If one is missing, outside the folder, no array of float32 (height, width, 1 or 3), cut off, or of another size
         than the positions; or there are values without positions.
     """
-    if positions is None:
+    if graph is None:
         if sockets:
-            name = next(iter(sockets))
+            name = sockets[0][0]
             raise BadInputError(f"request.json: socket {name!r} has a graph, but there is no entry 'graph': add it.")
         return
+    positions, depths = graph.positions, graph.depths
     size = _size(folder.file(positions, what="request.json: graph.positions"))
     if size[2] != 3:
         raise BadInputError(f"{positions} has {size[2]} numbers for a position: it must have 3.")
     if size[0] % depths:
         raise BadInputError(f"{positions} has {size[0]} rows, which are no {depths} pictures of one height.")
-    for name, file in sockets.items():
+    for name, file, elsewhere in sockets:
         found = _size(folder.file(file, what=f"request.json: graph of {name}"))
         if found[:2] != size[:2]:
             raise BadInputError(f"{file} is {found[1]} x {found[0]}, but {positions} {size[1]} x {size[0]}.")
+        if elsewhere is not None:
+            coarse = _size(folder.file(elsewhere, what=f"request.json: elsewhere of {name}"))
+            scale = max(size[1] // coarse[1], 1)
+            if coarse[1] * scale != size[1] or (coarse[0] * scale) % size[0] or coarse[2] != found[2]:
+                raise BadInputError(f"{elsewhere} is {coarse[1]} x {coarse[0]}, which no pixels of {positions} are.")
 
 
-def locate_files(folder: JobFolder, graph: Any, name: str, socket: dict[str, Any]) -> None:
+def locate_files(folder: JobFolder, graph: NodeGraph | None, name: str, socket: dict[str, Any]) -> None:
     """Give the files of a socket, as in request.json, by their absolute paths, and those of the `graph` with them."""
     if socket.get("texture"):
         socket["texture"] = str(folder.file(socket["texture"], what=f"request.json: texture of {name}"))
     if socket.get("graph") and graph is not None:
         socket["graph"] = str(folder.file(socket["graph"], what=f"request.json: graph of {name}"))
+        if socket.get("elsewhere"):
+            file = folder.file(socket["elsewhere"], what=f"request.json: elsewhere of {name}")
+            socket["elsewhere"] = str(file)
         socket["positions"] = str(folder.file(graph.positions, what="request.json: graph.positions"))
         socket["camera"], socket["depths"] = graph.camera, graph.depths
 

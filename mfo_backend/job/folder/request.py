@@ -55,18 +55,21 @@ class Target:
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
+_FILES = ("texture", "graph", "elsewhere")  # of a socket
+
+
 @dataclass(frozen=True)
 class Socket:
     """A socket of a Blender Principled node; a linked one stays as it is.
 
-    Its `texture` is a picture over the UV map, its `graph` holds what nodes give as the camera sees it; both are files
-    of the job.
+    Files of the job: a `texture` over the UV map, a `graph` as the camera sees it, and `elsewhere` for other rays.
     """
 
     value: Any = None
     linked: bool = False
     texture: str | None = None
     graph: str | None = None
+    elsewhere: str | None = None
 
 
 @dataclass(frozen=True)
@@ -180,9 +183,8 @@ def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = Fals
             if socket.texture is not None:
                 folder.file(socket.texture, what=f"{WHERE}: materials.{bsdf_id}.sockets.{name}.texture")
     named = request.materials.get(request.target.bsdf_id)
-    held = {name: socket.graph for name, socket in named.all_sockets if socket.graph} if named else {}
-    positions, depths = (request.graph.positions, request.graph.depths) if request.graph else (None, 1)
-    check_graph_files(folder, positions, depths, held)
+    held = [(name, s.graph, s.elsewhere) for name, s in named.all_sockets if s.graph] if named else []
+    check_graph_files(folder, request.graph, held)
     return request
 
 
@@ -318,9 +320,9 @@ def request_to_json(request: Request) -> dict[str, Any]:
 
 
 def _without_nothing(material: dict[str, Any]) -> None:
-    """Leave out textures and graphs that are not there."""
+    """Leave out files that are not there."""
     for socket in (*material["sockets"].values(), material["weight"]):
-        for key in ("texture", "graph"):
+        for key in _FILES:
             if socket[key] is None:
                 del socket[key]
     for key in ("free", "factors", "ways"):
@@ -383,14 +385,13 @@ def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
 
 
 def _socket(data: Any, where: str) -> Socket:
-    socket = CheckedObject(data, where, ("value", "linked", "texture", "graph"))
+    socket = CheckedObject(data, where, ("value", "linked", *_FILES))
     value = socket.raw("value", None)
     numbers = value if isinstance(value, list) else [value]
     if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
         raise socket.wrong("value", "a number, a list of one to four, true, false or null")
-    texture = socket.text("texture") if socket.raw("texture", None) is not None else None
-    graph = socket.text("graph") if socket.raw("graph", None) is not None else None
-    return Socket(value, socket.boolean("linked", False), texture, graph)
+    files = {key: socket.text(key) for key in _FILES if socket.raw(key, None) is not None}
+    return Socket(value, socket.boolean("linked", False), **files)
 
 
 def _fit(data: Any) -> FitSettings:

@@ -79,7 +79,7 @@ class GraphBlender:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
         """See `render.graph_pictures.Evaluate`."""
         where, own = self._evaluate, self._evaluate["sockets"]
         answer = self._ask({
@@ -89,11 +89,13 @@ class GraphBlender:
                 {"values": [list(v) if isinstance(v, tuple) else v for v in values], "sockets": [own[n] for n in names]}
                 for values, names in variants
             ],
-            "scale": scale, "samples": samples, "folder": str(self._folder),
+            "scale": scale, "samples": samples, "elsewhere": elsewhere, "folder": str(self._folder),
         })  # fmt: skip
         names = {theirs: ours for ours, theirs in own.items()}
         pictures = [{names[socket]: self._picture(file) for socket, file in files.items()} for files in answer["files"]]
-        return Evaluated(pictures, self._picture(answer["positions"]), np.array(answer["camera"], np.float64))
+        others = {names[socket]: self._picture(file) for socket, file in answer.get("elsewhere", {}).items()}
+        camera = np.array(answer["camera"], np.float64)
+        return Evaluated(pictures, self._picture(answer["positions"]), camera, others)
 
     def close(self) -> None:
         """End Blender and remove its files."""

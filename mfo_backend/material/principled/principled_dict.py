@@ -169,6 +169,7 @@ def projective(content: Mapping[str, Any], outside: Any) -> dict[str, Any]:
         "camera": ",".join(repr(float(number)) for row in content["camera"] for number in row),
         "outside": outside,
         "depths": int(content.get("depths", 1)),
+        **({"elsewhere": str(content["elsewhere"])} if content.get("elsewhere") else {}),
     }
 
 

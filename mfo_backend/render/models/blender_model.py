@@ -228,8 +228,9 @@ def _rewrite(bsdf: Element, properties: Mapping[str, Any], textures: Mapping[str
 
 def _projective(name: str, properties: Mapping[str, Any]) -> Element:
     texture = ElementTree.Element("texture", type="projective", name=name)
-    for key in ("filename", "positions", "camera"):
-        ElementTree.SubElement(texture, "string", name=key, value=properties[key])
+    for key in ("filename", "positions", "camera", "elsewhere"):
+        if key in properties:
+            ElementTree.SubElement(texture, "string", name=key, value=properties[key])
     ElementTree.SubElement(texture, "integer", name="depths", value=str(properties["depths"]))
     outside = properties["outside"]
     if isinstance(outside, Sequence):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -38,17 +38,32 @@ EXTRAPOLATED = 1e-3
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Pictures by socket for each variant; world positions, NaN beside the target; the (3, 4) matrix of the camera."""
+    """Pictures by socket for each variant; world positions, NaN beside the target; the (3, 4) matrix of the camera.
+
+    `elsewhere` are pictures of the first variant as of the texture `projective`, where they hang on the ray.
+    """
 
     pictures: Sequence[Mapping[str, Picture]]
     positions: Picture
     camera: NDArray[np.float64]
+    elsewhere: Mapping[str, Picture] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a texture shows: the picture that the camera sees, and that for other rays where it hangs on the ray."""
+
+    picture: Picture
+    elsewhere: Picture | None = None
 
 
 class Evaluate(Protocol):
-    """Evaluates variants of a graph, `scale` squared subpixels to a pixel, and so many samples in each."""
+    """Evaluates variants of a graph, `scale` squared subpixels to a pixel, and so many samples in each.
 
-    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+    `elsewhere` says that the pictures of that name are asked for.
+    """
+
+    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
         """The pictures; raises `BadInputError` with a sentence where the nodes cannot be evaluated."""
         ...
 
@@ -105,7 +120,7 @@ class GraphPictures:
         self._exact: list[tuple[Vector, GraphState]] = []  # those that were evaluated, the newest last
         # how much the slope along each entry changes over the width of the box, at most; unknown before two states are
         self._bend: Vector | None = None
-        self._fine: OrderedDict[bytes, Mapping[str, Picture]] = OrderedDict()
+        self._fine: OrderedDict[bytes, Mapping[str, Shown]] = OrderedDict()
         self._seen: tuple[Picture, NDArray[np.float64]] | None = None
         self.renders = 0
 
@@ -175,19 +190,23 @@ class GraphPictures:
         known, state = self._exact[best]
         return state.moved(vector - known)
 
-    def fine(self, vector: Vector) -> Mapping[str, Picture]:
+    def fine(self, vector: Vector) -> Mapping[str, Shown]:
         """Finer pictures by parameter, without derivatives."""
         key = vector.tobytes()
         if key not in self._fine:
             self.renders += 1
-            found = self._evaluate([(self._as_values(vector), self._sockets)], scale=FINE_SCALE, samples=FINE_SAMPLES)
-            self._fine[key] = {name_of(socket): picture for socket, picture in found.pictures[0].items()}
+            variants = [(self._as_values(vector), self._sockets)]
+            found = self._evaluate(variants, scale=FINE_SCALE, samples=FINE_SAMPLES, elsewhere=True)
+            self._fine[key] = {
+                name_of(socket): Shown(picture, found.elsewhere.get(socket))
+                for socket, picture in found.pictures[0].items()
+            }
             if len(self._fine) > RECALLED:
                 self._fine.popitem(last=False)
         self._fine.move_to_end(key)
         return self._fine[key]
 
-    def note(self, vector: Vector, fine: Mapping[str, Picture]) -> None:
+    def note(self, vector: Vector, fine: Mapping[str, Shown]) -> None:
         """Take over finer pictures that are known already."""
         self._fine[vector.tobytes()] = fine
 

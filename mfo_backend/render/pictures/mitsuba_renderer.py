@@ -22,7 +22,7 @@ from ...types.parameter import ParameterTable, Vector
 from ..machine.plugins import check_plugins
 from ..machine.variant import load_variant
 from ..models.blender_model import prepare_several_blender_principled
-from ..models.graph_pictures import GraphPictures
+from ..models.graph_pictures import GraphPictures, Shown
 from ..models.material_model import material_model
 from ..models.prepared_material import RADIANCE_KEY, Materials, PreparedMaterial
 from .pass_counter import PassCounter
@@ -66,7 +66,7 @@ class MitsubaRenderer:
         self._params.keep(list(self._keys.values()))
         if graph is not None:
             textures = {name: self._texture(name) for name in graph.varying}
-            graph.note(graph.table.pack({}), {name: texture.picture for name, texture in textures.items()})
+            graph.note(graph.table.pack({}), {k: Shown(t.picture, t.elsewhere) for k, t in textures.items()})
         self._mask: NDArray[np.bool_] | None = None
         self._of_pixels: PixelPictures | None = None
 
@@ -210,8 +210,8 @@ class MitsubaRenderer:
         self._params.update()
         if self.graph is not None:
             of_graph = np.asarray(vector, np.float64)[self.table.length - self.graph.table.length :]
-            for name, picture in self.graph.fine(of_graph).items():
-                self._texture(name).show(picture)
+            for name, shown in self.graph.fine(of_graph).items():
+                self._texture(name).show(shown.picture, shown.elsewhere)
         return theta
 
     def _texture(self, name: str) -> Any:

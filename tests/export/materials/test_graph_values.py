@@ -28,14 +28,15 @@ def evaluator(request: Any, folder: Path) -> Any:
     where = request.graph.evaluate
     own = where["sockets"]
 
-    def evaluate(variants: Sequence[Any], *, scale: int, samples: int) -> Any:
+    def evaluate(variants: Sequence[Any], *, scale: int, samples: int, elsewhere: bool = False) -> Any:
         asked = [{"values": list(values), "sockets": [own[name] for name in names]} for values, names in variants]
         found = answer({
             **where, "places": [value.place for value in request.graph.values], "variants": asked,
-            "scale": scale, "samples": samples, "folder": str(folder),
+            "scale": scale, "samples": samples, "elsewhere": elsewhere, "folder": str(folder),
         })  # fmt: skip
         pictures = [{name: np.load(folder / file) for name, file in files.items()} for files in found["files"]]
-        return Evaluated(pictures, np.load(folder / found["positions"]), np.array(found["camera"]))
+        others = {name: np.load(folder / file) for name, file in found["elsewhere"].items()}
+        return Evaluated(pictures, np.load(folder / found["positions"]), np.array(found["camera"]), others)
 
     return evaluate
 
@@ -57,6 +58,7 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     from blender_addon.graph_values.table import graph_values
     from mfo_backend.render.models.graph_pictures import GraphPictures
     from mfo_backend.render.paths.recorded_scene import RecordedScene
+    from mfo_backend.render.pictures.mitsuba_renderer import MitsubaRenderer
     from mfo_backend.render.pictures.renderer import load_renderer
 
     lit_scene(scene)
@@ -79,13 +81,17 @@ def test_the_recorded_picture_at_other_values_is_cycles(
         materials=request_materials(folder, request), light_paths=request.light_paths,
         graph=GraphPictures(request.graph.values, evaluator(request, tmp_path), linked),
     )  # fmt: skip
+    assert isinstance(renderer, MitsubaRenderer)
+    assert renderer.graph is not None
     recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
     there = renderer.table.pack({**renderer.table.unpack(renderer.start), **change})
     paths = recorded.record(there, grid=4, seed=0, near=True)
     groups = paths.pixel_groups(paths.interior)
     found = recorded.evaluator(paths, groups)(there)
     tree = material.node_tree
-    for value in graph_values(target_shader(material)):
+    shader = target_shader(material)
+    assert shader is not None
+    for value in graph_values(shader):
         if value.name in change:
             write(tree, value.place, change[value.name])
     truth = render_cycles().reshape(-1, 3)[groups.pixels]
@@ -97,7 +103,7 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     step = 0.02
     for k in range(1, len(there)):
         moved = there + step * (np.arange(len(there)) == k)
-        recorded.renderer.graph.settle(moved[1:])
+        renderer.graph.settle(moved[1:])
         change_of = (recorded.evaluator(paths, groups)(moved)[:, :, 0] - found[:, :, 0]) / step
         slope = found[:, :, 1 + k]
         # the difference is taken over a few per cent of the range, where normals turn

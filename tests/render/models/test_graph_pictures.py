@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from mfo_backend.render.models.graph_pictures import Evaluated, GraphPictures, Variant
+from mfo_backend.render.models.graph_pictures import Evaluated, GraphPictures, Shown, Variant
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.node_value import NodeValue
 
@@ -25,7 +25,7 @@ class Nodes:
     def __init__(self) -> None:
         self.variants: list[int] = []
 
-    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
         self.variants.append(len(variants))
         pictures = []
         for (color, power), sockets in variants:
@@ -93,15 +93,15 @@ def test_finer_pictures_are_kept() -> None:
     nodes = Nodes()
     pictures = graph(nodes)
     at = np.array([0.5, 0.5, 0.5, 1.0])
-    pictures.note(at, {"roughness": NOISE})
-    assert pictures.fine(at)["roughness"] is NOISE
+    pictures.note(at, {"roughness": Shown(NOISE)})
+    assert pictures.fine(at)["roughness"].picture is NOISE
     assert nodes.variants == []
-    np.testing.assert_allclose(pictures.fine(at + 0.25)["roughness"], NOISE**1.25, rtol=1e-6)
+    np.testing.assert_allclose(pictures.fine(at + 0.25)["roughness"].picture, NOISE**1.25, rtol=1e-6)
     assert nodes.variants == [1]
 
 
 def test_nodes_that_cannot_be_evaluated_are_known_before_the_fit() -> None:
-    def refuses(variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+    def refuses(variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
         raise BadInputError("Too many nodes.")
 
     pictures = GraphPictures((value("Mix/A", 0.5, ("Base Color",)),), refuses, ("Base Color",))
@@ -113,7 +113,7 @@ def test_normals_are_looked_at_more_finely() -> None:
     """In a picture of 200 x 200 pixels; of colours two subpixels along a pixel are enough."""
     asked = []
 
-    def evaluate(variants: Sequence[Variant], *, scale: int, samples: int) -> Evaluated:
+    def evaluate(variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
         asked.append((scale, samples))
         raise BadInputError("Enough.")
 

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scene of these studies: a head under a lamp or under an environment."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+LIGHTS = ("lamp", "probe")
+
+
+def head_scene(light: str, size: int) -> Any:
+    """A smooth head with a material of one Principled node, under a lamp or a probe; returns object and node."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.cycles.device = "CPU"
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -4.2, 0.9), (math.radians(78.0), 0.0, 0.0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    if light == "lamp":
+        lamp = bpy.data.lights.new("Lamp", "POINT")
+        lamp.energy, lamp.shadow_soft_size = 700.0, 0.0
+        item = bpy.data.objects.new("Lamp", lamp)
+        item.location = (2.0, -3.0, 3.0)
+        scene.collection.objects.link(item)
+    else:
+        scene.world = bpy.data.worlds.new("World")
+        tree = scene.world.node_tree
+        picture = tree.nodes.new("ShaderNodeTexEnvironment")
+        folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
+        picture.image = bpy.data.images.load(str(folder / "courtyard.exr"))
+        background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+        tree.links.new(picture.outputs[0], background.inputs["Color"])
+    bpy.ops.mesh.primitive_monkey_add()
+    target = bpy.context.object
+    modifier = target.modifiers.new("Smooth", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+    bpy.ops.object.shade_smooth()
+    material = bpy.data.materials.new("Head")
+    target.data.materials.append(material)
+    return target, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

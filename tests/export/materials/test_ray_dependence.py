@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes that ask for the ray: light that bounces within a hollow target finds other values than the camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
+from mfo_backend.job.folder.request import read_request  # noqa: E402
+
+from ..scenes import new_material  # noqa: E402
+from .test_graph_values import evaluator  # noqa: E402
+from .test_node_graphs import lit_scene, principled, recorded_and_cycles  # noqa: E402
+
+
+def bowl(material: Any) -> Any:
+    """A half ball that the camera looks into."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    item = bpy.context.object
+    item.data.materials.append(material)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.bisect(plane_co=(0.0, 0.0, 0.0), plane_no=(0.0, 0.0, 1.0), clear_outer=True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.object.shade_smooth()
+    return item
+
+
+def facing(tree: Any) -> Any:
+    """White where looked at straight, black from the side."""
+    weight, ramp = tree.nodes.new("ShaderNodeLayerWeight"), tree.nodes.new("ShaderNodeValToRGB")
+    low, high = ramp.color_ramp.elements
+    low.color, low.position, high.color, high.position = (0.9, 0.9, 0.9, 1.0), 0.35, (0.05, 0.05, 0.05, 1.0), 0.55
+    tree.links.new(weight.outputs["Facing"], ramp.inputs[0])
+    return ramp.outputs[0]
+
+
+def incoming(tree: Any) -> Any:
+    """The same by the product of ray and normal."""
+    geometry, product = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeVectorMath")
+    product.operation = "DOT_PRODUCT"
+    tree.links.new(geometry.outputs["Incoming"], product.inputs[0])
+    tree.links.new(geometry.outputs["Normal"], product.inputs[1])
+    return product.outputs["Value"]
+
+
+def camera_ray(tree: Any) -> Any:
+    """White for the camera, in a group, and black for all others."""
+    group = bpy.data.node_groups.new("Rays", "ShaderNodeTree")
+    group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    path, output = group.nodes.new("ShaderNodeLightPath"), group.nodes.new("NodeGroupOutput")
+    group.links.new(path.outputs["Is Camera Ray"], output.inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    return node.outputs[0]
+
+
+@pytest.mark.parametrize("build", [facing, incoming, camera_ray])
+def test_bounces_find_what_rays_from_elsewhere_find(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, tmp_path: Path, build: Any
+) -> None:
+    """The level is Cycles', and 10 to 80 % off were all rays the camera's; a fit's nodes give the export's."""
+    lit_scene(scene)
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 3
+    material = new_material("Target", Roughness=1.0)
+    tree, shader = material.node_tree, principled(material)
+    tree.links.new(build(tree), shader.inputs["Base Color"])
+    target = bowl(material)
+    found, truth = recorded_and_cycles(export, render_cycles, target)
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.005
+    if build is not facing:
+        return
+    report = export(target, name="again", fit={"parameters": ["Color Ramp/Stop 0"]}, reference=tmp_path / "cycles.exr")
+    request = read_request(JobFolder.open(report.folder))
+    socket = request.materials["target_bsdf"].sockets["Base Color"]
+    shown = evaluator(request, tmp_path)([([(0.9, 0.9, 0.9)], ["Base Color"])], scale=4, samples=4, elsewhere=True)
+    (evaluated,) = shown.elsewhere.values()
+    np.testing.assert_allclose(evaluated, np.load(report.folder / socket.elsewhere), atol=1e-5)
