@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 
+from ..export.nodes.shader_graph import Links
 from ..versions import active_output
 
 Path = tuple[bpy.types.Node, ...]  # group nodes, outermost first
@@ -126,13 +127,14 @@ def _own_groups(tree: bpy.types.NodeTree, depth: int) -> list[bpy.types.NodeTree
 
 def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
     """The output socket that feeds `socket`, reroutes skipped; muted nodes are left to Blender."""
+    links = None  # of a longer way
     while socket is not None and socket.is_linked:
-        link = socket.links[0]
+        link = socket.links[0] if links is None else links.into(socket)
         if link.is_muted or not link.is_valid:
             return None
         if link.from_node.bl_idname != "NodeReroute":
             return link.from_socket
-        socket = link.from_node.inputs[0]
+        socket, links = link.from_node.inputs[0], links or Links()
     return None
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -45,6 +46,7 @@ class Links:
 
     def __init__(self) -> None:
         self._of: dict[int, dict[int, bpy.types.NodeLink]] = {}
+        self._from: dict[int, Counter[int]] = {}
 
     def into(self, socket: bpy.types.NodeSocket) -> bpy.types.NodeLink:
         """The link into a linked input."""
@@ -61,6 +63,14 @@ class Links:
             self._of[tree.as_pointer()] = known
         return known.get(socket.as_pointer())
 
+    def count_from(self, output: bpy.types.NodeSocket) -> int:
+        """How many links begin at an output."""
+        tree = output.id_data
+        known = self._from.get(tree.as_pointer())
+        if known is None:
+            known = self._from[tree.as_pointer()] = Counter(link.from_socket.as_pointer() for link in tree.links)
+        return known[output.as_pointer()]
+
 
 def source_of(socket: bpy.types.NodeSocket, links: Links | None = None) -> bpy.types.NodeSocket | None:
     """Return the output socket that feeds `socket`, or None if nothing does; `links` are those of a longer walk.
@@ -73,7 +83,7 @@ def source_of(socket: bpy.types.NodeSocket, links: Links | None = None) -> bpy.t
             return None
         node, output = link.from_node, link.from_socket
         if node.bl_idname == "NodeReroute":
-            socket = node.inputs[0]
+            socket, links = node.inputs[0], links or Links()
             continue
         if not node.mute:
             return output

@@ -14,6 +14,7 @@ from ...versions import PRINCIPLED, node_tree_of
 from .closure_leaves import ClosureError, ClosureLeaf, Groups, by_identifier, closure_leaves
 from .graph_findings import GROUP_INPUT
 from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, why_not_fitted
+from .shader_graph import Links
 
 ALL_LEAVES = "*"  # what a material keeps where all shaders of its mix are fitted
 ALL = "all"  # and what a user calls it
@@ -234,9 +235,10 @@ def make_own(material: bpy.types.Material, names: Collection[str], leaf: str | N
 
 def _sole_input(socket: bpy.types.NodeSocket, group: bpy.types.Node) -> bpy.types.NodeSocket | None:
     """The input of `group` that feeds `socket` inside it as it is, and nothing else."""
+    links = Links()
     while socket.is_linked:
-        link = socket.links[0]
-        if link.is_muted or not link.is_valid or len(link.from_socket.links) != 1:
+        link = links.into(socket)
+        if link.is_muted or not link.is_valid or links.count_from(link.from_socket) != 1:
             return None
         if link.from_node.bl_idname == "NodeReroute":
             socket = link.from_node.inputs[0]
