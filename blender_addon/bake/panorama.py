@@ -18,8 +18,8 @@ import numpy as np
 from mathutils import Matrix, Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
+from ..probe.light_path import CAMERA, SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output, node_tree_of
-from .light_path import CAMERA, SCATTERED, answer_light_paths, light_path_outputs
 
 Pixels = NDArray[np.float32]
 

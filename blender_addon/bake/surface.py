@@ -17,10 +17,10 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot, slot_count
+from ..export.nodes.dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from ..probe.closure_tree import ClosureTree, Leaf, Value
+from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output
-from .dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for
-from .light_path import SCATTERED, answer_light_paths, light_path_outputs
 from .unwrap import unwrapped
 
 Pixels = NDArray[np.float32]

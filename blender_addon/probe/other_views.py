@@ -11,9 +11,9 @@ import math
 
 import bpy
 
-from ..bake.dependence import asked_for
-from ..bake.light_path import SCATTERED, answer_light_paths, light_path_outputs
+from ..export.nodes.dependence import asked_for
 from .graph_copy import nodes_of
+from .light_path import SCATTERED, answer_light_paths, light_path_outputs
 
 # by the angle between the ray and the normal; by the ray's direction
 OF_ANGLE = {"ShaderNodeFresnel": ("Fac", "Factor"), "ShaderNodeLayerWeight": ("Fresnel", "Facing")}

@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bake.dependence import deformed_generated
 from ...versions import (
     cycles_settings,
     divides_adaptively,
@@ -33,6 +32,7 @@ from ..materials.read_material import needs_bake, note_volume, read_context, rea
 from ..meshes.coincident import shared_faces
 from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
+from ..nodes.dependence import deformed_generated
 from ..render_state import (
     background_objects,
     instanced_objects,

@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bake.dependence import turns_with_camera
 from ...versions import active_output, cycles_settings, node_tree_of
 from ..audit.object_table import WORLD_CYCLES, WORLD_VISIBILITY
 from ..audit.rules import name_settings
@@ -18,6 +17,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..images.image_filter import equirectangular_pixels
 from ..images.image_pixels import UnreadableImageError
+from ..nodes.dependence import turns_with_camera
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
     has_texture_mapping,

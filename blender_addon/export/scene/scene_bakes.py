@@ -15,10 +15,10 @@ from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ...bake.baker import BakeError, Baker
-from ...bake.light_path import OF_CAMERA
 from ...bake.panorama import LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
 from ...probe.client import Probe
+from ...probe.light_path import OF_CAMERA
 from ...versions import node_tree_of
 from ..camera.camera_model import Camera
 from ..files.ply_file import TriangleMesh
