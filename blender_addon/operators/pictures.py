@@ -5,6 +5,8 @@
 # Blender reads properties from annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -12,6 +14,8 @@ from bpy.props import StringProperty
 
 from ..result.comparison import comparison_image, picture_image, split_image
 from ..sentences.translated import translated
+
+_DRAWN = 0.3  # seconds until a new window has its size
 
 
 class _JobOperator:
@@ -141,7 +145,17 @@ def _image_editors(context: bpy.types.Context) -> list[bpy.types.Area]:
             area = max(window.screen.areas, key=lambda a: a.width * a.height)
             area.type = "IMAGE_EDITOR"
             found.append(area)
+            bpy.app.timers.register(partial(_fill, window, area), first_interval=_DRAWN)
     return found
+
+
+def _fill(window: bpy.types.Window, area: bpy.types.Area) -> None:
+    """Show the picture of a new window as large as the window, which has to be drawn once to have a size."""
+    if window not in list(bpy.context.window_manager.windows) or area not in list(window.screen.areas):
+        return  # closed at once
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region), suppress(RuntimeError):
+        bpy.ops.image.view_all(fit_view=True)
 
 
 def job_folder_of(context: bpy.types.Context) -> str:

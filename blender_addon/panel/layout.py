@@ -13,13 +13,13 @@ from ..sentences.translated import translated
 _LABELS = {
     "cycles": "In Cycles",
     "cycles_difference": "Difference",
-    "engine": "In Scene's Engine",
+    "engine": "Own Engine",
     "engine_difference": "Difference",
 }
 _SHORT = {
     "reference": "Goal",
     "cycles_difference": "Error",
-    "engine": "In Scene",
+    "engine": "Own",
     "engine_difference": "Error",
 }  # where three names have little room
 _LETTERS_OF_A_ROW = 27  # of a line that holds two buttons uncut; a narrower side bar has one below the other

@@ -62,7 +62,7 @@ def check_result(job: Path, material: str, python: Path) -> None:
         runtime = _runtime()
         flips = [float(answer["metrics"]["flip"]) for answer in answers[1::2]]
         said = f"FLIP in Cycles: {flips[0]:.4f}"
-        runtime.cycles_text = f"{said}. {engine} shows it with {flips[1]:.4f}." if len(flips) > 1 else said
+        runtime.cycles_text = f"{said}. In {engine}: {flips[1]:.4f}." if len(flips) > 1 else said
         runtime.cycles_flip = flips[0]
         if shown_result.result is not None and shown_result.result.folder == job:
             for name in shown_result.CHECKED[: 2 * len(flips)]:

@@ -264,7 +264,7 @@ FIT = {
     "World '{}' could not be rendered by Cycles: {}": "Welt '{}' konnte von Cycles nicht gerendert werden: {}",
     "{} cannot be started ({}).": "{} kann nicht gestartet werden ({}).",
     "{} failed (exit code {}): {}": "{} ist fehlgeschlagen (Code {}): {}",
-    "{}. {} shows it with {}.": "{}. {} zeigt es mit {}.",
+    "{}. In {}: {}.": "{}. In {}: {}.",
     # the reference, more of it
     "Blender takes the reference '{}' as {}, but its file says {}: give the file itself as the reference, or set the image's color space.": "Blender nimmt die Referenz '{}' als {}, aber ihre Datei sagt {}: die Datei selbst als Referenz geben, oder den Farbraum des Bildes setzen.",
     "If the scene was matched to the turned picture, take a turned copy (Turn Upright, --upright).": "Wurde die Szene nach dem gedrehten Bild gemacht, eine gedrehte Kopie nehmen (Aufrecht drehen, --upright).",

@@ -134,7 +134,7 @@ PANEL = {
     "A copy of {} cannot be made ({}).": "Eine Kopie von {} kann nicht gemacht werden ({}).",
     # panel
     "FLIP in Cycles: {}": "FLIP in Cycles: {}",
-    "FLIP in Cycles: {}. {} shows it with {}.": "FLIP in Cycles: {}. {} zeigt es mit {}.",
+    "FLIP in Cycles: {}. In {}: {}.": "FLIP in Cycles: {}. In {}: {}.",
     "Bar: how sure the value is.": "Balken: wie sicher der Wert ist.",
     "Not visible in the picture, kept: {}.": "Im Bild nicht zu sehen, belassen: {}.",
     # why a button is grey
@@ -237,8 +237,8 @@ PANEL = {
     "Goal": "Ziel",
     "Error": "Fehler",
     "In Cycles": "In Cycles",
-    "In Scene": "In Szene",
-    "In Scene's Engine": "In der Engine der Szene",
+    "Own Engine": "Eigene",
+    "Own": "Eigene",
     # the reference in the check
     "scene-linear Rec.709": "szenenlineares Rec.709",
     "scene-linear {}, converted to Rec.709": "szenenlineares {}, umgerechnet in Rec.709",

@@ -41,7 +41,7 @@ def test_eevee_is_rendered_beside_cycles(scene: SimpleNamespace, begun) -> None:
     assert "--name engine" in found.commands[3]
     found.done(ANSWERS)
     runtime = scene.bpy.context.window_manager.mfo_runtime
-    assert runtime.cycles_text == "FLIP in Cycles: 0.0234. Eevee shows it with 0.1500."
+    assert runtime.cycles_text == "FLIP in Cycles: 0.0234. In Eevee: 0.1500."
     assert runtime.cycles_flip == pytest.approx(0.0234)
     found.done(ANSWERS[:2])  # where the scene's engine could not render
     assert runtime.cycles_text == "FLIP in Cycles: 0.0234"

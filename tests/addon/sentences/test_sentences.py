@@ -60,7 +60,7 @@ def in_german(text: str) -> str:
 def english_in(text: str) -> str:
     """What is left of a sentence in German that is English; names stand for what is put in."""
     said = in_german(text.replace("{}", "X"))
-    unknown = said == text.replace("{}", "X") and not said.startswith(("FLIP in Cycles", "Material 'X': X"))
+    unknown = said == text.replace("{}", "X") and not said.startswith(("FLIP in Cycles", "X. In X", "Material 'X': X"))
     return said if unknown or ENGLISH.search(said) else ""
 
 
