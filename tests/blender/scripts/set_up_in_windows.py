@@ -45,8 +45,11 @@ state.step = timed(state.step)
 section.draw_setup = timed(section.draw_setup)
 
 
-def shot(name):
+def shot(name, draws=12):
     if "MFO_SCREENSHOTS" in os.environ:
+        for _ in range(draws):  # panels slide open in steps, one with each draw
+            state.redraw()
+            yield 0.2
         subprocess.run(["import", "-window", "root", os.path.join(os.environ["MFO_SCREENSHOTS"], name + ".png")])
 
 
@@ -87,13 +90,12 @@ def start():
 def story():
     yield from show_panel()
     yield from until(lambda: state.current.name == "NOT_INSTALLED", 10)
-    yield 2.5  # panels slide open
-    shot("setup_1_not_installed")
+    yield from shot("setup_1_not_installed")
     start()
     assert state.current.name == "INSTALLING"
     yield from until(lambda: state.current.step == "Making the environment", 30)
     yield 0.5
-    shot("setup_2_installing")
+    yield from shot("setup_2_installing", draws=1)
     assert bpy.ops.mfo.cancel_install() == {"FINISHED"}
     yield from until(lambda: state.current.name == "NOT_INSTALLED", 20)
     assert not list(state.backend_root().glob("env-*"))
@@ -105,9 +107,9 @@ def story():
     yield from until(lambda: state.current.name == "BROKEN", 30)
     assert any("lacks mitsuba, drjit, numpy" in problem for problem in state.current.problems), state.current
     yield 0.5
-    shot("setup_3_broken")
+    yield from shot("setup_3_broken")
     yield from show_preferences()
-    shot("setup_4_preferences")
+    yield from shot("setup_4_preferences")
     preferences().backend_python = ""
     assert bpy.ops.mfo.remove_backend() == {"FINISHED"}
     assert not state.backend_root().exists()
