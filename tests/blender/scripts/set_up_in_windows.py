@@ -12,7 +12,6 @@ import sys
 import time
 from pathlib import Path
 
-import addon_utils
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
@@ -25,7 +24,7 @@ install = importlib.import_module(f"{addon_id}.blender_addon.backend.backend_ins
 LONGEST_STALL = 0.05  # seconds
 spent: list[float] = []
 bpy.context.preferences.view.show_splash = False
-addon_utils.enable(addon_id, default_set=True)  # --addons enables it without preferences
+importlib.import_module("addon_utils").enable(addon_id, default_set=True)  # --addons enables it without preferences
 install.BackendInstall.__init__.__defaults__ = ("", "", Path(lock))
 state.installed_python = lambda root: None
 
