@@ -22,6 +22,7 @@ _SHORT = {
     "engine": "Own",
     "engine_difference": "Error",
 }  # where three names have little room
+_LETTERS_OF_A_BOX = 3  # that its margins take; in a window a list of sockets' names was cut without them
 _LETTERS_OF_A_ROW = 27  # of a line that holds two buttons uncut; a narrower side bar has one below the other
 
 
@@ -29,7 +30,7 @@ def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: 
     """A sentence in the user's language over as many lines as the region needs; labels do not wrap."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(translated(text), letters(context)) or [""]):
+    for i, line in enumerate(textwrap.wrap(translated(text), letters(context) - _LETTERS_OF_A_BOX) or [""]):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
