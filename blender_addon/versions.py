@@ -168,6 +168,11 @@ def has_diffuse_roughness() -> bool:
     return bpy.app.version >= (4, 3, 0)
 
 
+def counts_passages_exactly() -> bool:
+    """Whether Cycles ends a path at the limit of transparent bounces; before 5.0 it goes through one surface more."""
+    return bpy.app.version >= (5, 0, 0)
+
+
 def is_module() -> bool:
     """Whether Blender is a module of this Python, not a program."""
     return not bpy.app.binary_path

@@ -81,6 +81,7 @@ SCENE = {
     "Collection '{}' is set to Indirect Only: the camera does not see its objects; in the fit it does.": "Collection '{}' steht auf Nur indirekt: die Kamera sieht ihre Objekte nicht; in der Anpassung sieht sie sie.",
     # lights and world
     "The scene has no light: add a light or give the world a colour.": "Die Szene hat kein Licht: ein Licht hinzufügen oder der Welt eine Farbe geben.",
+    "The limit of transparent bounces is {}: where light meets as many clear surfaces, this Blender lets it through one more than the fit. Set 8 or more in Render Properties > Light Paths, and render the reference anew.": "Die Grenze der transparenten Durchgänge ist {}: wo Licht auf so viele klare Flächen trifft, lässt dieses Blender es durch eine mehr als die Anpassung. Unter Rendereigenschaften > Lichtpfade 8 oder mehr setzen und die Referenz neu rendern.",
     "Light '{}' has a limit of bounces (Max Bounces), which the fit has not.": "Licht '{}' hat eine Grenze der Reflexionen (Max Bounces), die die Anpassung nicht hat.",
     "Light '{}' has shader nodes other than one Emission with plain values: simplify them or turn Use Nodes off.": "Licht '{}' hat andere Shader-Nodes als eine Emission mit einfachen Werten: sie vereinfachen oder Nodes verwenden ausschalten.",
     "Light '{}' is a portal, which gives no light of its own; it is left out.": "Licht '{}' ist ein Portal, das kein eigenes Licht gibt; es wird weggelassen.",

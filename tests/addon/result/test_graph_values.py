@@ -20,6 +20,8 @@ def graph(scene: SimpleNamespace) -> SimpleNamespace:
     the roughness as well, and another ramp is nothing but the roughness of the coat."""
     bpy = scene.bpy
     material = bpy.data.materials["Glaze"]
+    if material.node_tree is None:
+        material.use_nodes = True
     tree = material.node_tree
     shader = tree.nodes["Principled BSDF"]
     group = bpy.data.node_groups.new("Wash", "ShaderNodeTree")

@@ -35,7 +35,7 @@ def begun(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch):
 
 
 def test_eevee_is_rendered_beside_cycles(scene: SimpleNamespace, begun) -> None:
-    found = begun("BLENDER_EEVEE")
+    found = begun("BLENDER_EEVEE" if scene.bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT")
     assert found.labels == ["Rendering in Cycles", "Comparing", "Rendering in Eevee", "Comparing"]
     assert ["--engine scene" in command for command in found.commands] == [False, False, True, False]
     assert "--name engine" in found.commands[3]

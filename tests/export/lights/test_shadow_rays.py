@@ -30,6 +30,9 @@ def test_the_picture_is_that_of_cycles_without_a_note(settings: tuple[str, ...],
     from studies.differential.study import try_scene
 
     outcome = try_scene(settings, SEED, tmp_path, size=32, samples=64)
+    if settings == ("stack",) and bpy.app.version < (5, 0, 0):  # which goes through one surface more
+        assert [note[:35] for note in outcome.notes] == ["The limit of transparent bounces is"]
+        return
     assert outcome.notes == ()
     assert outcome.difference is not None
     assert not outcome.difference.is_failure

@@ -17,7 +17,7 @@ from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
 from mfo_backend.job.run.job_scene import request_materials  # noqa: E402
 
-from ..scenes import add_camera, add_light, new_material  # noqa: E402
+from ..scenes import add_camera, add_light, new_material, world_color  # noqa: E402
 
 
 def ball(material: Any) -> Any:
@@ -175,9 +175,8 @@ def test_one_blender_evaluates_and_bakes(scene: Any, export: Any, monkeypatch: p
     from blender_addon.probe import client
 
     lit_scene(scene)
-    scene.world = bpy.data.worlds.new("World")
+    sky = world_color(scene, 1.0)
     tree = scene.world.node_tree
-    sky = next(node for node in tree.nodes if node.type == "BACKGROUND")
     gradient = tree.nodes.new("ShaderNodeTexGradient")
     tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], gradient.inputs[0])
     tree.links.new(gradient.outputs["Color"], sky.inputs["Color"])

@@ -38,6 +38,11 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
+def mix_node_input(material: Any) -> str:
+    """What this Blender calls the factor of a Mix Shader."""
+    return next(node for node in material.node_tree.nodes if node.type == "MIX_SHADER").inputs[0].name
+
+
 def named(request: dict[str, Any]) -> list[str]:
     """The names of what is free beside the fitted leaf."""
     target = request["materials"]["target_bsdf"]
@@ -72,6 +77,8 @@ def test_pictures_at_other_values_are_cycles(
     lit_scene(scene)
     build, others = CASES[name]
     material = material_of(build)
+    factor = mix_node_input(material)
+    others = {name.replace("Factor", factor): value for name, value in others.items()}
     target = ball(material)
     values = [value.name for value in mix_values(target_shader(material)) if value.by_default or value.factor]
     fit = {"parameters": ["base_color", "roughness", *values]}
