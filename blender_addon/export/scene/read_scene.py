@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...versions import (
-    counts_passages_exactly,
     cycles_settings,
     divides_adaptively,
     has_compositor,
@@ -42,6 +40,7 @@ from ..render_state import (
     rendered_layer,
     rendered_objects,
 )
+from .read_light_paths import BOUNCES, read_light_paths
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
 from .scene_data import RenderSettings, SceneData, Shape, Terminator, target_bsdf, target_shape
@@ -52,12 +51,6 @@ SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROB
 DEFAULT_SPP = 64
 # of the target's area; 0.09 on a ball of 12 segments, whose diffuse light is 0.6 % off, 0.02 on one of 24
 MOST_BENT = 0.05
-BOUNCES = ("diffuse", "glossy", "transmission")
-# of a ball, a box and a floor with a limit of 0 one block was 8 % too dark, the picture 1 %; with 1 the picture was
-# 0.06 % too dark, and with 2 or 4 nothing was above the noise. With no diffuse bounce a metal's picture was 0.4 % too
-# bright, one block 2 %
-FEW_BOUNCES = 2
-MANY_PASSAGES = 8  # Blender's default; one to three panes under lower limits were 2 to 18 % off in 4.5.15
 
 
 def read_scene(
@@ -172,38 +165,11 @@ def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings
         return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
     if cycles.sample_clamp_direct > 0.0:
         findings.note("Cycles clamps direct light; the fit does not.")
-    light_paths = _read_light_paths(cycles, findings)
+    light_paths = read_light_paths(cycles, findings)
     # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
     depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
     exposure = cycles.film_exposure
     return RenderSettings(pixel_filter, depth, scene.render.film_transparent, exposure, DEFAULT_SPP, light_paths)
-
-
-def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
-    """The settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
-    if not (cycles.caustics_reflective and cycles.caustics_refractive):
-        findings.note("Cycles removes caustics; the fit does not.")
-    for kind in ("glossy", "diffuse"):
-        limit = getattr(cycles, f"{kind}_bounces")
-        if limit < min(FEW_BOUNCES, cycles.max_bounces):
-            findings.note(
-                f"The limit of {kind} bounces is {limit}: what counts as one follows from Cycles' choice among the "
-                "lobes of a material, which the fit does not have exactly. Light over glossy surfaces may be several "
-                f"percent off; set {FEW_BOUNCES} or more in Render Properties > Light Paths, and render the reference "
-                "anew."
-            )
-    if 0 < cycles.transparent_max_bounces < MANY_PASSAGES and not counts_passages_exactly():
-        findings.note(
-            f"The limit of transparent bounces is {cycles.transparent_max_bounces}: where light meets as many clear "
-            "surfaces, this Blender lets it through one more than the fit. Set 8 or more in Render Properties > "
-            "Light Paths, and render the reference anew."
-        )
-    return {
-        "filter_glossy": cycles.blur_glossy,
-        "clamp_indirect": cycles.sample_clamp_indirect * cycles.film_exposure,
-        **{f"{kind}_bounces": getattr(cycles, f"{kind}_bounces") for kind in BOUNCES},
-        "transparent_bounces": cycles.transparent_max_bounces,
-    }
 
 
 class _Walk:
