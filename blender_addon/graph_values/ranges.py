@@ -50,6 +50,7 @@ SETTINGS = {
     ("ShaderNodeTexNoise", "Distortion"): Range(-2.0, 2.0, step=ROUGH_STEP),
 }
 LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
+DIRECTION = ("ShaderNodeNormalMap", "Color")  # an input whose colour is a direction
 SCALES = ("Scale", "Distance", "Lacunarity", "Brick Width", "Row Height", "Detail Scale")
 
 

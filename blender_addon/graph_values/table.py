@@ -85,9 +85,10 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
             known = found.setdefault(met.place, met)
             known.sockets.append(name) if name not in known.sockets else None
             known.asks_color |= is_color
+            known.is_direction &= met.is_direction
             if len(found) >= MOST:
                 break
-    return named_apart([_finished(met, tree) for met in found.values()])
+    return named_apart([_finished(met, tree) for met in found.values() if not (met.is_color and met.is_direction)])
 
 
 def chosen_values(values: Sequence[GraphValue], wanted: str | Sequence[str]) -> list[GraphValue]:
@@ -144,19 +145,22 @@ class _Met:
     sockets: list[str]
     asks_color: bool = False
     label: str = ""  # in place of the node's
+    is_direction: bool = False  # whether it comes only where its colour is a direction
 
 
 def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], links: Links) -> Iterator[_Met]:
     """The values upstream of a socket that lies in `groups`."""
     seen: set[tuple[Any, ...]] = set()
-    ways = [iter([(socket, groups)])]
+    ways = [(iter([(socket, groups)]), False)]
     while ways:
-        further, within = next(ways[-1], (None, ()))
+        further, within = next(ways[-1][0], (None, ()))
         if further is None:
             ways.pop()
-        elif not further.is_linked:
+            continue
+        is_direction = ways[-1][1] or (further.node.bl_idname, further.name) == ranges.DIRECTION
+        if not further.is_linked:
             if further.node.bl_idname != GROUP_INPUT and not is_tint(further.node):  # a tint has names of its own
-                yield from _input_values(further, within)
+                yield from _as_direction(_input_values(further, within), is_direction)
         elif (source := source_of(further, links)) is not None and not source.node.mute:
             node = source.node
             key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier)
@@ -164,8 +168,14 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
                 continue
             seen.add(key)
             if node.bl_idname not in (GROUP, GROUP_INPUT):
-                yield from _own_values(node, within, source)
-            ways.append(feeding(node, source, within))
+                yield from _as_direction(_own_values(node, within, source), is_direction)
+            ways.append((feeding(node, source, within), is_direction))
+
+
+def _as_direction(values: Iterable[_Met], is_direction: bool) -> Iterator[_Met]:
+    for met in values:
+        met.is_direction = is_direction
+        yield met
 
 
 def _tints(name: str, place: SocketPlace) -> Iterator[_Met]:

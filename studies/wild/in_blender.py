@@ -27,9 +27,10 @@ from blender_addon.headless import _open
 
 from .rows import how_read
 
-# Principled values that are moved for the start, with the range they are drawn from
+# values of reflecting shaders that are moved for the start, with the range they are drawn from
 MOVED = {
     "Base Color": (0.1, 0.9),
+    "Color": (0.1, 0.9),
     "Roughness": (0.2, 0.8),
     "Metallic": (0.0, 0.6),
 }
@@ -166,17 +167,17 @@ def _make_small(scene: bpy.types.Scene, size: int) -> None:
 
 
 def _move_values(material: bpy.types.Material, draw: random.Random) -> list[str]:
-    """Give unlinked values of every Principled node of the material others; returns which."""
+    """Give unlinked values of every reflecting shader of the material others; returns which."""
     moved = []
     for node in material.node_tree.nodes if material.node_tree else ():
-        if node.bl_idname != "ShaderNodeBsdfPrincipled":
+        if not node.bl_idname.startswith("ShaderNodeBsdf") or node.bl_idname == "ShaderNodeBsdfTransparent":
             continue
         for name, (low, high) in MOVED.items():
             socket = node.inputs.get(name)
             if socket is None or socket.is_linked:
                 continue
             drawn = [draw.uniform(low, high) for _ in range(3)]
-            socket.default_value = (*drawn, 1.0) if name == "Base Color" else drawn[0]
+            socket.default_value = (*drawn, 1.0) if socket.type == "RGBA" else drawn[0]
             moved.append(name)
     return moved
 

@@ -46,6 +46,9 @@ class Camera:
     shift_y: float
     clip_start: float
     clip_end: float
+    # of a perspective camera without shift; a radius of 0 leaves everything sharp
+    aperture_radius: float = 0.0
+    focus_distance: float = 0.0
 
     @property
     def fits_width(self) -> bool:
@@ -90,15 +93,22 @@ def sensor_element(camera: Camera, pixel_filter: PixelFilter, spp: int) -> Eleme
         matrix = camera.world @ moved @ TURN @ np.diag([half_width, half_width, 1.0, 1.0])
         add(sensor, transform("to_world", matrix))
     else:
-        sensor = plugin("sensor", "perspective", "sensor")
+        sensor = plugin("sensor", "thinlens" if camera.aperture_radius > 0.0 else "perspective", "sensor")
         add(
             sensor,
             transform("to_world", camera.world @ TURN),
             scalar("fov", camera.field_of_view),
             string("fov_axis", "x" if camera.fits_width else "y"),
-            scalar("principal_point_offset_x", camera.shift_x * fit / camera.width),
-            scalar("principal_point_offset_y", -camera.shift_y * fit / camera.height),
         )
+        if camera.aperture_radius > 0.0:
+            lens = scalar("aperture_radius", camera.aperture_radius), scalar("focus_distance", camera.focus_distance)
+            add(sensor, *lens)
+        else:
+            add(
+                sensor,
+                scalar("principal_point_offset_x", camera.shift_x * fit / camera.width),
+                scalar("principal_point_offset_y", -camera.shift_y * fit / camera.height),
+            )
     film = add(
         plugin("film", "hdrfilm"),
         integer("width", camera.width),

@@ -56,7 +56,37 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings
         shift_y=data.shift_y,
         clip_start=data.clip_start,
         clip_end=data.clip_end,
+        aperture_radius=_aperture_radius(data),
+        focus_distance=_focus_distance(evaluated, depsgraph),
     )
+
+
+def _aperture_radius(data: bpy.types.Camera) -> float:
+    """Radius of the lens in metres as Cycles has it (sync of blender/camera.cpp); 0 where everything is sharp."""
+    if not data.dof.use_dof or _why_sharp(data):
+        return 0.0
+    return data.lens * 1e-3 / (2.0 * max(data.dof.aperture_fstop, 1e-5))
+
+
+def _why_sharp(data: bpy.types.Camera) -> str:
+    """What of a camera the renderer's lens does not have."""
+    if data.type != "PERSP":
+        return "is orthographic"
+    return "has a shift" if data.shift_x != 0.0 or data.shift_y != 0.0 else ""
+
+
+def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
+    """Distance in metres from the lens to the plane that is sharp: along the view, of an object or a bone of it."""
+    dof = camera.data.dof
+    if dof.focus_object is None:
+        return max(dof.focus_distance, 1e-5)
+    item = dof.focus_object.evaluated_get(depsgraph)
+    place = item.matrix_world
+    bone = item.pose.bones.get(dof.focus_subtarget) if item.pose is not None else None
+    if bone is not None:
+        place = place @ bone.matrix
+    view = camera.matrix_world.col[2].xyz.normalized()
+    return max(abs(view.dot(camera.matrix_world.translation - place.translation)), 1e-5)
 
 
 def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
@@ -70,8 +100,12 @@ def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
         )
     if render.use_multiview:
         findings.error("Stereoscopy is on: turn it off to fit a single picture.", Fix("one_eye"))
-    if scene.camera.data.dof.use_dof:
-        findings.note(f"Camera '{scene.camera.name}': depth of field is left out, everything is sharp.")
+    camera, dof = scene.camera, scene.camera.data.dof
+    if dof.use_dof and _why_sharp(camera.data):
+        why = _why_sharp(camera.data)
+        findings.note(f"Camera '{camera.name}' {why}: its depth of field is left out, everything is sharp.")
+    elif dof.use_dof and (dof.aperture_blades > 0 or dof.aperture_ratio != 1.0):
+        findings.note(f"Camera '{camera.name}': the aperture is taken for a circle (Blades 0, Ratio 1).")
     if render.use_motion_blur:
         findings.note("Motion blur is left out: the scene is exported at the current frame.")
 

@@ -114,7 +114,7 @@ def read_scene(
         walk.note_coincident_faces()
         walk.note_bent_normals(seen)
         for each, shape in seen:
-            check_visible(data, shape, each.object, scene, depsgraph, findings)
+            check_visible(data, shape, each.object, each.slot, scene, depsgraph, findings)
     return data
 
 

@@ -19,6 +19,7 @@ def check_visible(
     data: SceneData,
     shape: Shape,
     target: bpy.types.Object,
+    slot: int,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     findings: Findings,
@@ -40,13 +41,21 @@ def check_visible(
     seen = seen[np.linspace(0, len(seen) - 1, min(len(seen), PROBES)).astype(int)]
     blocker = ""
     for point in seen:
-        hit = _first_hit(point, data, scene, depsgraph)
-        if hit is None or hit.original == target:
+        hit, face = _first_hit(point, data, scene, depsgraph)
+        if hit is None or (hit.original == target and _is_of_slot(hit, face, slot)):
             return
         blocker = hit.name
         if _lets_light_through(hit):
             return
     findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
+
+
+def _is_of_slot(item: bpy.types.Object, face: int, slot: int) -> bool:
+    """Whether a face of the target may have the fitted material; an object may hide some of its own faces."""
+    if item.type != "MESH" or face >= len(item.data.polygons):
+        return True
+    last = max(len(item.material_slots) - 1, 0)
+    return min(item.data.polygons[face].material_index, last) == slot
 
 
 def _points(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -63,7 +72,8 @@ def _points(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _first_hit(
     point: NDArray[np.float64], data: SceneData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-) -> bpy.types.Object | None:
+) -> tuple[bpy.types.Object | None, int]:
+    """What a ray from the camera towards a point meets first, and which face of it."""
     world = data.camera.world
     forward = -world[:3, 2]
     if data.camera.kind == "ORTHO":
@@ -72,8 +82,8 @@ def _first_hit(
         origin, direction = world[:3, 3], point - world[:3, 3]
     unit = direction / np.linalg.norm(direction)
     start = origin + unit * data.camera.clip_start / max(float(unit @ forward), 1e-6)
-    hit, _, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(unit))
-    return item if hit else None
+    hit, _, _, face, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(unit))
+    return (item if hit else None), face
 
 
 def _lets_light_through(item: bpy.types.Object) -> bool:

@@ -71,7 +71,9 @@ PANEL = {
     "Stereoscopy is on: turn it off to fit a single picture.": "Stereoskopie ist an: ausschalten, um ein einzelnes Bild anzupassen.",
     "The scene has no camera: add one and make it the active camera.": "Die Szene hat keine Kamera: eine hinzufügen und zur aktiven Kamera machen.",
     "Camera '{}' is of type {}: make it Perspective or Orthographic.": "Kamera '{}' ist vom Typ {}: sie perspektivisch oder orthografisch machen.",
-    "Camera '{}': depth of field is left out, everything is sharp.": "Kamera '{}': Schärfentiefe wird weggelassen, alles ist scharf.",
+    "Camera '{}' has a shift: its depth of field is left out, everything is sharp.": "Kamera '{}' ist verschoben: Ihre Schärfentiefe wird weggelassen, alles ist scharf.",
+    "Camera '{}' is orthographic: its depth of field is left out, everything is sharp.": "Kamera '{}' ist orthografisch: Ihre Schärfentiefe wird weggelassen, alles ist scharf.",
+    "Camera '{}': the aperture is taken for a circle (Blades 0, Ratio 1).": "Kamera '{}': Die Blende wird als Kreis genommen (Blades 0, Ratio 1).",
     "Motion blur is left out: the scene is exported at the current frame.": "Bewegungsunschärfe wird weggelassen: die Szene wird im aktuellen Einzelbild exportiert.",
     # buttons of the check
     "Select {}": "{} auswählen",

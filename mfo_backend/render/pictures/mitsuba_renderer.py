@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
 
 CAMERA_WORLD = "camera_world"  # id in the scene file, property of the integrator
 _MASK_RAYS = 4  # rays per pixel and axis that look for the target
+_PLASTIC = (0.7548776662466927, 0.5698402909980532)  # steps of the R2 sequence (Roberts 2018): even over a lens
 
 
 class MitsubaRenderer:
@@ -182,7 +183,11 @@ class MitsubaRenderer:
         corner = mi.Point2f(pixel % columns, pixel // columns)
         within = mi.Point2f(of_pixel % _MASK_RAYS, of_pixel // _MASK_RAYS)
         position = (corner + (within + 0.5) / _MASK_RAYS) / dr.opaque(mi.Point2f, (width, height))
-        ray, _ = self._sensor.sample_ray(0.5, 0.5, position, mi.Point2f(0.5))
+        on_lens = mi.Point2f(0.5)
+        if self._sensor.needs_aperture_sample():  # those of a pixel lie apart on it
+            along = (0.5 + mi.Float(of_pixel) * step for step in _PLASTIC)
+            on_lens = mi.Point2f(*(number - dr.floor(number) for number in along))
+        ray, _ = self._sensor.sample_ray(0.5, 0.5, position, on_lens)
         surface = self._scene.ray_intersect_preliminary(ray, coherent=True)
         target = mi.ShapePtr(self.shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel

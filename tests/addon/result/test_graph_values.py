@@ -77,6 +77,23 @@ def test_the_table(graph: SimpleNamespace) -> None:
     assert "Noise Texture/W" not in found  # of four dimensions alone
 
 
+def test_a_colour_that_is_a_direction_is_no_value(graph: SimpleNamespace) -> None:
+    """A fit would have one grey number for the blue of a flat normal map, and turn all normals with it."""
+    tree = graph.material.node_tree
+    normal, mix = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("NormalMap", "MixRGB"))
+    tree.links.new(normal.outputs[0], graph.shader.inputs["Normal"])
+    assert {name for name in values_of(graph.material) if "Normal Map" in name} == {"Normal Map/Strength"}
+    tree.links.new(mix.outputs[0], normal.inputs["Color"])
+    tree.links.new(graph.noise.outputs[1], mix.inputs["Color1"])
+    found = values_of(graph.material)
+    own = {value.name for value in found.values() if value.label == "Mix (Legacy)" or value.place.path == (mix.name,)}
+    assert [name.rsplit("/", 1)[1] for name in own] == ["Factor"]
+    assert "Normal" in found["Noise Texture/Scale"].sockets  # it stays one, with all that it reaches
+    tree.links.new(mix.outputs[0], graph.shader.inputs["Base Color"])
+    (paint,) = (v for v in values_of(graph.material).values() if v.place.path == (mix.name,) and v.place.size == 3)
+    assert set(paint.sockets) == {"Base Color", "Normal"}  # here it is a colour, too
+
+
 def test_sets_and_names(graph: SimpleNamespace) -> None:
     from blender_addon.graph_values.table import GraphValueError, chosen_values
 

@@ -77,6 +77,47 @@ def test_picture_equals_that_of_cycles(
         assert centroids[0] == pytest.approx(centroids[1], abs=0.03)  # pixels
 
 
+@pytest.mark.parametrize("by_object", [False, True])
+def test_depth_of_field_equals_that_of_cycles(
+    by_object: bool, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    """One white square on the plane that is sharp, one far behind it; the focus by distance or by an object."""
+    scene.render.resolution_x, scene.render.resolution_y = 48, 32
+    scene.cycles.samples = 256
+    white = emission_material("White", (0.8, 0.8, 0.8))
+    for x, z in ((-0.7, 0.0), (0.8, -3.0)):
+        corners = [(x - 0.4, -0.4, z), (x + 0.4, -0.4, z), (x + 0.4, 0.4, z), (x - 0.4, 0.4, z)]
+        add_mesh(f"At {z}", corners, [(0, 1, 2, 3)], white)
+    target = add_quad("Target", 0.02, 0.3, new_material("Target"))
+    camera = add_camera("PERSP", (0.0, 0.0, 4.0), lens=40.0)
+    dof = camera.data.dof
+    dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.1, 9.0 if by_object else 4.0
+    if by_object:  # at the side: the distance is along the view
+        dof.focus_object = bpy.data.objects.new("Focus", None)
+        scene.collection.objects.link(dof.focus_object)
+        dof.focus_object.location = (1.5, 0.7, 0.0)
+    expected = render_cycles()
+    report = export(target)
+    assert report.notes == ()
+    found = render_mitsuba(report, 256)
+    assert ((expected[..., 0] > 0.05) & (expected[..., 0] < 0.7)).sum() > 60  # it is blurred
+    assert np.abs(found - expected).mean() < 0.005
+
+
+def test_what_of_a_lens_the_fit_does_not_have_is_said(scene: Any) -> None:
+    world_color(scene, 1.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    camera = add_camera("PERSP", (0, 0, 5))
+    camera.data.dof.use_dof, camera.data.dof.aperture_blades = True, 5
+    circle = "Camera 'Camera': the aperture is taken for a circle (Blades 0, Ratio 1)."
+    assert check_export(bpy.context, target) == ([], [circle])
+    camera.data.shift_x = 0.1
+    sharp = "its depth of field is left out, everything is sharp."
+    assert check_export(bpy.context, target) == ([], [f"Camera 'Camera' has a shift: {sharp}"])
+    camera.data.type = "ORTHO"
+    assert check_export(bpy.context, target) == ([], [f"Camera 'Camera' is orthographic: {sharp}"])
+
+
 @pytest.mark.parametrize(("kind", "width"), [("BOX", 1.0), ("BLACKMAN_HARRIS", 1.5), ("GAUSSIAN", 1.5)])
 def test_pixel_filter_blurs_an_edge_alike(
     kind: str, width: float, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
@@ -101,16 +142,13 @@ def test_pixel_filter_blurs_an_edge_alike(
 
 
 def test_what_a_camera_loses_is_said(scene: Any) -> None:
-    camera = add_camera("PERSP", (0, 0, 5))
+    add_camera("PERSP", (0, 0, 5))
     target = add_quad("Target", 1.0, 0.0, new_material("Target"))
     world_color(scene, 1.0)
-    camera.data.dof.use_dof = scene.render.use_motion_blur = True
+    scene.render.use_motion_blur = True
     assert check_export(bpy.context, target) == (
         [],
-        [
-            "Camera 'Camera': depth of field is left out, everything is sharp.",
-            "Motion blur is left out: the scene is exported at the current frame.",
-        ],
+        ["Motion blur is left out: the scene is exported at the current frame."],
     )
     scene.render.use_multiview = True
     assert check_export(bpy.context, target)[0] == ["Stereoscopy is on: turn it off to fit a single picture."]

@@ -61,3 +61,15 @@ def test_a_gap_in_what_hides_it_is_found(faces: int, lit: Any, export: Any) -> N
     lid.scale = (1.01, 1.01, 1.0)
     with pytest.raises(ExportError, match="hidden behind 'Lid'"):
         export(target)
+
+
+def test_an_object_may_hide_its_own_slot(lit: Any, export: Any) -> None:
+    """A small square of another material below a large one of the same object."""
+    corners = [(x * s, y * s, z) for s, z in ((0.2, 0.0), (0.5, 1.0)) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    target = add_mesh("Target", corners, [(0, 1, 2, 3), (4, 5, 6, 7)], new_material("Paint"))
+    target.data.materials.append(new_material("Lid"))
+    target.data.polygons[1].material_index = 1
+    with pytest.raises(ExportError, match="it is hidden behind 'Target'"):
+        export(target)
+    target.active_material_index = 1
+    export(target)
