@@ -69,10 +69,12 @@ def _aperture_radius(data: bpy.types.Camera) -> float:
 
 
 def _why_sharp(data: bpy.types.Camera) -> str:
-    """What of a camera the renderer's lens does not have."""
+    """The sentence on what of a camera the renderer's lens does not have, for the camera's name."""
     if data.type != "PERSP":
-        return "is orthographic"
-    return "has a shift" if data.shift_x != 0.0 or data.shift_y != 0.0 else ""
+        return "Camera '{}' is orthographic: its depth of field is left out, everything is sharp."
+    if data.shift_x != 0.0 or data.shift_y != 0.0:
+        return "Camera '{}' has a shift: its depth of field is left out, everything is sharp."
+    return ""
 
 
 def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
@@ -102,8 +104,7 @@ def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
         findings.error("Stereoscopy is on: turn it off to fit a single picture.", Fix("one_eye"))
     camera, dof = scene.camera, scene.camera.data.dof
     if dof.use_dof and _why_sharp(camera.data):
-        why = _why_sharp(camera.data)
-        findings.note(f"Camera '{camera.name}' {why}: its depth of field is left out, everything is sharp.")
+        findings.note(_why_sharp(camera.data).format(camera.name))
     elif dof.use_dof and (dof.aperture_blades > 0 or dof.aperture_ratio != 1.0):
         findings.note(f"Camera '{camera.name}': the aperture is taken for a circle (Blades 0, Ratio 1).")
     if render.use_motion_blur:

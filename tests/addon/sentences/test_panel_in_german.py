@@ -17,7 +17,7 @@ from .test_sentences import ENGLISH
 SAME = {"Material Fit", "FLIP", "Live", "Material", "Start", "A/B"}  # in both languages
 BLENDERS = "Values to Fit"  # looked up by Blender within a longer text
 NOTES = [
-    "Camera 'Camera': depth of field is left out, everything is sharp.",
+    "Camera 'Camera' has a shift: its depth of field is left out, everything is sharp.",
     "Light 'the and of' is a portal, which gives no light of its own; it is left out.",
     "Roughness of material 'Glaze' is linked to the node 'Noise' (Noise Texture), which cannot be exported; the "
     "socket's own value is used.",
