@@ -78,17 +78,18 @@ def baked_surface(
 
 
 def _leaves(closures: ClosureTree, bake: _Bake) -> list[dict[str, Any]]:
-    asked: list[tuple[dict[str, Any], str, Value]] = []
+    asked: list[tuple[dict[str, Any], str, Value, bool]] = []
     leaves = []
     for leaf in closures.leaves:
         found: dict[str, Any] = {"kind": leaf.node.bl_idname, "label": leaf.node.bl_label, "sockets": {}}
         for name in ("distribution", "subsurface_method", "fresnel_type"):
             if hasattr(leaf.node, name):
                 found[name] = getattr(leaf.node, name)
-        asked.append((found, "weight", leaf.weight))
+        asked.append((found, "weight", leaf.weight, False))
         for socket in leaf.node.inputs:
             if socket.name not in SKIPPED and socket.type != "SHADER" and socket.enabled:
-                asked.append((found["sockets"], socket.name, closures.value(leaf.path, socket)))
+                several = socket.type != "VALUE"  # whatever is linked: a colour on Roughness is one number
+                asked.append((found["sockets"], socket.name, closures.value(leaf.path, socket), several))
         leaves.append(found)
     bake.values(asked)
     for found, leaf in zip(leaves, closures.leaves, strict=True):
@@ -267,13 +268,16 @@ class _Bake:
             bpy.data.images.remove(image)
             bpy.data.images.remove(blank)
 
-    def values(self, asked: list[tuple[dict[str, Any], str, Value]]) -> None:
-        """Put each value, or the name of its picture, where it is asked for; three numbers share a bake."""
+    def values(self, asked: list[tuple[dict[str, Any], str, Value, bool]]) -> None:
+        """Put each value, or the name of its picture, where it is asked for; three numbers share a bake.
+
+        The last of each says whether its socket holds several numbers.
+        """
         numbers = []
-        for place, name, value in asked:
+        for place, name, value, several in asked:
             if not hasattr(value, "is_output"):
                 place[name] = value
-            elif value.type in ("RGBA", "VECTOR"):
+            elif several:
                 place[name] = self._put(self._of_socket(value))
             else:
                 numbers.append((place, name, value))

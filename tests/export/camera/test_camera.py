@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
+from bpy_extras.object_utils import world_to_camera_view  # pyright: ignore[reportMissingImports]
+from mathutils import Vector  # pyright: ignore[reportMissingImports]
 
 from blender_addon.export.camera.camera_model import PixelFilter, sensor_element
 from blender_addon.export.camera.read_camera import read_camera

@@ -98,11 +98,24 @@ def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
     nodes.tree.links.new(place, nodes.tree.get_output_node("CYCLES").inputs["Displacement"])
     for axis, socket in (("X", "Roughness"), ("Y", "Metallic")):
         nodes.tree.links.new(apart.outputs[axis], nodes.principled.inputs[socket])
+    blue = nodes.new("RGB")  # a colour on a number, which takes its luminance, and the other way round
+    blue.outputs[0].default_value = (0.1, 0.2, 0.9, 1.0)
+    nodes.tree.links.new(blue.outputs[0], nodes.principled.inputs["Coat Weight"])
+    nodes.tree.links.new(apart.outputs["X"], nodes.principled.inputs["Specular Tint"])
     report = export(target)
     bsdf, positions, uv = shape_of(report)
     expected = 0.5 * positions + 0.5
     # a vertex lies within a texel of its place, and a texel is about a hundredth of the ball wide
-    for socket, values in (("Base Color", expected), ("Roughness", expected[:, :1]), ("Metallic", expected[:, 1:2])):
+    sockets = report.request["materials"][bsdf]["sockets"]
+    luminance = 0.2126 * 0.1 + 0.7152 * 0.2 + 0.0722 * 0.9
+    assert sockets["Coat Weight"]["value"] == pytest.approx(luminance, abs=1e-3)
+    grey = np.repeat(expected[:, :1], 3, axis=1)
+    for socket, values in (
+        ("Base Color", expected),
+        ("Roughness", expected[:, :1]),
+        ("Metallic", expected[:, 1:2]),
+        ("Specular Tint", grey),
+    ):
         found = at_vertices(texture(report, bsdf, socket), uv)[:, : values.shape[1]]
         assert np.sqrt(np.mean((found - values) ** 2)) < 0.01, socket
     for left in ("what is linked to Coat Normal is", "its displacement is"):
