@@ -22,9 +22,9 @@ def graph(scene: SimpleNamespace) -> SimpleNamespace:
     material = bpy.data.materials["Glaze"]
     if material.node_tree is None:
         material.use_nodes = True
-    tree = material.node_tree
+    tree: Any = material.node_tree
     shader = tree.nodes["Principled BSDF"]
-    group = bpy.data.node_groups.new("Wash", "ShaderNodeTree")
+    group: Any = bpy.data.node_groups.new("Wash", "ShaderNodeTree")
     group.interface.new_socket("Under", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
