@@ -107,6 +107,7 @@ def recover(chosen: argparse.Namespace, material: Row) -> Row:
         child([blender, "prepare", *prepare, f"--out={folder}", f"--size={chosen.size}", samples], RENDER_SECONDS)
         began = time.monotonic()
         fit = [f"{folder}/start.blend", target, f"--reference={folder}/reference.exr", f"--out={job}"]
+        fit += ["--shader=all"] if material["sort"] == "mix" else []  # all of them have moved
         said = child(
             ["mfo_backend", "blend", *fit, "--apply", "--make-local", f"--save-as={fitted}", "--json"], FIT_SECONDS
         )
