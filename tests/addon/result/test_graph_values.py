@@ -43,10 +43,10 @@ def graph(scene: SimpleNamespace) -> SimpleNamespace:
     tree.links.new(ramp.outputs["Color"], shader.inputs["Roughness"])
     tree.links.new(coat.outputs["Color"], shader.inputs["Coat Roughness"])
     tree.links.new(node.outputs[0], shader.inputs["Base Color"])
-    other: Any = bpy.data.materials.new("Other")
+    other = bpy.data.materials.new("Other")
     if other.node_tree is None:
         other.use_nodes = True
-    other.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
+    bpy.data.materials["Other"].node_tree.nodes.new("ShaderNodeGroup").node_tree = group
     return SimpleNamespace(
         bpy=bpy, material=material, ramp=ramp, coat=coat, noise=noise, node=node, group=group, shader=shader
     )
