@@ -147,8 +147,10 @@ def _proposal(
 ) -> NextPicture | None:
     worst = {name: float(after[table.slice_of(name)].max()) for name in wanted}
     before = {name: float(now[table.slice_of(name)].max()) for name in wanted}
-    settles = tuple(name for name, sd in worst.items() if sd < DETERMINED_BELOW)
-    surer = tuple(name for name, sd in worst.items() if WORTH_A_PICTURE * sd < before[name] and name not in settles)
+    # a value may be called undetermined for what no deviation says, such as a rival: no picture of this promises that
+    falls = [name for name, sd in worst.items() if WORTH_A_PICTURE * sd < before[name]]
+    settles = tuple(name for name in falls if worst[name] < DETERMINED_BELOW)
+    surer = tuple(name for name in falls if name not in settles)
     if not settles and not surer:
         return None
     width = {name: table[name].upper - table[name].lower for name in wanted}
