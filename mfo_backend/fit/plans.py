@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 NEAR_EVALUATIONS = 12  # of a solve that begins near its end: where light is sampled, and of what is tried from there
 PERCEPTUAL_EVALUATIONS = 25  # of a stage, from each start
+# Squared: most rays of a pixel of one of several materials. With 256 half of the residual of a chest of 411 pixels was
+# the recording's own noise, which put a wrong material before the truth by a chi squared of 12; with 1024 the truth
+# came first by 20 (docs/notebook/several_materials.md). Larger: more time. Smaller: chance decides on small targets.
+FINEST_AMONG_OTHERS = 32
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,9 @@ class RecordedPlan:
         Of a solve that tries to leave a basin where every light is exact.
     basins, basin_factor
         Solutions the preset `best` keeps alive to the end, and how much more than the best one they may cost.
+    alike
+        Whether materials that are known to be taken for the solution are tried where light is sampled, too. Under exact
+        lights they always are.
     """
 
     scan: bool = True
@@ -85,6 +92,11 @@ class RecordedPlan:
     other_evaluations: int = 25
     basins: int = 3
     basin_factor: float = 1.5
+    alike: bool = False
+
+    def among_others(self) -> RecordedPlan:
+        """The same for one of several materials, which may fill few pixels: more rays for each, more basins."""
+        return replace(self, grid_finest=FINEST_AMONG_OTHERS, alike=True)
 
     @staticmethod
     def of(preset: str) -> RecordedPlan:

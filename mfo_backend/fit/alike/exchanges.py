@@ -76,6 +76,15 @@ def moved(x: Vector, table: ParameterTable) -> Iterator[Vector]:
             yield _with(x, table, sheen_weight=0.5, sheen_roughness=roughness)
 
 
+def taken_for(x: Vector, table: ParameterTable) -> tuple[Vector, ...]:
+    """Materials that may be taken for `x` where light is sampled: those of `moved`, and a metal for a dielectric."""
+    others = list(moved(x, table))
+    if "metallic" in table.names:
+        dielectric, metal = OPPOSITE
+        others.insert(0, _with(x, table, metallic=metal if _value(x, table, "metallic") < 0.5 else dielectric))
+    return tuple(np.clip(other, table.lower, table.upper) for other in others)
+
+
 def metal_rivals(
     problem: Problem, solve: SolveBelow, found: Solution, table: ParameterTable
 ) -> tuple[Solution, tuple[Rival, ...]]:

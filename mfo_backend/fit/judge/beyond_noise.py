@@ -9,7 +9,7 @@ sum of the products' squares is the standard deviation of their sum.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,15 @@ NEXT = ((0, 1), (1, 0), (1, 1), (1, -1))
 BLUR = 2.0  # pixels: of what an eye is asked about, so that it does not look at noise
 REACH = 4  # pixels to each side of one that its noise is taken from
 LEAST_PIXELS = 40  # fewer say too little
+# Below as many, noise is drawn from the pictures themselves, with their tails and colours: normal numbers of the same
+# variance look larger, by up to 0.025 of FLIP in rooms of Cycles, and hid errors of 0.02 to 0.05 on targets of 140 to
+# 430 pixels (docs/notebook/several_materials.md). Larger: also the targets that the limits were measured on.
+FEW_PIXELS = 500
+# What neighbours' noise adds to the variance of a mean, relative to it, at most. Under the Gaussian pixel filter of
+# exported scenes, s = 0.4155 pixels, exp(-d^2 / 4 s^2) over eight neighbours is 1.16: half of that beside a reference
+# of as much noise. More is taken for an error. Larger: fine errors count as noise. Smaller: noise counts as error.
+FILTERED = 0.6
+DRAWS = 4  # whose mean is the noise of few pixels; of one, FLIP scattered by 0.005
 CHANCE = 2.0  # standard deviations of chance that are taken from what neighbours share
 
 Light = NDArray[np.floating]
@@ -48,19 +57,46 @@ def beyond_noise(
     shown = [_display(_blurred(light, mask)) for light in (reference, result)]
     seen = _mean_flip(shown[0], shown[1], mask)
     apart = np.where(mask[..., None], reference - result, 0.0).astype(np.float64)
-    noise = np.sqrt(_noise_variance(apart, mask, lags))[..., None]
-    drawn = noise * np.random.default_rng(0).standard_normal(apart.shape)
-    noisy = _display(np.maximum(_blurred(result, mask) + _blurred(drawn, mask), 0.0))
+    variance = _noise_variance(apart, mask, lags)
+    drawn = _of_few(apart, variance, mask, lags) if np.count_nonzero(mask) < FEW_PIXELS else _normal(apart, variance)
+    calm = _blurred(result, mask)
+    noisy = [_display(np.maximum(calm + _blurred(noise, mask), 0.0)) for noise in drawn]
     displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
     shared, deviation = _shared_square(displayed, mask, lags)
     fine = max(abs(square) - CHANCE * sd for square, sd in (_shared_square(displayed, mask, of) for of in FINE))
     return Difference(
         seen,
-        _mean_flip(shown[1], noisy, mask),
+        float(np.mean([_mean_flip(shown[1], picture, mask) for picture in noisy])),
         max(shared, 0.0) ** 0.5,
         max(shared - CHANCE * deviation, 0.0) ** 0.5,
         max(fine, 0.0) ** 0.5,
     )
+
+
+def _normal(apart: Light, variance: NDArray[np.float64]) -> Iterator[Light]:
+    """Normal noise of this variance (height, width)."""
+    yield np.sqrt(variance)[..., None] * np.random.default_rng(0).standard_normal(apart.shape)
+
+
+def _of_few(
+    apart: Light, variance: NDArray[np.float64], mask: Mask, lags: Sequence[tuple[int, int]]
+) -> Iterator[Light]:
+    """The differences themselves, scaled to this variance around each pixel, with signs that are drawn.
+
+    What pixels side by side share beyond what those farther apart do is noise as well, as of a pixel filter that is
+    wider than a pixel. Drawn signs lose it, so it is made up for in size: in a mean over neighbours it adds to the
+    variance.
+    """
+    squares = sums_around(np.square(apart).mean(axis=-1) * mask, REACH)
+    around = squares / np.maximum(sums_around(mask.astype(np.float64), REACH), 1.0)
+    wide = max(_shared_square(apart, mask, lags)[0], 0.0)
+    beside, across = (max(_shared_square(apart, mask, of)[0] - wide, 0.0) for of in FINE[:2])
+    mean = max(float(variance[mask].mean()), 1e-30)
+    more = 1.0 + min(4.0 * (beside + across) / mean, FILTERED)  # four neighbours of each kind
+    scale = np.sqrt(variance * more / np.maximum(around, 1e-30))
+    for draw in range(DRAWS):
+        sign = np.where(np.random.default_rng(draw).random(mask.shape) < 0.5, -scale, scale)
+        yield sign[..., None] * apart
 
 
 def _shared_square(apart: Light, mask: Mask, lags: Sequence[tuple[int, int]]) -> tuple[float, float]:

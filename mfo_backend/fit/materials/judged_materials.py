@@ -23,6 +23,9 @@ from .rounds import MOST_ROUNDS, Member, Turns, check_members, show_all, take_tu
 
 # Paths of the picture that is judged, and samples of a pixel at least: as `judge.verification` takes of a whole one
 MOST_PATHS, LEAST_SAMPLES = 1 << 21, 4
+# Times `verify_spp`: samples of that picture at most. Noise of its own hides what few pixels show: with 64 samples a
+# pixel in rooms of six, errors of 0.016 to 0.053 looked the same (docs/notebook/several_materials.md).
+MORE_SAMPLES = 4
 START_SAMPLES = 8  # of a pixel of the picture before the fit, which only says from where its errors came
 NOT_STILL = (
     "The light between the materials still moved after {rounds} rounds: fit again from the applied values, or fit "
@@ -106,7 +109,7 @@ def _judged_all(
 ) -> tuple[list[FitResult], tuple[Pixels, Pixels]]:
     """The results by a picture of all these vectors, and its halves."""
     stopped = tasks[0].should_stop()
-    halves = _halves(members, vectors, LEAST_SAMPLES if stopped else members[0].settings.verify_spp)
+    halves = _halves(members, vectors, LEAST_SAMPLES if stopped else MORE_SAMPLES * members[0].settings.verify_spp)
     end = np.mean(halves, axis=0, dtype=np.float32)
     fitted = np.any([task.mask for task in tasks], axis=0)
     judged = []

@@ -18,6 +18,7 @@ from ...types.image import Image, Pixels
 from ...types.result import FitResult
 from ...types.status import Status
 from ..judge.checked_reference import check_reference
+from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..recover_material import recover_material
 from ..result.outcome import FitOutcome
@@ -133,10 +134,11 @@ def take_turns(
             still = False
             member = members[k]
             quick = replace(member.settings, preset="fast", verify_spp=LOOK_SAMPLES, losses=None)
+            plan = None if number == 1 else RecordedPlan.of(member.settings.preset).among_others()
             try:
                 outcome = recover_material(
                     member.renderer, reference, quick if number == 1 else member.settings, display=display,
-                    listener=course.of(k, number), should_stop=should_stop, hand_over=False,
+                    listener=course.of(k, number), should_stop=should_stop, hand_over=False, plan=plan,
                     begin=None if number == 1 or (number == 2 and moved) else present[k], judged=False,
                 )  # fmt: skip
             except UnrecordableError as error:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...solve.bounded_least_squares import Solution
-from ..alike.exchanges import best_basin, metal_rivals, width_rivals
+from ..alike.exchanges import best_basin, metal_rivals, taken_for, width_rivals
 from ..alike.simplest import OtherEnds, SimplestEnd
 from ..alike.unneeded_lobes import solve_without_unneeded
 from ..plans import NEAR_EVALUATIONS
@@ -83,7 +83,9 @@ def refine_sampled(setting: Setting, basins: Sequence[Vector], make: MakeResidua
         stage.vector = x
         # the first weights came from a model that was still off
         found = _problems(recording, x, make, weigh, solve_all=True)
-        rival = better_basin(setting, found.refined.few, x, others)
+        alike = setting.plan.alike
+        others = [*others, *(taken_for(x, setting.table) if alike else ())]
+        rival = better_basin(setting, found.refined.few, x, others, significant=alike)
         if rival is not None:
             known, number = found.refined.few.equations(x).cost, recording.number
             del found, recording

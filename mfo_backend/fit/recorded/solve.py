@@ -12,7 +12,7 @@ from ...solve.bounded_least_squares import NormalEquations, Solution, SolveLimit
 from ..alike.unneeded_lobes import Box
 from ..result.course import Stage
 from ..squares.problem import Problem
-from ..tolerances import CLEARLY_LOWER
+from ..tolerances import CLEARLY_LOWER, SIGNIFICANT
 from .recording import Setting, Vector
 
 COST_CHANGE = 1e-5  # relative, of a step that ends a solve
@@ -55,8 +55,13 @@ def solve_within(setting: Setting, problem: Problem, start: Vector, box: Box, *,
     return solve(setting, problem, start, FEW_EVALUATIONS, box=box, wanted=wanted).x
 
 
-def better_basin(setting: Setting, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
-    """The best of the other basins on the same problem, if it is clearly better than `found`."""
+def better_basin(
+    setting: Setting, problem: Problem, found: Vector, others: Sequence[Vector], *, significant: bool = False
+) -> Vector | None:
+    """The best of the other basins on the same problem, if it is clearly better than `found`.
+
+    Of few residuals a small part is chance: one that is `significant` has a chi squared that noise does not explain.
+    """
     if not others or setting.course.should_stop():
         return None
     evaluations = setting.plan.trial_evaluations
@@ -64,7 +69,8 @@ def better_basin(setting: Setting, problem: Problem, found: Vector, others: Sequ
     known = solve(setting, problem, found, evaluations).equations.cost
     rivals = (solve(setting, problem, x, evaluations, known=known) for x in others)
     best = min(rivals, key=lambda rival: rival.equations.cost)
-    return best.x if best.equations.cost < CLEARLY_LOWER * known else None
+    lower = min(CLEARLY_LOWER, 1.0 - SIGNIFICANT / problem.independent) if significant else CLEARLY_LOWER
+    return best.x if best.equations.cost < lower * known else None
 
 
 def _limits(setting: Setting, problem: Problem, evaluations: int) -> SolveLimits:

@@ -11,6 +11,7 @@ from mfo_backend.fit.judge.beyond_noise import beyond_noise
 from mfo_backend.fit.judge.verdict import is_worse, judge
 from mfo_backend.metrics.display.colour import srgb_from_linear
 from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.metrics.flip.ldr_flip import flip_map
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.verdict import Cause, Verdict
 
@@ -70,6 +71,29 @@ def test_what_neighbours_share_is_found_in_noise_of_any_size():
         found = beyond_noise(noisy(level, share, 1), noisy(np.full_like(level, other), share, 2), MASK)
         assert found.shared == pytest.approx(apart, rel=0.02 + 2.0 * share)
         assert found.shared_at_least <= found.shared
+
+
+def flickering(picture, seed):
+    """With noise of one colour whose tails are heavier than those of any variance."""
+    tails = np.random.default_rng(seed).standard_t(2.2, picture.shape[:2])
+    return np.maximum(picture * (1.0 + 0.08 * tails[..., None]), 0.0).astype(np.float64)
+
+
+@pytest.mark.parametrize("radius", [8, 12])
+def test_few_pixels_hide_no_difference_in_the_tails_of_noise(radius):
+    """On 190 to 440 pixels, by the pictures without noise: what they differ in by FLIP, and that two are the same."""
+    mask = np.hypot(ROWS - 48, COLUMNS - 48) < radius
+    calm, other = (gaussian_filter(scene(ball=ball), (2, 2, 0)) for ball in (0.6, 0.55))
+    apart = flip_map(srgb_from_linear(calm), srgb_from_linear(other))[mask].mean()
+    visible = {
+        ball: [
+            beyond_noise(flickering(scene(), k), flickering(scene(ball=ball), 100 + k), mask).visible for k in range(6)
+        ]
+        for ball in (0.6, 0.55)
+    }
+    assert np.mean(visible[0.6]) < 0.01
+    assert np.min(visible[0.55]) > 0.025
+    assert 0.4 * apart < np.mean(visible[0.55]) < apart
 
 
 def test_few_pixels_have_no_verdict():

@@ -39,3 +39,23 @@ def test_the_better_valley_is_gone_on_with(others, expected):
     assert (rival is None) == (expected is None)
     if rival is not None:
         assert rival[0] == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize(("independent", "significant", "found"), [(5, True, False), (5, False, True), (20, True, True)])
+def test_of_few_residuals_a_lower_cost_may_be_chance(independent, significant, found):
+    """The valley at -0.995 costs 0.0199; that at 0.4 half of it: 2.5 of chi squared of 5 residuals, 10 of 20."""
+
+    def equations(x):
+        here = two_valleys(x)
+        return NormalEquations(0.0199 - 0.01 * (x[0] > 0.0), 0.0 * here.gradient, here.hessian)
+
+    setting = SimpleNamespace(
+        plan=RecordedPlan(),
+        table=SimpleNamespace(lower=np.array([-3.0]), upper=np.array([3.0])),
+        course=SimpleNamespace(should_stop=lambda: False),
+        sampled=True,
+    )
+    problem = SimpleNamespace(equations=equations, independent=independent, near=None)
+    left, right = np.array([-0.995]), np.array([0.4])
+    rival = better_basin(setting, problem, left, [right], significant=significant)
+    assert (rival is not None) is found
