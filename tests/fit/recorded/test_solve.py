@@ -41,7 +41,9 @@ def test_the_better_valley_is_gone_on_with(others, expected):
         assert rival[0] == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize(("independent", "significant", "found"), [(5, True, False), (5, False, True), (20, True, True)])
+@pytest.mark.parametrize(
+    ("independent", "significant", "found"), [(5, True, False), (5, False, True), (20, True, True)]
+)
 def test_of_few_residuals_a_lower_cost_may_be_chance(independent, significant, found):
     """The valley at -0.995 costs 0.0199; that at 0.4 half of it: 2.5 of chi squared of 5 residuals, 10 of 20."""
 
