@@ -31,8 +31,8 @@ BLUR = 2.0  # pixels: of what an eye is asked about, so that it does not look at
 REACH = 4  # pixels to each side of one that its noise is taken from
 LEAST_PIXELS = 40  # fewer say too little
 # Below as many, noise is drawn from the pictures themselves, with their tails and colours: normal numbers of the same
-# variance look larger, by up to 0.025 of FLIP in rooms of Cycles, and hid errors of 0.02 to 0.05 on targets of 140 to
-# 430 pixels (docs/notebook/several_materials.md). Larger: also the targets that the limits were measured on.
+# variance look larger, by up to 0.03 of FLIP in rooms of Cycles, and made errors of 0.02 look like 0.01 on targets of
+# 360 to 420 pixels (docs/notebook/several_materials.md). Larger: also the targets that the limits were measured on.
 FEW_PIXELS = 500
 # What neighbours' noise adds to the variance of a mean, relative to it, at most. Under the Gaussian pixel filter of
 # exported scenes, s = 0.4155 pixels, exp(-d^2 / 4 s^2) over eight neighbours is 1.16: half of that beside a reference
