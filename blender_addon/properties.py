@@ -19,6 +19,7 @@ from bpy.props import (
 
 from .picture_part import MFO_PG_part, has_pixels
 from .result import comparison, overlay
+from .translations import CONTEXT
 from .versions import RELATIVE_PATH
 
 # name, label, description of Mitsuba's `principled`; `specular` and `eta` set the same reflectance
@@ -155,7 +156,9 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         update=_opacity_changed,
     )
-    preset: EnumProperty(name="Preset", description="How the values are searched", items=PRESET_ITEMS)
+    preset: EnumProperty(
+        name="Preset", description="How the values are searched", items=PRESET_ITEMS, translation_context=CONTEXT
+    )
     parameter_set: EnumProperty(
         name="Parameters",
         description="Which values may change; for a socket with a link, those of the nodes that feed it",

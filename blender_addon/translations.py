@@ -204,7 +204,7 @@ _GERMAN_OPERATORS = {
     "Paint a Mask": "Maske malen",
     "Show the Reference": "Die Referenz zeigen",
     "Whole Picture": "Ganzes Bild",
-    "Fit Several Materials": "Mehrere Materialien anpassen",
+    "Fit Several Materials": "Mehrere anpassen",
     "Fit One Material": "Ein Material anpassen",
     "Show Result of Material": "Ergebnis des Materials zeigen",
     "Add Another Picture": "Weiteres Bild hinzufügen",
@@ -260,9 +260,11 @@ _GERMAN_OPERATORS = {
 }
 # fmt: on
 
+CONTEXT = "Material Fit"  # of names that Blender's own German has as other words: Fast as "Einfügen"
 LANGUAGES = {
     "de": {("*", text): german for text, german in _GERMAN.items()}
-    | {("Operator", text): german for text, german in _GERMAN_OPERATORS.items()},
+    | {("Operator", text): german for text, german in _GERMAN_OPERATORS.items()}
+    | {(CONTEXT, text): _GERMAN[text] for text in ("Preset", "Balanced", "Best", "Fast", "Paper")},
 }
 LANGUAGES["de_DE"] = LANGUAGES["de"]  # what Blender 4.3 and 5.2 call it
 

@@ -86,8 +86,11 @@ def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     else:
         material = obj.active_material
         row = layout.row()
-        row.label(text=obj.name, icon="OBJECT_DATA")
-        row.label(text=material.name if material else "No material", icon="MATERIAL" if material else "ERROR")
+        row.label(text=obj.name, icon="OBJECT_DATA", translate=False)  # a name is nobody's to translate
+        if material is None:
+            row.label(text="No material", icon="ERROR")
+        else:
+            row.label(text=material.name, icon="MATERIAL", translate=False)
     layout.operator("mfo.list_materials", icon="MATERIAL")
 
 
@@ -102,5 +105,5 @@ def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         if entry.object is None or entry.material is None:
             continue
         row = box.row(align=True)
-        row.prop(entry, "use", text=entry.material.name)
-        row.label(text=entry.object.name, icon="OBJECT_DATA")
+        row.prop(entry, "use", text=entry.material.name, translate=False)
+        row.label(text=entry.object.name, icon="OBJECT_DATA", translate=False)

@@ -62,7 +62,7 @@ def _draw_materials(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup
         line = column.row(align=True)
         icon = shown_result.VERDICT_ICONS.get(row.words, "BLANK1")
         shown = index == runtime.shown_material
-        line.operator("mfo.show_material", text=row.name, icon=icon, depress=shown).index = index
+        line.operator("mfo.show_material", text=row.name, icon=icon, depress=shown, translate=False).index = index
         line.label(text=row.result)
 
 

@@ -23,8 +23,8 @@ PANEL = {
     # heading of the check
     "Check": "Prüfen",
     "Choose a picture": "Ein Bild wählen",
-    "{} problem to fix": "{} Problem zu beheben",
-    "{} problems to fix": "{} Probleme zu beheben",
+    "{} problem to fix": "{} Problem beheben",
+    "{} problems to fix": "{} Probleme beheben",
     "Ready": "Bereit",
     "Ready, {} note": "Bereit, {} Hinweis",
     "Ready, {} notes": "Bereit, {} Hinweise",
