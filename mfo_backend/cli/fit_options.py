@@ -20,7 +20,8 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--parameters",
         metavar="LIST",
-        help='all, reduced, or names with commas between, as "Base Color,Roughness" or base_color (default: all)',
+        help='all, reduced, or names with commas between, as "Base Color,Roughness", base_color or, of a node that '
+        'feeds it, "Color Ramp/Stop 0" (default: all)',
     )
     group.add_argument("--range", help="losses on radiance or display values: hdr, ldr or auto (default: auto)")
     group = parser.add_argument_group("for experts and the paper's method")

@@ -12,7 +12,7 @@ import bpy
 
 from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
-from ...graph_values.table import GraphValue, GraphValueError, chosen_values, graph_values
+from ...graph_values.table import GraphValue, GraphValueError, chosen_values, graph_values, plain_name
 from ...probe.own_blender import save_copy
 from ..findings import ExportError, Findings
 from ..material_model import Material
@@ -41,12 +41,14 @@ def chosen_graph_values(
     names = () if isinstance(wanted, str) else tuple(name for name in wanted if "/" in str(name))
     rest = fit if isinstance(wanted, str) else fit | {"parameters": [name for name in wanted if name not in names]}
     target = None if obj is None else target_shader(obj.active_material)
-    if obj is None or target is None or (not names and wanted != "all"):
+    if obj is None or target is None or (isinstance(wanted, str) and wanted != "all"):
         return [], rest
+    values = graph_values(target)
     try:
-        chosen = chosen_values(graph_values(target), wanted if isinstance(wanted, str) else names)
+        chosen = chosen_values(values, wanted if isinstance(wanted, str) else names)
     except GraphValueError as error:
         raise ExportError(str(error)) from error
+    _check_not_nodes(rest.get("parameters", "all"), target, values)
     several = f"a fit of several {together} changes the values of sockets alone" if together else None
     reason = several or _not_fitted(target, fit)
     if reason is None:
@@ -63,6 +65,15 @@ def chosen_graph_values(
         raise ExportError(f"{', '.join(names)} cannot be fitted: {reason}.")
     findings.note(f"Values inside nodes ({', '.join(value.name for value in chosen)}) stay as they are: {reason}.")
     return [], rest
+
+
+def _check_not_nodes(names: str | Sequence[str], target: TargetShader, values: Sequence[GraphValue]) -> None:
+    """Refuse the name of a node where that of a value is asked for."""
+    sockets = {plain_name(name) for place in (target.places, target.own_names) for name in place}
+    for name in () if isinstance(names, str) else map(str, names):
+        found = next((value.name for value in values if plain_name(value.label) == plain_name(name)), None)
+        if found is not None and plain_name(name) not in sockets:
+            raise ExportError(f"'{name}' is a node, not a value: name its values, as '{found}'.")
 
 
 def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:

@@ -200,6 +200,8 @@ def test_what_a_fit_is_refused(graph: SimpleNamespace, tmp_path: Path) -> None:
 
     with pytest.raises(ExportError, match="the nearest is 'Noise Texture/Scale'"):
         export(parameters=["Noise Texture/Scales"])
+    with pytest.raises(ExportError, match="'noise_texture' is a node, not a value: name its values, as 'Noise Textur"):
+        export(parameters=["Roughness", "noise_texture"])
     with pytest.raises(ExportError, match="Mix/Factor cannot be fitted: the preset paper"):
         export(parameters=["Mix/Factor"], preset="paper")
     graph.shader.inputs["Transmission Weight"].default_value = 0.5
