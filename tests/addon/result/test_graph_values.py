@@ -43,7 +43,7 @@ def graph(scene: SimpleNamespace) -> SimpleNamespace:
     tree.links.new(ramp.outputs["Color"], shader.inputs["Roughness"])
     tree.links.new(coat.outputs["Color"], shader.inputs["Coat Roughness"])
     tree.links.new(node.outputs[0], shader.inputs["Base Color"])
-    other: Any = bpy.data.materials.new("Other")
+    other = bpy.data.materials.new("Other")
     if other.node_tree is None:
         other.use_nodes = True
     bpy.data.materials["Other"].node_tree.nodes.new("ShaderNodeGroup").node_tree = group
