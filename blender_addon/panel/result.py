@@ -9,6 +9,7 @@ from ..export.nodes.target_shader import target_shader
 from ..result import previews, shown_result
 from ..result.animated_sockets import animation_of
 from ..result.job_result import must_ask
+from ..sentences.translated import translated
 from .layout import draw_sentence, letters, pair
 
 _LETTERS_OF_THREE = 26  # of a line with name, start and result; a narrower side bar has no start
@@ -44,7 +45,7 @@ class Result:
         shows_own = material is not None and applied and material.mfo.shows_original
         text = ("A: Own" if shows_own else "B: Recovered") if applied else "A/B"
         row = pair(column, context)
-        row.operator("mfo.toggle", text=text, icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
+        row.operator("mfo.toggle", text=translated(text), icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         column.operator("mfo.save_as_asset", icon="ASSET_MANAGER")
         if runtime.has_result:

@@ -239,6 +239,8 @@ PANEL = {
     "Goal": "Ziel",
     "Error": "Fehler",
     "In Cycles": "In Cycles",
+    "A: Own": "A: Eigene",
+    "B: Recovered": "B: Gefunden",
     "Own Engine": "Eigene",
     "Own": "Eigene",
     # the reference in the check
