@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
 """Verdicts and causes on pictures whose difference and noise are known."""
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.pictures.next_picture import _proposal  # pyright: ignore[reportPrivateUsage]
+from mfo_backend.fit.pictures.next_picture import _proposal
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
 TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coat_weight", 1, 0.0, 1.0, 0.5)])

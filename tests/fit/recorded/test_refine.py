@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-# pyright: reportArgumentType=false, reportOperatorIssue=false
 """The guards of a recorded fit's stages, each against a fit without it."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-# pyright: reportArgumentType=false
 """A start that noise has put second is not lost: `refine` goes on with it where it is clearly better."""
 
 from __future__ import annotations
