@@ -248,4 +248,5 @@ def _judged(
         gap = model_gap(task.reference, halves, task.mask, task.view)
         said = (gap.sentence,) if gap is not None and gap.sentence else ()
         result = replace(result, model_gap=gap, notes=(*result.notes, *said))
+    result = replace(result, seconds=time.monotonic() - task.began)  # a verdict takes time as well
     return FitOutcome(result, first.image, end.image, task.counted, halves)

@@ -150,6 +150,7 @@ SCENE = {
     "Material '{}': {} has no counterpart in Mitsuba's principled and is missing in a fit with the model mitsuba_principled.": "Material '{}': {} hat kein Gegenstück in Mitsubas principled und fehlt in einer Anpassung mit dem Modell mitsuba_principled.",
     "Material '{}': {} is approximated by its closest simple equivalent.": "Material '{}': {} wird durch das nächste einfache Gegenstück angenähert.",
     "Material '{}': {} is approximated by its nearest model.": "Material '{}': {} wird durch sein nächstes Modell angenähert.",
+    "'{}' is a node, not a value: name its values, as '{}'.": "'{}' ist ein Node, kein Wert: seine Werte nennen, wie '{}'.",
     "Material '{}': {} is fitted as its nearest model.": "Material '{}': {} wird als sein nächstes Modell angepasst.",
     "Material '{}': {} is shown as black.": "Material '{}': {} wird schwarz gezeigt.",
     "Material '{}': {} is taken for white.": "Material '{}': {} gilt als weiß.",

@@ -131,6 +131,7 @@ class FitRunner:
         from ...fit.recover_material import recover_material
         from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
+        reference = self._judge.reference  # rendered before time is taken
         began, method = time.monotonic(), METHODS[task.method]
         # a renderer of its own for every fit: passes count from 0 and nothing is left over from the fit before
         renderer = load_mitsuba_renderer(
@@ -150,7 +151,7 @@ class FitRunner:
         with watch.watching():
             outcome = recover_material(
                 NewSeeds(renderer, settings.seed) if method.new_seeds else renderer,
-                self._judge.reference,
+                reference,
                 settings,
                 plan=method.plan,
                 hand_over=False,  # a preset that hands a scene over to the preset `paper` has not fitted it
