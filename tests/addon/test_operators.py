@@ -222,9 +222,8 @@ def test_values_are_copied_as_text(scene: SimpleNamespace) -> None:
     fit(scene)
     assert scene.bpy.ops.mfo.copy_values() == {"FINISHED"}
     text = values_as_text(runtime(scene).values)
-    color = text.splitlines()[0]
-    assert color in ("Base Color: #8BBF48", "Base Color: #8BBE48")  # Blender converts; 4.5 rounds otherwise
-    assert text.splitlines() == [color, "Metallic: 0.125", "Roughness: 0.312"]
+    color = "#8BBF48" if scene.bpy.app.version >= (5, 0, 0) else "#8BBE48"  # Blender converts, and rounds otherwise
+    assert text.splitlines() == [f"Base Color: {color}", "Metallic: 0.125", "Roughness: 0.312"]
 
 
 def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

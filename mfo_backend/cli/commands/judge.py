@@ -13,8 +13,8 @@ from pathlib import Path
 from ...fit.judge.region import fill_outside
 from ...job.folder.atomic_file import write_atomically
 from ...job.folder.job_folder import JobFolder
+from ...job.folder.job_view import view_of
 from ...job.folder.request import read_request
-from ...job.run.job_view import view_of
 from ...job.run.run_job import read_reference
 from ...metrics.compare import compare_images
 from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside

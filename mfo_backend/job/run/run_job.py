@@ -18,12 +18,12 @@ from ...types.image import Image
 from ...types.status import Status
 from ..folder.graph_request import COPY
 from ..folder.job_folder import JobFolder, unwritable
+from ..folder.job_view import view_of
 from ..folder.picture_part import with_part
 from ..folder.request import Request, read_request
 from ..output.progress import EventWriter
 from ..output.result import write_partial
 from .fit_scene import Fitter, fit_scene
-from .job_view import view_of
 from .more_pictures import JobPicture, in_order, label, without_repeats
 from .outputs import bytes_needed, write_outputs
 from .stop import StopSignal

@@ -24,10 +24,10 @@ from ..camera.highlight_cells import Highlights, highlight_cells
 from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
+from ..transport.even_points import even_points
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import seen_side
 from ..transport.traced_radiance import traced_radiance
-from .even_points import even_points
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .proposal import DefensiveProposal
 from .recorded_background import add_radiance, recorded_background

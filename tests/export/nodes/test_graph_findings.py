@@ -105,10 +105,10 @@ def test_a_node_of_another_blender(scene: Any) -> None:
     assert "which this Blender does not know" in errors[0]
 
 
-def chain(tree: Tree, output: Any, length: int) -> Any:
-    """Maths one after the other."""
+def chain(tree: Tree, output: Any, length: int, kind: str = "ShaderNodeMath") -> Any:
+    """Nodes one after the other."""
     for _ in range(length):
-        node = tree.nodes.new("ShaderNodeMath")
+        node = tree.nodes.new(kind)
         tree.links.new(output, node.inputs[0])
         output = node.outputs[0]
     return output

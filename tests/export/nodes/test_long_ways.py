@@ -17,14 +17,11 @@ from blender_addon.probe.closure_tree import ClosureTree  # noqa: E402
 from blender_addon.probe.graph_copy import own_copy, remove_copy  # noqa: E402
 
 from ..scenes import new_material  # noqa: E402
+from .test_graph_findings import chain  # noqa: E402
 
 
 def rerouted(tree: Any, output: Any, count: int) -> Any:
-    for _ in range(count):
-        node = tree.nodes.new("NodeReroute")
-        tree.links.new(output, node.inputs[0])
-        output = node.outputs[0]
-    return output
+    return chain(tree, output, count, "NodeReroute")
 
 
 def looks(count: int, monkeypatch: pytest.MonkeyPatch) -> int:

@@ -8,9 +8,9 @@ from ...metrics.display.tone_mapping import DisplayView, View
 from ...scene.image_file import read_image
 from ...types.errors import BadInputError
 from ...types.image import Encoding, Image
-from ..folder.job_folder import JobFolder
-from ..folder.request import Request
-from ..folder.view_request import ViewTable
+from .job_folder import JobFolder
+from .request import Request
+from .view_request import ViewTable
 
 
 def view_of(folder: JobFolder, request: Request, reference: Image) -> View:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mfo_backend.job.folder.job_folder import JobFolder
+from mfo_backend.job.folder.job_view import view_of
 from mfo_backend.job.folder.request import read_request
-from mfo_backend.job.run.job_view import view_of
 from mfo_backend.metrics.display.baked_view import BakedView
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.scene.exr_file import write_exr
