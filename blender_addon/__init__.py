@@ -15,7 +15,7 @@ from .operators import part
 from .panel import menu
 from .process import waiting_backend
 from .result import comparison, previews
-from .running import cycles_check, handlers, live, running_export, running_job
+from .running import cycles_check, handlers, live, notice, running_export, running_job
 from .versions import is_module
 
 CLASSES = (*properties.CLASSES, *preferences_page.CLASSES, *OPERATORS, *panel.CLASSES)
@@ -42,6 +42,7 @@ def unregister() -> None:
     live.close()
     running_export.close()
     running_job.close()
+    notice.close()
     waiting_backend.close()
     backend_state.close()
     cycles_check.close()

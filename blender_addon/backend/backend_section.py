@@ -23,9 +23,11 @@ _TITLES = {
 }
 
 
-def needs_setup() -> bool:
-    """Whether a panel must show the set-up instead of the button that starts a fit."""
-    return backend_state.current.name in {"NOT_INSTALLED", "INSTALLING"}
+def why_no_fit() -> str:
+    """Why the backend cannot run a fit as it is now, empty where it can or nobody has asked it yet."""
+    if backend_state.current.name == "BROKEN":
+        return "The backend cannot run: the box below says why, and what helps"
+    return "The backend is not installed yet: press Install below" if has_trouble() else ""
 
 
 def has_trouble() -> bool:

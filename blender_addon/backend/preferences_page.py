@@ -7,7 +7,7 @@
 import os
 
 import bpy
-from bpy.props import IntProperty, StringProperty
+from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ..process import waiting_backend
 from ..process.backend_python import VARIABLE
@@ -54,6 +54,15 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
         min=0,
         max=120,
     )
+    when_done: EnumProperty(
+        name="When a Fit Ends",
+        description="What tells of it besides the panel and the status bar",
+        items=(
+            ("NOTHING", "Nothing", "Panel and status bar alone"),
+            ("SOUND", "Sound", "Two short tones"),
+            ("NOTICE", "System Notice", "A notice of the system, by notify-send on Linux and osascript on macOS"),
+        ),
+    )
 
     def draw(self, context: bpy.types.Context) -> None:
         """The state of the backend, the paths, and a line where the variable wins over the first."""
@@ -69,6 +78,7 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
             layout.label(text=f"{VARIABLE} is set and used instead: {os.environ[VARIABLE]}", icon="INFO")
         layout.prop(self, "job_root")
         layout.prop(self, "idle_minutes")
+        layout.prop(self, "when_done")
         held = waiting_backend.memory_mb()
         if held is not None:
             layout.label(text=f"A backend waits and holds {held} MB" if held else "A backend is loading", icon="TIME")

@@ -7,7 +7,7 @@
 import bpy
 from bpy.props import IntProperty, StringProperty
 
-from ..backend.backend_section import needs_setup
+from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
 from ..export.fitted_slot import FittedSlot
 from ..export.job import drained
@@ -51,8 +51,8 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         if running_export.current is not None:
             cls.poll_message_set(translated("The scene is being exported for a fit"))
             return False
-        if not bpy.app.background and needs_setup():
-            cls.poll_message_set(translated("The backend is not installed yet: press Install below"))
+        if not bpy.app.background and (reason := why_no_fit()):
+            cls.poll_message_set(translated(reason))
             return False
         by_active = not bpy.app.background and not context.scene.mfo.targets
         if by_active and context.object is None:
@@ -123,6 +123,9 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
         """In windows only with more than one material to fit."""
         if running_job.current is not None and bpy.app.background:
             cls.poll_message_set(translated("A fit is running; cancel it first"))
+            return False
+        if not bpy.app.background and (reason := why_no_fit()):
+            cls.poll_message_set(translated(reason))
             return False
         if not bpy.app.background and len(selected_targets(context, most=2)) < 2:
             cls.poll_message_set(

@@ -13,6 +13,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..result.comparison import comparison_image, picture_image, split_image
+from ..result.report_page import shown_report
 from ..sentences.translated import translated
 
 _DRAWN = 0.3  # seconds until a new window has its size
@@ -86,12 +87,12 @@ class MFO_OT_open_report(_JobOperator, bpy.types.Operator):
     job_folder: StringProperty(name="Job Folder", description="Empty: the last fit", options={"HIDDEN", "SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Hand index.html to the system."""
+        """Hand index.html, in the user's language, to the system."""
         report = Path(self.folder(context)) / "index.html"
         if not report.is_file():
             self.report({"ERROR"}, translated(f"There is no report in {report.parent}: run the fit again."))
             return {"CANCELLED"}
-        bpy.ops.wm.url_open(url=report.absolute().as_uri())
+        bpy.ops.wm.url_open(url=shown_report(report.absolute()).as_uri())
         return {"FINISHED"}
 
 

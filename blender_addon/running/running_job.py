@@ -29,7 +29,7 @@ from ..result.local_copy import unwritable
 from ..result.shown_result import add_message
 from ..result.write_back import WriteBackError
 from ..versions import is_modal_operator_running
-from . import fit_queue
+from . import fit_queue, notice
 from .fit_queue import PreparedFit
 
 TICK = 0.15  # seconds between two looks at the process
@@ -260,6 +260,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
         record_results()
     else:
         waiting_backend.prepare(job.fit.python, idle_seconds(bpy.context), own_blender(SERVER, []))
+        notice.tell(runtime.sentence)
     redraw()
 
 

@@ -10,34 +10,78 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import bpy
 
-from .german import GERMAN
+from .languages import FOLDERS
 
-LANGUAGES: dict[str, Mapping[str, str]] = {"de_DE": GERMAN, "de": GERMAN}  # a language is one folder
 _PARTS = re.compile(r"(?<=[.:]) (?=[A-Z'0-9])")  # between two sentences
 _LIST = re.compile(r"(, | and | or |; )")  # between the names of a list
-_GERMAN_JOINTS = {" and ": " und ", " or ": " oder "}
-_JOINTS = {"de_DE": _GERMAN_JOINTS, "de": _GERMAN_JOINTS}
+
+
+@dataclass(frozen=True, eq=False)
+class Language:
+    """Sentences by their English ones, and the words between the names of a list."""
+
+    sentences: Mapping[str, str]
+    joints: Mapping[str, str]
+
+    @cached_property
+    def patterns(self) -> list[tuple[re.Pattern[str], str]]:
+        """The entries with something put in, those with most words of their own first."""
+        holding = [english for english in self.sentences if "{}" in english]
+        holding.sort(key=lambda english: len(english.replace("{}", "")), reverse=True)
+        return [
+            (re.compile("(.+?)".join(map(re.escape, english.split("{}"))), re.DOTALL), english) for english in holding
+        ]
+
+
+LANGUAGES = {code: Language(folder.SENTENCES, folder.JOINTS) for code, folder in FOLDERS.items()}
+# headings are too plain to be looked for in other texts
+_REPORTS = {code: Language(folder.SENTENCES | folder.REPORT, folder.JOINTS) for code, folder in FOLDERS.items()}
 
 
 def translated(text: str) -> str:
     """The text in the interface's language, or as it is."""
-    if not bpy.context.preferences.view.use_translate_interface and not bpy.app.background:
-        return text
-    return in_language(_language(), text)
+    return in_language(_language(), text) if _is_wanted() else text
+
+
+def report_language() -> str:
+    """The language that reports are shown in, as `de`; empty for English."""
+    code = _code(_language()) if _is_wanted() else ""
+    return code if code in _REPORTS else ""
+
+
+def in_report(language: str, text: str) -> str:
+    """A text of a report in a language."""
+    return _said(_REPORTS[language], text)
+
+
+def in_language(language: str, text: str) -> str:
+    """The text in a language, called as Blender does (`de_DE`)."""
+    known = LANGUAGES.get(_code(language))
+    return text if known is None else _said(known, text)
+
+
+def _is_wanted() -> bool:
+    return bpy.context.preferences.view.use_translate_interface or bpy.app.background
 
 
 def _language() -> str:
     return bpy.app.translations.locale
 
 
-@lru_cache(maxsize=1024)
-def in_language(language: str, text: str) -> str:
-    """The text in a language; where it is not known as a whole, by as many sentences at a time as are known."""
-    if language not in LANGUAGES or not text:
+def _code(language: str) -> str:
+    """Blender 4.2 says `de`, 4.3 and later `de_DE`."""
+    return language.partition("_")[0]
+
+
+@lru_cache(maxsize=2048)
+def _said(language: Language, text: str) -> str:
+    """The text; where it is not known as a whole, by as many sentences at a time as are known."""
+    if not text:
         return text
     parts, said, begin = _PARTS.split(text), [], 0
     while begin < len(parts):
@@ -48,11 +92,11 @@ def in_language(language: str, text: str) -> str:
     return " ".join(said)
 
 
-def _known(language: str, text: str) -> str | None:
-    table = LANGUAGES[language]
+def _known(language: Language, text: str) -> str | None:
+    table = language.sentences
     if text in table:
         return table[text]
-    for pattern, english in _patterns(language):
+    for pattern, english in language.patterns:
         found = pattern.fullmatch(text)
         if found is None or (english.endswith("{}") and text.endswith(".") and not _ends_in_sentence(english)):
             continue  # a button's words, not the beginning of a sentence
@@ -68,19 +112,11 @@ def _ends_in_sentence(english: str) -> bool:
     return english.endswith((": {}", ". {}"))
 
 
-def _put_in(language: str, words: str) -> str:
+def _put_in(language: Language, words: str) -> str:
     """What is put into a sentence: another sentence, words that are known, or a list of these and of sockets' names."""
-    parts, joints = _LIST.split(words), _JOINTS.get(language, {})
-    known = [joints.get(part, part) if i % 2 else _known(language, part) for i, part in enumerate(parts)]
-    if None in known and (whole := in_language(language, words)) != words:
+    parts = _LIST.split(words)
+    known = [language.joints.get(part, part) if i % 2 else _known(language, part) for i, part in enumerate(parts)]
+    if None in known and (whole := _said(language, words)) != words:
         return whole
     names = bpy.app.translations.pgettext_iface  # sockets are called as Blender shows them
     return "".join(names(part) if said is None else said for part, said in zip(parts, known, strict=True))
-
-
-@lru_cache(maxsize=4)
-def _patterns(language: str) -> list[tuple[re.Pattern[str], str]]:
-    """The entries with something put in, those with most words of their own first."""
-    holding = [english for english in LANGUAGES[language] if "{}" in english]
-    holding.sort(key=lambda english: len(english.replace("{}", "")), reverse=True)
-    return [(re.compile("(.+?)".join(map(re.escape, english.split("{}"))), re.DOTALL), english) for english in holding]

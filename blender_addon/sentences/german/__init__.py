@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the add-on and its backend say at run time, in German: `{}` are the parts put in, numbered where they move."""
+"""All that an artist reads, in German: `{}` are the parts put in, numbered where they move."""
 
 from .fit import FIT
+from .labels import LABELS, OPERATORS
 from .panel import PANEL
+from .report import REPORT
 from .scene import SCENE
 
-GERMAN = {**PANEL, **SCENE, **FIT}
+LOCALES = ("de", "de_DE")  # what Blender 4.2, and what later ones call it
+JOINTS = {" and ": " und ", " or ": " oder "}
+SENTENCES = {**PANEL, **SCENE, **FIT}
+
+__all__ = ["JOINTS", "LABELS", "LOCALES", "OPERATORS", "REPORT", "SENTENCES"]

@@ -159,6 +159,7 @@ PANEL = {
     "The active material has no earlier results": "Das aktive Material hat keine früheren Ergebnisse",
     "The active material has no shader whose values are fitted": "Das aktive Material hat keinen Shader, dessen Werte angepasst werden",
     "The backend is being installed": "Das Backend wird installiert",
+    "The backend cannot run: the box below says why, and what helps": "Das Backend kann nicht laufen: der Kasten unten sagt, warum, und was hilft",
     "The backend is not installed yet: press Install below": "Das Backend ist noch nicht installiert: unten Installieren drücken",
     "The fit is being cancelled": "Die Anpassung wird abgebrochen",
     "The installation is being cancelled": "Die Installation wird abgebrochen",

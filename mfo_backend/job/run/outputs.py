@@ -118,7 +118,7 @@ def _title(request: Request) -> str:
         return f"{len(request.targets)} materials"
     target = request.target
     material = target.material or target.bsdf_id or target.shape_id
-    return f"{material} on {target.object}" if target.object else material
+    return f"{material} · {target.object}" if target.object else material
 
 
 def _subtitle(request: Request, model: str) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from ..test_operators import fit, runtime
-from .test_sentences import ENGLISH
+from .languages import ENGLISH
 
 SAME = {"Material Fit", "FLIP", "Live", "Material", "Start", "A/B"}  # in both languages
 BLENDERS = "Values to Fit"  # looked up by Blender within a longer text

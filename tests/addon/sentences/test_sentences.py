@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the add-on says at run time goes through translation, and has German where the panel and its buttons say it."""
+"""What the add-on says at run time goes through translation, and complete languages have all of it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 
 from mfo_backend.types.verdict import Cause, Judgement, Verdict
 
+from .languages import COMPLETE, ENGLISH
 from .run_time_sentences import ADDON, BACKEND, run_time_sentences, sentences
 
 SAID = (
@@ -41,14 +42,14 @@ PUT_TOGETHER = {  # of parts, by functions that tests below call
 FOR_DEVELOPERS = {
     "The view's table {} is {}x{}, but request.json says {} nodes, which is {}x{}: export the job again.",
 }
-ENGLISH = re.compile(r"\b(the|is|are|not|of|and|with|it|be|to|or|has|have|which|that|from|its|for|at|by)\b")
+SAME = ("FLIP in Cycles", "X. In X", "Material 'X': X")  # in another language, too
 
 
 @pytest.fixture
 def german(addon: object):
-    from blender_addon.sentences.german import GERMAN
+    from blender_addon.sentences.german import SENTENCES
 
-    return GERMAN
+    return SENTENCES
 
 
 def in_german(text: str) -> str:
@@ -57,25 +58,29 @@ def in_german(text: str) -> str:
     return in_language("de_DE", text)
 
 
-def english_in(text: str) -> str:
-    """What is left of a sentence in German that is English; names stand for what is put in."""
-    said = in_german(text.replace("{}", "X"))
-    unknown = said == text.replace("{}", "X") and not said.startswith(("FLIP in Cycles", "X. In X", "Material 'X': X"))
+def english_in(text: str, language: str) -> str:
+    """What is left of a sentence in another language that is English; names stand for what is put in."""
+    from blender_addon.sentences.translated import in_language
+
+    said = in_language(language, text.replace("{}", "X"))
+    unknown = said == text.replace("{}", "X") and not said.startswith(SAME)
     return said if unknown or ENGLISH.search(said) else ""
 
 
-def test_every_sentence_of_the_addon_has_german(german) -> None:
+@pytest.mark.parametrize("language", COMPLETE)
+def test_every_sentence_of_the_addon_is_translated(addon: object, language: str) -> None:
     found = run_time_sentences(SAID)
     assert len(found) > 300
-    missing = sorted(s for s in found if english_in(s) and not s.startswith("{}."))
-    assert missing == [], "no German: add them to sentences/german"
+    missing = sorted(s for s in found if english_in(s, language) and not s.startswith("{}."))
+    assert missing == [], f"not in {language}: add them to its folder of sentences/"
 
 
-def test_what_the_backend_notes_has_german(german) -> None:
+@pytest.mark.parametrize("language", COMPLETE)
+def test_what_the_backend_notes_is_translated(addon: object, language: str) -> None:
     found = {text.removeprefix("{}") if text.startswith("{}S") else text for text in sentences(BACKEND, BY_BACKEND)}
     assert len(found) > 80
-    missing = sorted(s for s in found - PUT_TOGETHER - FOR_DEVELOPERS if english_in(s.strip()))
-    assert missing == [], "no German: add them to sentences/german/fit.py"
+    missing = sorted(s for s in found - PUT_TOGETHER - FOR_DEVELOPERS if english_in(s.strip(), language))
+    assert missing == [], f"not in {language}: add them to fit.py of its folder of sentences/"
 
 
 def test_every_verdict_has_german(german) -> None:
@@ -106,14 +111,26 @@ def test_unknown_sentences_and_other_languages_stay_english(german) -> None:
 
     for text in ("Use a smaller picture, or free some memory.", "Select what you like.", ""):
         assert in_german(text) == text
-    assert in_language("fr_FR", "Ready") == "Ready"
+    assert in_language("it_IT", "Ready") == "Ready"
 
 
-def test_translations_put_in_what_the_english_ones_do(german) -> None:
-    for english, words in german.items():
-        fields = [field for _, field, *_ in string.Formatter().parse(words) if field is not None]
-        assert len(fields) == english.count("{}"), english
-        assert english.endswith(".") == words.endswith("."), english
+def test_a_second_language_is_found(addon: object) -> None:
+    from blender_addon.sentences.translated import in_language
+
+    said = in_language("fr_FR", "Pictures 1, 2 and 3 do not go together: the light or camera of one of them differs "
+                       "from its scene.")  # fmt: skip
+    assert said.startswith("Les images 1, 2 et 3 ne vont pas ensemble : la lumière")
+    assert in_language("fr", "Ready, 3 notes") == "Prêt, 3 remarques"
+
+
+def test_translations_put_in_what_the_english_ones_do(addon: object) -> None:
+    from blender_addon.sentences.languages import FOLDERS
+
+    for language in FOLDERS.values():
+        for english, words in {**language.SENTENCES, **language.REPORT}.items():
+            fields = [field for _, field, *_ in string.Formatter().parse(words) if field is not None]
+            assert len(fields) == english.count("{}"), english
+            assert english.endswith(".") == words.endswith("."), english
 
 
 def test_everything_that_is_reported_goes_through_translation() -> None:

@@ -105,6 +105,7 @@ def story():
     preferences().backend_python = str(next(state.backend_root().glob("env-*/bin/python")))
     yield from until(lambda: state.current.name == "BROKEN", 30)
     assert any("lacks mitsuba, drjit, numpy" in problem for problem in state.current.problems), state.current
+    assert not bpy.ops.mfo.fit.poll()
     yield 0.5
     yield from shot("setup_3_broken")
     yield from show_preferences()

@@ -105,7 +105,7 @@ def test_a_finished_job_leaves_pictures_report_and_result(start_worker, job: Pat
     names = {path.name for path in (job / "pictures").iterdir()}
     pictures = ("reference", "start", "result", "difference", "curve", "counted")
     assert names == {"result.exr", *(f"{name}.png" for name in pictures)}
-    assert "Glaze on Vase" in (job / "index.html").read_text("utf-8")
+    assert "Glaze · Vase" in (job / "index.html").read_text("utf-8")
     assert not [path for path in job.rglob("*") if path.suffix == ".tmp"]
 
 
