@@ -33,6 +33,8 @@ def events_of(text: str) -> list[dict]:
 
 
 def wait_for_event(child: subprocess.Popen, name: str) -> dict:
+    assert child.stdout is not None
+    assert child.stderr is not None
     while line := child.stdout.readline():
         event = json.loads(line)
         if event["event"] == name:
@@ -222,6 +224,8 @@ def test_it_ends_when_its_parent_is_killed(job: Path, deaf: bool) -> None:
     parent.kill()
     parent.wait()
     # until the worker, which holds the other end, is really gone; a deaf one would go on for minutes
+    assert parent.stdout is not None
+    assert parent.stderr is not None
     rest = parent.stdout.read()
     log = parent.stderr.read()
     parent.stdout.close()
