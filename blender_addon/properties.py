@@ -92,6 +92,9 @@ class MFO_PG_picture(bpy.types.PropertyGroup):
     camera: PointerProperty(
         name="Camera", description="Camera that the picture was made with", type=bpy.types.Object, poll=_is_camera
     )
+    scene: PointerProperty(
+        name="Scene", description="Scene that the picture shows, if it is another one", type=bpy.types.Scene
+    )
     frame: IntProperty(name="Frame", description="Frame that the picture shows", default=1)
     exposure: FloatProperty(
         name="Exposure",

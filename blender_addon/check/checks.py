@@ -191,13 +191,13 @@ def _more_pictures(scene: bpy.types.Scene) -> list[Finding]:
     for number, entry in enumerate(settings.pictures, 2):
         if not entry.use:
             continue
-        path = Path(bpy.path.abspath(entry.path))
+        path, shows = Path(bpy.path.abspath(entry.path)), entry.scene or scene
         if not entry.path:
             found.append(Finding(TO_CHOOSE, f"Choose the file of picture {number}, or do not use it."))
         elif not path.is_file():
             found.append(Finding(STOPS, f"Picture {number} ({path}) does not exist: choose another file."))
-        elif not scene.frame_start <= entry.frame <= scene.frame_end:
-            frames = f"{scene.frame_start} to {scene.frame_end}"
+        elif not shows.frame_start <= entry.frame <= shows.frame_end:
+            frames = f"{shows.frame_start} to {shows.frame_end}"
             found.append(Finding(STOPS, f"Picture {number}: frame {entry.frame} is outside of the frames {frames}."))
         elif problem := _part_problem(entry.part, path):
             found.append(Finding(STOPS, f"Picture {number}: {problem}"))

@@ -134,7 +134,10 @@ def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
             frozenset(settings.sockets),
         ),
         [(bound.name, bound.lower, bound.upper) for bound in settings.bounds],
-        [(one.use, one.path, one.frame, getattr(one.camera, "name", "")) for one in settings.pictures],
+        [
+            (one.use, one.path, one.frame, getattr(one.camera, "name", ""), getattr(one.scene, "name", ""))
+            for one in settings.pictures
+        ],
         [
             (one.part.crop, getattr(one.part.mask, "name", ""), one.part.use_alpha)
             for one in (settings.first_picture, *settings.pictures)

@@ -31,6 +31,7 @@ from .reference.picture_setup import PictureSetup, check_setups, shown
 from .reference.reference import Picture, read_reference
 from .reference.reference_view import SCENE
 from .request import WholeRequest, parameter_of
+from .scene.candidates import candidates
 from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
@@ -249,6 +250,8 @@ def partial_export(
         requests = {p: whole.of(f, n, fits[n]) for n, (p, f) in enumerate(zip(paths, fitted, strict=True))}
         if targets:
             requests[""] = whole.of(fitted[0], 0, fits[0], seen=False) | {"targets": paths}
+        else:
+            requests[""] |= candidates(context.scene, data)
         files.write(folder)
         tell(0.9)
         if picture is not None and reference is not None:

@@ -260,7 +260,8 @@ def _pictures(settings: bpy.types.PropertyGroup, first: Picture) -> list[Picture
             raise FitError(f"Picture {number} has no file: choose it, or do not use this picture.")
         reference = first if number == 1 else counted_part(Path(bpy.path.abspath(entry.path)), entry.part)
         camera = entry.camera.name if entry.camera is not None else ""
-        found.append(PictureSetup(reference, number, entry.frame, camera, exposure=entry.exposure))
+        scene = entry.scene.name if entry.scene is not None else ""
+        found.append(PictureSetup(reference, number, entry.frame, camera, scene, exposure=entry.exposure))
     if not found:
         raise FitError("No picture is used: tick one at least.")
     return found

@@ -4,13 +4,11 @@
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
 
-import math
-
 import bpy
 from bpy.props import IntProperty
-from mathutils import Matrix, Vector
 
 from ..result import shown_result
+from ..result.next_picture import scene_with_light, turned_camera
 from ..sentences.translated import translated
 
 
@@ -59,17 +57,17 @@ class MFO_OT_remove_picture(bpy.types.Operator):
 
 
 class MFO_OT_set_up_next_picture(bpy.types.Operator):
-    """Add the camera that the fit proposes, make it the scene's, and list its picture, which is to be made yet"""
+    """Set the camera or the light up that the fit proposes, and list the picture, which is to be made yet"""
 
     bl_idname = "mfo.set_up_next_picture"
-    bl_label = "Set Up Camera"
+    bl_label = "Set Up Next Picture"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Only with a proposal and the camera that it turns."""
+        """Only with a proposal and what it is made of."""
         found = shown_result.result
-        if found is None or found.next_turn is None:
+        if found is None or found.next_picture is None:
             cls.poll_message_set(translated("The last fit proposes no further picture"))
             return False
         if context.scene.camera is None:
@@ -78,23 +76,29 @@ class MFO_OT_set_up_next_picture(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Copy the camera of the first picture, turned about the vertical through the object."""
+        """Add the camera, or a scene with the light, and an entry of the list."""
         scene, found = context.scene, shown_result.result
         assert found is not None  # as `poll` has seen
-        assert found.next_turn is not None
+        proposed = found.next_picture
+        assert proposed is not None
         settings = scene.mfo
         source = settings.first_picture.camera if settings.pictures else None
         source = source or scene.camera
-        center = Vector(found.next_center)
-        turn = Matrix.Rotation(math.radians(found.next_turn), 4, "Z")
-        entry = add_picture(scene, None)
-        camera = bpy.data.objects.new(f"{source.name} turned {found.next_turn:.0f}", source.data.copy())
-        scene.collection.objects.link(camera)
-        camera.matrix_world = Matrix.Translation(center) @ turn @ Matrix.Translation(-center) @ source.matrix_world
-        scene.camera = entry.camera = camera
-        self.report(
-            {"INFO"}, translated(f"Camera {camera.name!r} is set up: make the picture from there and choose its file.")
-        )
+        missing = next((n for n in (proposed.camera, proposed.light) if n and n not in scene.objects), None)
+        if missing is not None:
+            self.report({"ERROR"}, translated(f"The scene has no object {missing!r} any more: run the fit again."))
+            return {"CANCELLED"}
+        if proposed.light:
+            entry = add_picture(scene, source)
+            entry.scene = scene_with_light(scene, proposed)
+            entry.scene.camera = source
+            said = f"Scene {entry.scene.name!r} is set up: make the picture from there and choose its file."
+        else:
+            entry = add_picture(scene, None)
+            own = scene.objects[proposed.camera] if proposed.camera else turned_camera(scene, source, proposed)
+            scene.camera = entry.camera = own
+            said = f"Camera {own.name!r} is set up: make the picture from there and choose its file."
+        self.report({"INFO"}, translated(said))
         return {"FINISHED"}
 
 

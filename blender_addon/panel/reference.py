@@ -74,6 +74,10 @@ def _draw_what_it_shows(
     row.active = picture.use
     row.prop(picture, "camera", text="", icon="CAMERA_DATA")
     row.prop(picture, "frame")
+    if index is not None and len(bpy.data.scenes) > 1:
+        row = box.row()
+        row.active = picture.use
+        row.prop(picture, "scene", text="", icon="SCENE_DATA")
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

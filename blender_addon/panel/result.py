@@ -94,13 +94,14 @@ def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: b
 
 
 def _draw_next_picture(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Which further picture would tell more, and a button that sets its camera up."""
+    """Which further picture would tell more, and a button that sets its camera or light up."""
     found = shown_result.result
-    if found is None or not found.next_sentence:
+    if found is None or found.next_picture is None:
         return
-    box = layout.box()
-    draw_sentence(box, context, found.next_sentence, "CAMERA_DATA")
-    box.operator("mfo.set_up_next_picture", icon="VIEW_CAMERA")
+    box, light = layout.box(), found.next_picture.light
+    draw_sentence(box, context, found.next_picture.sentence, "LIGHT" if light else "CAMERA_DATA")
+    text = "Set Up Light" if light else "Set Up Camera"
+    box.operator("mfo.set_up_next_picture", text=translated(text), icon="LIGHT" if light else "VIEW_CAMERA")
 
 
 def _cells(

@@ -33,6 +33,18 @@ class PastPicture:
 
 
 @dataclass(frozen=True)
+class NextPicture:
+    """What a result proposes; the fields are those of `next_picture` in result.json."""
+
+    sentence: str
+    turn: float
+    center: tuple[float, ...]
+    camera: str = ""
+    light: str = ""
+    light_turn: float = 0.0
+
+
+@dataclass(frozen=True)
 class JobResult:
     """The outcome of a fit; values by parameter name of `model`, colours linear Rec.709, errors (start, result).
 
@@ -61,9 +73,7 @@ class JobResult:
     spread: Mapping[str, float] = field(default_factory=dict)  # standard deviation, of a colour's least sure channel
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # what the fit could have chosen
     pictures: tuple[PastPicture, ...] = ()  # of a fit of several
-    next_sentence: str = ""  # on the further picture that would tell more
-    next_turn: float | None = None  # degrees that its camera is turned about the vertical
-    next_center: tuple[float, ...] = (0.0, 0.0, 0.0)  # a point of that axis
+    next_picture: NextPicture | None = None  # that would tell more
     leaf: str = ""  # the name of the fitted shader node, after the groups it lies in; empty where that is not known
     labels: Mapping[str, str] = field(default_factory=dict)  # what it calls values, where it has another name for them
 
@@ -159,7 +169,7 @@ def read_job_result(folder: Path) -> JobResult:
             leaf="/".join(map(str, target.get("node", ()))),
             labels={str(k): str(v) for k, v in target.get("labels", {}).items()},
             pictures=tuple(_picture(folder, p) for p in result.get("pictures", ())),
-            **_next_picture(result.get("next_picture")),
+            next_picture=_next_picture(result.get("next_picture")),
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -194,14 +204,15 @@ def _picture(folder: Path, data: dict[str, Any]) -> PastPicture:
     return PastPicture(name, str(data.get("verdict") or ""), (float(before), float(after)), inner)
 
 
-def _next_picture(data: dict[str, Any] | None) -> dict[str, Any]:
+def _next_picture(data: Mapping[str, Any] | None) -> NextPicture | None:
     if not data:
-        return {}
+        return None
     center = tuple(float(v) for v in data["center"])
-    turn = float(data["turn"])
-    if len(center) != 3 or not all(map(math.isfinite, (turn, *center))):
+    turns = float(data["turn"]), float(data.get("light_turn", 0.0))
+    if len(center) != 3 or not all(map(math.isfinite, (*turns, *center))):
         raise ValueError("the proposed camera is no place")
-    return {"next_sentence": str(data["sentence"]), "next_turn": turn, "next_center": center}
+    names = str(data.get("camera", "")), str(data.get("light", ""))
+    return NextPicture(str(data["sentence"]), turns[0], center, *names, turns[1])
 
 
 def _spread(deviations: list[Any]) -> float:

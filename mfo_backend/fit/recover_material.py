@@ -18,6 +18,7 @@ from ..types.event import Listener, Preview, Started
 from ..types.image import Image, Pixels
 from ..types.result import FitResult
 from ..types.status import Status
+from .candidates import NOTHING_ELSE, Candidates
 from .judge.fit_task import FitTask, check_task
 from .judge.judged_result import judged_result
 from .judge.model_gap import model_gap
@@ -71,6 +72,7 @@ def recover_material(
     begin: Vector | None = None,
     judged: bool = True,
     nearer_than: float | None = None,
+    candidates: Candidates = NOTHING_ELSE,
 ) -> FitOutcome:
     """Recover the renderer's parameters from a picture of the same scene.
 
@@ -99,6 +101,8 @@ def recover_material(
     nearer_than
         FLIP beyond noise of a result of another class: stages on whole light paths stop where their first ones do not
         come below it.
+    candidates
+        The scene's other cameras and lights, from which a further picture could be proposed.
 
     Raises
     ------
@@ -112,7 +116,7 @@ def recover_material(
         If no route of the preset holds the material, and it may not be handed over.
     """
     task = check_task(renderer, reference, settings, display, listener, should_stop)
-    task = replace(task, nearer_than=nearer_than)
+    task = replace(task, nearer_than=nearer_than, candidates=candidates)
     reasons: list[str] = []
     for make, why in _ways(task, plan, begin, hand_over=hand_over):
         try:

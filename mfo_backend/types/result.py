@@ -56,12 +56,18 @@ class Contradiction:
 
 @dataclass(frozen=True)
 class NextPicture:
-    """A further picture that would tell more: the first one's camera, turned about the world's Z axis.
+    """A further picture that would tell more: from another camera, or under other light.
 
     Attributes
     ----------
     turn, center
-        Degrees against the clock as seen from above, and the world point that the axis goes through.
+        Degrees that the first picture's camera is turned by around the vertical through a world point, against the
+        clock as seen from above; 0 leaves it.
+    camera
+        The scene's camera to take it from instead; empty for the first picture's.
+    light, light_turn
+        The light that is changed, and degrees that it is turned by around the same axis, 0 for it alone: all other
+        lamps and the world are off. Empty for the light as it is.
     settles
         Values that it would determine.
     predicted
@@ -73,6 +79,9 @@ class NextPicture:
     settles: tuple[str, ...]
     predicted: dict[str, float]
     sentence: str
+    camera: str = ""
+    light: str = ""
+    light_turn: float = 0.0
 
 
 @dataclass(frozen=True)

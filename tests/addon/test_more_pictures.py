@@ -137,7 +137,67 @@ def test_the_proposed_camera_is_set_up_around_the_object_and_listed(scene: Simpl
     np.testing.assert_allclose(new, rotation @ old, atol=1e-5)
 
 
-@pytest.mark.parametrize("wrong", [{"center": [0.0]}, {"turn": "far"}, {"turn": None}])
+def set_up(scene: SimpleNamespace, **proposal: object) -> None:
+    """Show a proposal and press its button."""
+    runtime = scene.bpy.context.window_manager.mfo_runtime
+    shown_result.clear(runtime)
+    shown_result.show(read_job_result(propose(scene, **proposal)), 0)
+    assert scene.bpy.ops.mfo.set_up_next_picture() == {"FINISHED"}
+
+
+def test_a_proposed_camera_of_the_scene_is_taken(scene: SimpleNamespace) -> None:
+    bpy = scene.bpy
+    side = bpy.context.scene.camera.copy()
+    side.name = "Side"
+    bpy.context.collection.objects.link(side)
+    set_up(scene, turn=0.0, camera="Side")
+    assert bpy.context.scene.camera == side
+    assert bpy.context.scene.mfo.pictures[0].camera == side
+    bpy.context.scene.camera = bpy.context.scene.mfo.first_picture.camera
+    bpy.data.objects.remove(side)
+    with pytest.raises(RuntimeError, match="no object 'Side' any more"):
+        bpy.ops.mfo.set_up_next_picture()
+
+
+@pytest.mark.parametrize("turn", [0.0, 90.0])
+def test_proposed_light_is_a_scene_of_its_own(scene: SimpleNamespace, turn: float) -> None:
+    bpy = scene.bpy
+    own, lights = bpy.context.scene, {}
+    room = bpy.data.collections.new("Room")
+    own.collection.children.link(room)
+    for name, collection in (("Key", room), ("Fill", own.collection)):
+        lights[name] = bpy.data.objects.new(name, bpy.data.lights.new(name, "POINT"))
+        lights[name].location = (3.0, 0.0, 2.0)
+        collection.objects.link(lights[name])
+    own.view_layers[0].layer_collection.children["Room"].indirect_only = True
+    bpy.context.view_layer.update()
+    before = set(own.objects)
+    set_up(scene, turn=0.0, light="Key", light_turn=turn)
+    entry = own.mfo.pictures[0]
+    assert (entry.camera, bpy.context.scene) == (own.camera, own)
+    assert set(own.objects) == before
+    there = {each.name for each in entry.scene.objects if each.type == "LIGHT"}
+    others = {each.name for each in before if each.type == "LIGHT"} - {"Key"}
+    assert {each for each in before if each.type != "LIGHT"} <= set(entry.scene.objects)
+    copied = [each for each in entry.scene.view_layers[0].layer_collection.children if each.name.startswith("Room")]
+    assert [each.indirect_only for each in copied] == [True]
+    if turn == 0.0:
+        assert there == {"Key"}
+        assert entry.scene.world is None
+    else:
+        assert there == {"Key.001", *others}
+        assert entry.scene.world == own.world
+        place = np.array(entry.scene.objects["Key.001"].matrix_world)[:3, 3]
+        np.testing.assert_allclose(place, (1.0, 2.0, 2.0), atol=1e-5)  # about the vertical through (1, 0)
+    second = Path(scene.reference).with_name("second.png")
+    fake_backend.png(second, (60, 60, 40), WIDTH, HEIGHT)
+    entry.path = str(second)
+    fit(scene)
+    more = json.loads((Path(scene.job) / "more_pictures" / "2" / "request.json").read_text("utf-8"))
+    assert more["picture"]["scene"] == entry.scene.name
+
+
+@pytest.mark.parametrize("wrong", [{"center": [0.0]}, {"turn": "far"}, {"turn": None}, {"light_turn": "far"}])
 def test_a_proposal_that_is_none_is_refused(scene: SimpleNamespace, wrong: dict[str, object]) -> None:
     with pytest.raises(JobResultError):
         read_job_result(propose(scene, **wrong))

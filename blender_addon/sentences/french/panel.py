@@ -177,6 +177,8 @@ PANEL = {
     "The job has several materials, and one is named: leave the name out.": "La tâche a plusieurs matériaux, et un seul est nommé : omettre le nom.",
     "There is no such result any more: run the fit again.": "Ce résultat n'existe plus : relancer l'ajustement.",
     "{} was left as it is: {} {}": "{} est resté tel quel : {} {}",
+    "Scene {} is set up: make the picture from there and choose its file.": "La scène {} est en place : faire l'image de là et choisir son fichier.",
+    "The scene has no object {} any more: run the fit again.": "La scène n'a plus d'objet {} : relancer l'ajustement.",
     "Camera {} is set up: make the picture from there and choose its file.": "La caméra {} est en place : faire l'image de là et choisir son fichier.",
     "{}: {} before, {} recovered": "{} : avant {}, trouvé {}",
     "unknown": "inconnu",

@@ -178,6 +178,8 @@ PANEL = {
     "There is no such result any more: run the fit again.": "Dieses Ergebnis gibt es nicht mehr: die Anpassung erneut starten.",
     "{} was left as it is: {} {}": "{} blieb, wie es ist: {} {}",
     "Camera {} is set up: make the picture from there and choose its file.": "Kamera {} ist aufgestellt: das Bild von dort machen und seine Datei wählen.",
+    "Scene {} is set up: make the picture from there and choose its file.": "Szene {} ist eingerichtet: das Bild von dort machen und seine Datei wählen.",
+    "The scene has no object {} any more: run the fit again.": "Die Szene hat kein Objekt {} mehr: die Anpassung noch einmal starten.",
     "{}: {} before, {} recovered": "{}: vorher {}, gefunden {}",
     "unknown": "unbekannt",
     "determined": "bestimmt",

@@ -17,6 +17,7 @@ from ...render.pictures.renderer import Renderer
 from ...render.sheet.contact_sheet import ContactSheet
 from ...types.event import Listener
 from ...types.image import Encoding, Image, Pixels
+from ..candidates import Candidates
 from ..settings import FitSettings
 from .checked_reference import check_reference, counted_pixels
 
@@ -43,6 +44,8 @@ class FitTask:
         The fit's begin on the monotonic clock, seconds.
     nearer_than
         FLIP beyond noise that a fit from another class has to come below; None where there is none before it.
+    candidates
+        The scene's other cameras and lights, from which a further picture could be.
     """
 
     renderer: Renderer
@@ -58,6 +61,7 @@ class FitTask:
     should_stop: Callable[[], bool]
     began: float
     nearer_than: float | None = None
+    candidates: Candidates = field(default_factory=Candidates)
 
     @property
     def sheet(self) -> ContactSheet | None:

@@ -15,6 +15,7 @@ from ...render.paths.recorded_scene import RecordedScene
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.sheet.recorded_sheet import RecordedSheet
 from ...render.sheet.sheet_renderer import SheetRenderer
+from ...render.sheet.turned_camera import View, view_of
 from ...types.certainty import Certainty
 from ...types.image import Pixels
 from ...types.result import Contradiction, NextPicture
@@ -175,8 +176,14 @@ class RecordedRoute:
             return None
         scene = self._scene if isinstance(self._scene, RecordedScene) else self._scene.first
         pictures = 1 if task.sheet is None else len(task.sheet)
-        known = Known(kept.x, kept.spread, kept.certainty, self._renderer.start, pictures)
-        return next_picture(scene, known, Stream.NEXT_PICTURE.seed(task.settings.seed))
+        known = Known(kept.x, kept.spread, kept.certainty, self._renderer.start, pictures, self._views())
+        return next_picture(scene, known, task.candidates, Stream.NEXT_PICTURE.seed(task.settings.seed))
+
+    def _views(self) -> tuple[View, ...]:
+        """Where the cameras of the pictures stand."""
+        renderers = getattr(self._renderer, "renderers", (self._renderer,))
+        found = (view_of(renderer.scene.sensors()[0]) for renderer in renderers)
+        return tuple(view for view in found if view is not None)
 
     def _contradiction(self, end: OnRecording, kept: Kept) -> Contradiction | None:
         """Which of several pictures does not go with the others."""

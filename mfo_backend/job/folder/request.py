@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from ...fit.candidates import Candidates
 from ...fit.settings import FitSettings
 from ...material.cycles_model import SHADERS
 from ...metrics.display.tone_mapping import DisplayView
@@ -20,6 +21,7 @@ from .graph_request import NodeGraph, graph_from_json, graph_to_json
 from .job_folder import JobFolder
 from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
 from .picture_part import PicturePart, part_from_json, part_to_json
+from .picture_request import Picture, candidates_from_json, candidates_to_json, picture_from_json
 from .scene_files import check_scene_files
 from .view_request import ViewTable, light_paths_from_json, table_from_json, view_from_json
 
@@ -34,6 +36,7 @@ WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),
     *("film_exposure", "graph", "fit", "notes", "left_out", "picture", "more_pictures", "targets"),
+    *("cameras", "lights"),
 )
 _MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", *MIX_KEYS)
 
@@ -101,18 +104,6 @@ class Material:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """Where a picture of several comes from: its number, counted from 1, its file, and what of the .blend it shows."""
-
-    number: int = 1
-    name: str = ""
-    frame: int | None = None
-    camera: str = ""
-    scene: str = ""
-    view_layer: str = ""
-
-
-@dataclass(frozen=True)
 class Request:
     """A whole job; paths are relative to its folder, sizes are pixels. Without a view, exposure suits the reference.
 
@@ -141,6 +132,7 @@ class Request:
     left_out: tuple[str, ...] = ()  # those of the notes that may be why a result does not match
     generator: Mapping[str, Any] = field(default_factory=dict)
     picture: Picture = field(default_factory=Picture)
+    candidates: Candidates = field(default_factory=Candidates)  # for a further picture
     more_pictures: tuple[tuple[str, Request], ...] = ()
     targets: tuple[tuple[str, Request], ...] = ()
 
@@ -226,7 +218,8 @@ def request_from_json(data: Any) -> Request:
         notes=top.texts("notes", ()),
         left_out=top.texts("left_out", top.texts("notes", ())),
         generator=_generator(top.mapping("generator", {})),
-        picture=_picture(top.raw("picture", None)),
+        picture=picture_from_json(top.raw("picture", None), WHERE),
+        candidates=candidates_from_json(top.raw("cameras", ()), top.raw("lights", ()), WHERE),
     )
 
 
@@ -269,20 +262,6 @@ def _folder_of(folder: JobFolder, path: str, key: str) -> JobFolder:
     return JobFolder.open(folder.root / path)
 
 
-def _picture(data: Any) -> Picture:
-    if data is None:
-        return Picture()
-    picture = CheckedObject(data, f"{WHERE}: picture", ("number", "name", "frame", "camera", "scene", "view_layer"))
-    return Picture(
-        number=picture.integer("number", 1, 10_000, 1),
-        name=picture.text("name", ""),
-        frame=picture.integer("frame", -(2**20), 2**20) if picture.raw("frame", None) is not None else None,
-        camera=picture.text("camera", ""),
-        scene=picture.text("scene", ""),
-        view_layer=picture.text("view_layer", ""),
-    )
-
-
 def request_to_json(request: Request) -> dict[str, Any]:
     """The JSON form of a request; `request_from_json` is its inverse."""
     materials = asdict(request)["materials"]
@@ -315,6 +294,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
         "notes": list(request.notes),
         "left_out": list(request.left_out),
         **({"picture": asdict(request.picture)} if request.picture != Picture() else {}),
+        **candidates_to_json(request.candidates),
         **{key: [path for path, _ in found] for key in _MOST_OF if (found := getattr(request, key))},
     }
 

@@ -214,7 +214,7 @@ class _OneMaterial:
         outcome = recover_material(
             renderer, shown, self.request.fit, display=display, listener=heard, should_stop=self.should_stop,
             hand_over=nearer_than is None, noted=any(p.request.left_out for p in self.pictures),
-            nearer_than=nearer_than,
+            nearer_than=nearer_than, candidates=self.request.candidates,
         )  # fmt: skip
         result = outcome.result if together is None else with_notes(outcome.result, together.notes)
         sheet = None if together is None else together.renderer.sheet

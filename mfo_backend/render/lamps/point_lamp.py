@@ -13,6 +13,7 @@ shaded point, so that irradiance nearby grows no further than to d = r. Choose t
 from __future__ import annotations
 
 import math
+from copy import copy
 from typing import Any
 
 import drjit as dr
@@ -81,6 +82,12 @@ class SpotCone:
         self.soft = dr.opaque(mi.Float, max((1.0 - rim) * float(props["blend"]), 1e-9))
         inverse = np.linalg.inv(matrix_of(props)[:3, :3])
         self.rows = [opaque_vector(row) for row in inverse]
+
+    def turned(self, turn: np.ndarray) -> SpotCone:
+        """The cone after a rotation (3, 3) of the lamp."""
+        other = copy(self)
+        other.rows = [opaque_vector(turn @ np.array(row, np.float64).ravel()) for row in self.rows]
+        return other
 
     def factor(self, direction: mi.Vector3f) -> mi.Float:
         """The factor for light that arrives along the line `direction`, which points to the lamp."""

@@ -188,8 +188,18 @@ class RecordedScene:
         self.renderer.counter.add(1.0)
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
 
-    def record_from(self, sensor: mi.Sensor, vector: NDArray[np.float64], *, grid: int, seed: int) -> RecordedPaths:
+    def record_from(
+        self,
+        sensor: mi.Sensor,
+        vector: NDArray[np.float64],
+        *,
+        grid: int,
+        seed: int,
+        pixels: NDArray[np.bool_] | None = None,
+    ) -> RecordedPaths:
         """Record what another camera would see of the material `vector`, with two samples where light is sampled.
+
+        Only some `pixels` of its film are looked at, True (height, width), or all.
 
         Raises
         ------
@@ -210,6 +220,7 @@ class RecordedScene:
             light_paths=self.renderer.light_paths,
             samples=2 if self.needs.sampled else 1,
             free_emission=EMISSION in self.renderer.table.names,
+            pixels=pixels,
             sensor=sensor,
         )
         return record_paths(self.renderer.scene, self.renderer.shape, settings, allow_dark=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mfo_backend.fit.pictures.next_picture import _proposal
+from mfo_backend.fit.pictures.next_picture import Choice, _proposal
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
 TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coat_weight", 1, 0.0, 1.0, 0.5)])
@@ -22,11 +22,14 @@ TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coa
     ],
 )
 def test_what_a_picture_settles_is_what_falls(before, after, settles, ends):
-    found = _proposal(60.0, np.zeros(3), np.array(after), np.array(before), TABLE.names, TABLE)
+    found = _proposal(Choice(turn=60.0), np.zeros(3), np.array(after), np.array(before), TABLE.names, TABLE)
     assert found is not None
     assert found.settles == settles
     assert found.sentence.endswith(ends)
 
 
 def test_where_no_deviation_falls_nothing_is_proposed():
-    assert _proposal(60.0, np.zeros(3), np.array([0.015, 0.2]), np.array([0.019, 0.3]), TABLE.names, TABLE) is None
+    assert (
+        _proposal(Choice(turn=60.0), np.zeros(3), np.array([0.015, 0.2]), np.array([0.019, 0.3]), TABLE.names, TABLE)
+        is None
+    )

@@ -292,3 +292,32 @@ def test_light_paths_come_back_and_are_checked(request_data: dict) -> None:
         with pytest.raises(BadInputError) as error:
             request_from_json({**data, "light_paths": wrong})
         assert_one_sentence(error.value)
+
+
+PLACE = [1, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1]
+SIDE = {"name": "Side", "to_world": PLACE, "fov": 40.0}
+
+
+def test_cameras_and_lights_of_the_scene_come_back(request_data: dict) -> None:
+    data = request_data | {"cameras": [SIDE], "lights": [{"name": "Key", "emitter": "light_0001"}]}
+    request = request_from_json(data)
+    assert request.candidates.cameras[0].to_world[3] == 2.0
+    assert request.candidates.lights[0].emitter == "light_0001"
+    assert request_from_json(request_to_json(request)) == request
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("cameras", "Side", "cameras is 'Side'"),
+        ("cameras", [SIDE] * 65, "at most 64"),
+        ("cameras", [SIDE | {"to_world": PLACE[:9]}], r"cameras\[0\].to_world is .*16 finite numbers"),
+        ("cameras", [SIDE | {"to_world": [3, *PLACE[1:]]}], "without a scale"),
+        ("cameras", [SIDE | {"fov": 200.0}], "fov is 200"),
+        ("lights", [{"name": "Key"}], "'emitter': it is required"),
+    ],
+)
+def test_wrong_cameras_and_lights_are_one_sentence(request_data: dict, key: str, value: object, words: str) -> None:
+    with pytest.raises(BadInputError, match=words) as caught:
+        request_from_json(request_data | {key: value})
+    assert_one_sentence(caught.value)

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a scene has to offer for a further picture: its other cameras, and lights that can be moved or left alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class OtherCamera:
+    """A perspective camera of the scene, by its name.
+
+    `to_world` are the 16 numbers of Mitsuba's matrix, row by row; `fov` is its field of view along x, degrees.
+    """
+
+    name: str
+    to_world: tuple[float, ...]
+    fov: float
+
+
+@dataclass(frozen=True)
+class SceneLight:
+    """A light that can be moved or left alone: what the user calls it, and the id of its emitter in the scene file."""
+
+    name: str
+    emitter: str
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """The cameras and lights of a scene."""
+
+    cameras: tuple[OtherCamera, ...] = ()
+    lights: tuple[SceneLight, ...] = ()
+
+
+NOTHING_ELSE = Candidates()
