@@ -100,8 +100,8 @@ def _draw_next_picture(layout: bpy.types.UILayout, context: bpy.types.Context) -
         return
     box, light = layout.box(), found.next_picture.light
     draw_sentence(box, context, found.next_picture.sentence, "LIGHT" if light else "CAMERA_DATA")
-    text = "Set Up Light" if light else "Set Up Camera"
-    box.operator("mfo.set_up_next_picture", text=translated(text), icon="LIGHT" if light else "VIEW_CAMERA")
+    icon = "LIGHT" if light else "VIEW_CAMERA"
+    box.operator("mfo.set_up_next_picture", text="Set Up Light" if light else "Set Up Camera", icon=icon)
 
 
 def _cells(
