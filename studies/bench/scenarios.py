@@ -16,7 +16,7 @@ from ..materials.measure import measure as measure_room
 from ..verdicts.measure import flips
 from ..verdicts.measure import measure as measure_verdict
 from ..verdicts.summary import determined
-from ..views.measure import TURNS, fit, rendered
+from ..views.measure import FRONT, SHOTS, fit, rendered, shot_of
 
 OTHER_NOISE = 7  # seed of the pictures that a result is judged by
 
@@ -50,10 +50,10 @@ def views(scene: int, size: int) -> BlenderRow:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         run_module("studies.views.scene", "build", scene, folder)
-        front = rendered(folder, "Front")
+        front = rendered(folder, FRONT)
         proposal = fit(folder, [front]).get("next_picture")
-        turn = round(proposal["turn"]) % 360 if proposal else TURNS[scene % len(TURNS)]
-        result = fit(folder, [front, rendered(folder, f"T{turn:03d}")])
+        second = shot_of(proposal) if proposal else SHOTS[scene % len(SHOTS)]
+        result = fit(folder, [front, rendered(folder, second)])
         front[0].rename(folder / "reference.exr")
         job = ("--job", folder / "job")
         for file, name, words in (("truth", "floor", ()), ("start", "before", ()), ("start", "after", job)):
@@ -69,7 +69,7 @@ def views(scene: int, size: int) -> BlenderRow:
         for name, value in result["recovered"].items()
     ]
     wrong, sure = determined(values)
-    case = f"Front and a turn of {turn} degrees"
+    case = f"Front and {second.scene or second.camera}"
     return BlenderRow("views", scene, case, result["verdict"], after, floor, start, result["seconds"], sure, wrong)
 
 

@@ -5,47 +5,72 @@ from __future__ import annotations
 
 import random
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..child_module import MATCHED_OR_NOT, run_module
 
 TURNS = range(30, 360, 30)  # degrees around the target that a camera stands at, as `scene` makes them
+LAMP_TURNS = (0, 90, 180, 270)  # degrees that its lamp is turned by; 0 is the lamp alone
+
+
+class Shot(NamedTuple):
+    """A camera of the file and the scene it shows, the first one without a name."""
+
+    camera: str
+    scene: str = ""
+
+
+FRONT = Shot("Front")
+SHOTS = (*(Shot(f"T{turn:03d}") for turn in TURNS), *(Shot("Front", f"L{turn:03d}") for turn in LAMP_TURNS))
 
 
 def measure(number: int, folder: Path) -> dict[str, Any]:
     """The row of one scene."""
     run_module("studies.views.scene", "build", number, folder)
-    front = rendered(folder, "Front")
+    front = rendered(folder, FRONT)
     one = fit(folder, [front])
     proposal = one.get("next_picture")
     draw = random.Random(1000 + number)
-    turns = [f"T{turn:03d}" for turn in TURNS]
-    proposed = f"T{round(proposal['turn']) % 360:03d}" if proposal else draw.choice(turns)
-    drawn = draw.choice([turn for turn in turns if turn != proposed])
+    proposed = shot_of(proposal) if proposal else draw.choice(SHOTS)
+    drawn = draw.choice([shot for shot in SHOTS if shot != proposed])
     second, third = rendered(folder, proposed), rendered(folder, drawn)
-    wrong = rendered(folder, proposed, moved=True)
+    # a lamp that is elsewhere in the first scene
+    planted = next((shot for shot in (proposed, drawn) if not shot.scene), Shot(f"T{draw.choice(TURNS):03d}"))
+    wrong = rendered(folder, planted, moved=True)
+    other = third if planted == proposed else second
     return {
         "number": number,
         "proposal": proposal,
-        "cameras": [proposed, drawn],
+        "shots": [proposed, drawn],
         "one": _short(one),
         "proposed": _short(fit(folder, [front, second])),
         "drawn": _short(fit(folder, [front, third])),
         "three": _short(fit(folder, [front, second, third])),
-        "planted": _short(fit(folder, [front, wrong, third])),
+        "planted": _short(fit(folder, [front, wrong, other])),
     }
 
 
-def rendered(folder: Path, camera: str, *, moved: bool = False) -> tuple[Path, str]:
-    """The truth from a camera, and the camera's name."""
-    file = folder / f"{camera}{'_moved' if moved else ''}.exr"
-    run_module("studies.views.scene", "render", folder, camera, file, *(["--moved"] if moved else []))
-    return file, camera
+def shot_of(proposal: dict[str, Any]) -> Shot:
+    """The camera and scene of the files that a result proposes."""
+    if proposal["light"]:
+        return Shot("Front", f"L{round(proposal['light_turn']) % 360:03d}")
+    return Shot(proposal["camera"] or f"T{round(proposal['turn']) % 360:03d}")
 
 
-def fit(folder: Path, pictures: list[tuple[Path, str]]) -> dict[str, Any]:
+def rendered(folder: Path, shot: Shot, *, moved: bool = False) -> tuple[Path, Shot]:
+    """The truth as a shot shows it."""
+    file = folder / f"{shot.camera}{shot.scene}{'_moved' if moved else ''}.exr"
+    words = [*(["--scene", shot.scene] if shot.scene else []), *(["--moved"] if moved else [])]
+    run_module("studies.views.scene", "render", folder, shot.camera, file, *words)
+    return file, shot
+
+
+def fit(folder: Path, pictures: list[tuple[Path, Shot]]) -> dict[str, Any]:
     """The result of one job over all pictures."""
-    words = [word for file, camera in pictures for word in ("--reference", f"{file}@camera={camera}")]
+    words: list[str] = []
+    for file, shot in pictures:
+        what = f"camera={shot.camera}" + (f",scene={shot.scene}" if shot.scene else "")
+        words += ["--reference", f"{file}@{what}"]
     asked = ("--object", "Target", *words, "--out", folder / "job", "--json")
     return run_module("mfo_backend", "blend", folder / "start.blend", *asked, allowed=MATCHED_OR_NOT).answer
 

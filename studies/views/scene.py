@@ -2,10 +2,11 @@
 """The scenes of `studies.views`, run by a Python with `bpy`.
 
     python -m studies.views.scene build NUMBER FOLDER
-    python -m studies.views.scene render FOLDER CAMERA FILE [--moved]
+    python -m studies.views.scene render FOLDER CAMERA FILE [--scene SCENE] [--moved]
 
 `build` writes truth.blend, its values in truth.json, and start.blend, with the camera Front and its turns T030 to T330
-around the target; `render` shows the truth from one of them, with `--moved` under a lamp that is elsewhere.
+around the target, and scenes whose lamp is turned likewise, L090 to L270, or alone, L000; `render` shows the truth from
+one of the cameras in one of the scenes, with `--moved` under a lamp that is elsewhere.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import bpy
 from mathutils import Matrix, Vector  # pyright: ignore[reportMissingImports]  # part of bpy
 
 TARGET, CENTER = "Target", Vector((0.0, 0.0, 1.1))
-TURNS = range(30, 360, 30)
+TURNS, LAMP_TURNS = range(30, 360, 30), (0, 90, 180, 270)
 SIZE, SAMPLES = 64, 128
 MOVED = 1.1  # radians that the lamp is turned by
 
@@ -56,6 +57,7 @@ def build(number: int, folder: Path) -> None:
         around = Matrix.Translation(CENTER) @ Matrix.Rotation(math.radians(turn), 4, "Z") @ Matrix.Translation(-CENTER)
         _camera(f"T{turn:03d}", around @ front.matrix_world)
     scene.camera = front
+    _other_light(scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "start.blend"), copy=True)
     truth = {
         "Base Color": (*(draw.uniform(0.05, 0.8) for _ in range(3)), 1.0),
@@ -72,10 +74,10 @@ def build(number: int, folder: Path) -> None:
     (folder / "truth.json").write_text(json.dumps({name.lower().replace(" ", "_"): v for name, v in truth.items()}))
 
 
-def render(folder: Path, camera: str, file: Path, *, moved: bool) -> None:
-    """Render the truth from a camera."""
+def render(folder: Path, camera: str, file: Path, *, name: str, moved: bool) -> None:
+    """Render the truth from a camera in a scene, the first one without a name."""
     bpy.ops.wm.open_mainfile(filepath=str(folder / "truth.blend"))
-    scene = bpy.context.scene
+    scene = bpy.data.scenes[name] if name else bpy.context.scene
     scene.camera = scene.objects[camera]
     if moved:
         _place(scene.objects["Lamp"], scene.objects["Lamp"]["turn"] + MOVED)
@@ -85,7 +87,23 @@ def render(folder: Path, camera: str, file: Path, *, moved: bool) -> None:
     settings.file_format, settings.color_depth = "OPEN_EXR", "32"
     scene.cycles.seed = sum(camera.encode())
     scene.render.filepath = str(file)
-    bpy.ops.render.render(write_still=True)
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+
+
+def _other_light(scene: bpy.types.Scene) -> None:
+    """Scenes of the same objects with the lamp turned about the target, and with it alone."""
+    lamp = scene.objects["Lamp"]
+    for degrees in LAMP_TURNS:
+        other = scene.copy()
+        other.name = f"L{degrees:03d}"
+        if not degrees:
+            other.world = None
+            continue
+        around = Matrix.Translation(CENTER) @ Matrix.Rotation(math.radians(degrees), 4, "Z")
+        moved = lamp.copy()
+        moved.matrix_world = around @ Matrix.Translation(-CENTER) @ lamp.matrix_world
+        other.collection.objects.unlink(lamp)
+        other.collection.objects.link(moved)
 
 
 def _lights(draw: random.Random, kind: str) -> None:
@@ -140,9 +158,10 @@ if __name__ == "__main__":
     one.add_argument("folder", type=Path)
     one.add_argument("camera")
     one.add_argument("file", type=Path)
+    one.add_argument("--scene", default="")
     one.add_argument("--moved", action="store_true")
     chosen = parser.parse_args()
     if chosen.command == "build":
         build(chosen.number, chosen.folder)
     else:
-        render(chosen.folder, chosen.camera, chosen.file, moved=chosen.moved)
+        render(chosen.folder, chosen.camera, chosen.file, name=chosen.scene, moved=chosen.moved)

@@ -2,24 +2,27 @@
 """Which further picture would tell most of the values that are not determined.
 
 Candidates are turns of the present camera around the target, the scene's other cameras, and from where the present
-camera stands each lamp turned likewise or alone. Each is recorded with few lanes at the solution. Its normal equations
-add to the information that there is, so
-the covariance with it is (C^-1 + I)^-1, before the picture exists (optimal design of experiments; V. Fedorov, "Theory
-of Optimal Experiments", 1972). The present picture is recorded in the same way, and what it tells is
-known: C^-1. A candidate tells as much more or less of it as its normal equations are larger or smaller, in the
-directions in which they differ most; the noise of so few lanes is in both.
+camera stands each lamp turned likewise or alone. Each is recorded with few lanes at the solution. Its derivatives join
+those of the pictures that there are, and certainty is taken from all of them as it will be when the picture exists
+(optimal design of experiments; V. Fedorov, "Theory of Optimal Experiments", 1972). The present picture is recorded in
+the same way: how much larger its own derivatives are than those of the fit says in which unit a candidate's count.
+Materials that explain the pictures as well are looked at in the candidate's: how far apart they are there says how much
+of the doubt would be left.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_image import TwoSamples
 from ...render.paths.recorded_scene import RecordedScene
 from ...render.sheet.turned_camera import View, side_by_side, target_center, turn_about, view_of
@@ -27,8 +30,11 @@ from ...types.certainty import Certainty, Level
 from ...types.errors import BadInputError
 from ...types.parameter import ParameterTable
 from ...types.result import NextPicture
+from ..alike.compare import Comparison
 from ..candidates import Candidates
-from ..squares.recording_noise import rows_of_samples, without_own_noise
+from ..certainty.covariance import covariance
+from ..squares.problem import Rival
+from ..squares.recording_noise import MOST_OWN, rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
 from ..tolerances import DETERMINED_BELOW, NOTHING_KNOWN, WORTH_A_PICTURE
 
@@ -37,25 +43,99 @@ Vector = NDArray[np.float64]
 TURNS = tuple(range(0, 360, 30))  # degrees; the first is the present camera
 LAMP_TURNS = (90, 180, 270)  # degrees
 MOST_CAMERAS, MOST_LAMPS = 12, 3  # that are looked at: each lamp's recordings take 0.3 s of processor time
-SIDE = 40  # pixels along the longer side of a candidate: some hundred see the target
-GRID = 2  # squared: camera rays of a pixel
-_RIDGE = 1e-9  # of the largest entry
+SIDE = 80  # pixels along the longer side of a candidate, at most: some thousand see the target
+GRID = 1  # squared: camera rays of a pixel
+STRONG = 1e-3  # of the largest: information of a direction that the unit is taken from
 _SAME_PLACE = 1e-3  # of matrices of cameras, metres and sines
 
 
 @dataclass(frozen=True)
-class Known:
-    """What the present `pictures` tell: the solution and its covariance in widths of the box.
+class Doubt:
+    """Another material that explains the pictures about as well, and how they compare.
 
-    `user` are the scene's own values; `views` are where the pictures' cameras stand, as far as that is known.
+    `away` is its way from the solution in widths of the box.
+    """
+
+    rival: Rival
+    away: Vector
+    comparison: Comparison
+
+    @property
+    def spread(self) -> Vector:
+        """What it adds to the covariance."""
+        return np.outer(self.away, self.away)
+
+    def share(self, times: float) -> float:
+        """Its share after a picture whose two materials are `times` as far apart as in one of the present ones."""
+        it = self.comparison
+        further = it.distance * times
+        before = max(it.better, 1e-12)
+        deviation = math.sqrt(it.deviation**2 + 4.0 * it.inflation * further)
+        return self.rival.share * min(NormalDist().cdf(-(it.more + further) / max(deviation, 1e-12)) / before, 1.0)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Residuals and derivatives (g, 3, 1 + k) of the fit at its solution, the recording's own noise in them, the least
+    error of a residual, and how many `pictures` they are of."""
+
+    rows: Vector
+    own: Vector | None
+    model_error: float
+    pictures: int
+
+    def with_further(self, told: _Told, unit: float, table: ParameterTable) -> Vector:
+        """The covariance with a further picture, whose derivatives count in this `unit`.
+
+        Its residuals are as large as the present ones, of signs by chance.
+        """
+        size = float(np.sqrt(np.mean(np.square(self.rows[:, :, 0]))))
+        rows = told.rows / unit
+        rows[:, :, 0] = size * np.random.default_rng(0).choice((-1.0, 1.0), rows.shape[:2])
+        own = None
+        if self.own is not None:
+            further = np.zeros_like(rows) if told.own is None else told.own / unit
+            further[:, :, 0] = 0.0
+            own = np.concatenate([self.own, further])
+        return covariance(np.concatenate([self.rows, rows]), own, table, self.model_error)
+
+    def unit_of(self, present: _Told, table: ParameterTable) -> float:
+        """How much larger the derivatives of the present picture's few lanes are than those of the fit.
+
+        The median over the directions that the fit tells apart: where its lanes show next to nothing a ratio is noise.
+        """
+        there, here = (_gram(rows, own, table) for rows, own in ((self.rows, self.own), (present.rows, present.own)))
+        levels, directions = np.linalg.eigh(there / self.pictures)
+        strong = levels > STRONG * levels[-1]
+        seen = np.einsum("ki,kl,li->i", directions, here, directions, optimize=True)
+        return float(np.sqrt(max(np.median(seen[strong] / levels[strong]), 1e-30)))
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a picture tells: derivatives (g, 3, 1 + k) of its residuals, the recording's own noise in them, and squared
+    distances to each of the doubts' pictures."""
+
+    rows: Vector
+    own: Vector | None
+    distances: Vector
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the present pictures tell: the solution, its covariance in widths of the box, and what that is taken from.
+
+    `user` are the scene's own values; `views` are where the pictures' cameras stand, as far as that is known; `doubts`
+    are what else it may be.
     """
 
     x: Vector
     spread: Vector
     certainty: Mapping[str, Certainty]
     user: Vector
-    pictures: int
+    evidence: Evidence
     views: tuple[View, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
 
     def open(self, table: ParameterTable) -> tuple[str, ...]:
         """Values that a further picture is for; none where all that is not determined is the user's own again."""
@@ -100,43 +180,45 @@ def next_picture(scene: RecordedScene, known: Known, candidates: Candidates, see
         return None
     center = target_center(scene.renderer.shape)
     with scene.renderer.counter.uncounted():  # the result is known without it
-        told = dict(_told(scene, known, candidates, center, seed))
-    own = told.pop(PRESENT, None)
-    if own is None or not told:
+        predicted = predictions(scene, known, candidates, center, seed)
+    if not predicted:
         return None
-    of_pictures = np.linalg.inv(_regular(known.spread))
-    of_one = of_pictures / known.pictures
-    predicted = [(one, _deviations(of_pictures + _information(gram, own, of_one))) for one, gram in told.items()]
-    now = _deviations(of_pictures)
-    best, after = min(predicted, key=lambda one: _score(one[1], now, wanted, table))
+    now = np.sqrt(np.maximum(np.diag(known.spread), 1e-30))
+    best, after = min(predicted.items(), key=lambda one: _score(one[1], now, wanted, table))
     return _proposal(best, center, after, now, wanted, table)
 
 
-def _information(candidate: Vector, present: Vector, known: Vector) -> Vector:
-    """What a candidate tells, from its products of derivatives, those of the present camera, and what that told.
+def predictions(
+    scene: RecordedScene, known: Known, candidates: Candidates, center: Vector, seed: int
+) -> dict[Choice, Vector]:
+    """The deviations (k,) in widths of the box that values would have after each of the pictures that could be made."""
+    told = dict(_told(scene, known, candidates, center, seed))
+    own = told.pop(PRESENT, None)
+    if own is None:
+        return {}
+    table, evidence = scene.renderer.table, known.evidence
+    unit = evidence.unit_of(own, table)
 
-    In the basis V with V' present V = 1 and V' candidate V = diag(l), each direction counts l times.
-    """
-    root = np.linalg.inv(np.linalg.cholesky(_regular(present)))
-    ratios, directions = np.linalg.eigh(root @ candidate @ root.T)
-    basis = root.T @ directions
-    scale = np.sqrt(np.maximum(ratios, 0.0))
-    back = np.linalg.inv(basis)
-    return back.T @ (scale[:, None] * (basis.T @ known @ basis) * scale) @ back
+    def after(each: _Told) -> Vector:
+        spread = evidence.with_further(each, unit, table)
+        times = each.distances / np.maximum(own.distances, 1e-12) / evidence.pictures
+        for doubt, more in zip(known.doubts, times, strict=True):
+            spread = spread + doubt.share(float(more)) * doubt.spread
+        return np.sqrt(np.maximum(np.diag(spread), 1e-30))
 
-
-def _deviations(information: Vector) -> Vector:
-    return np.sqrt(np.maximum(np.diag(np.linalg.inv(information)), 1e-30))
+    return {choice: after(each) for choice, each in told.items()}
 
 
 def _told(
     scene: RecordedScene, known: Known, candidates: Candidates, center: Vector, seed: int
-) -> Iterator[tuple[Choice, Vector]]:
-    """Choices with the products of derivatives that a picture of the present size would have, by tile of one pixel."""
+) -> Iterator[tuple[Choice, _Told]]:
+    """Choices with what a picture would tell."""
     sensor = scene.renderer.scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().crop_size())
-    part = SIDE / max(width, height)
-    size = max(round(height * part), 4), max(round(width * part), 4)
+    part = min(SIDE / max(width, height), 1.0)
+    size = _whole_tiles(height * part), _whole_tiles(width * part)
+    # a tile of the fit, for what is narrow is lost in its mean
+    block = next((side for side in (TILE, TILE // 2) if side <= TILE * part * math.sqrt(2.0)), 1)
     own = view_of(sensor)
     if own is None:
         return
@@ -146,9 +228,8 @@ def _told(
         views[Choice(camera=camera.name)] = View(np.reshape(camera.to_world, (4, 4)), camera.fov)
     views = {one: view for one, view in views.items() if one == PRESENT or not known.has(view)}
     cameras = side_by_side(list(views.values()), size)
-    table, share = scene.renderer.table, width * height / (size[0] * size[1])
 
-    def grams(pixels: NDArray[np.bool_] | None = None) -> Iterator[tuple[int, Vector]]:
+    def seen(pixels: NDArray[np.bool_] | None = None) -> Iterator[tuple[int, _Told]]:
         """By the number of a view."""
         try:
             paths = scene.record_from(cameras, known.x, grid=GRID, seed=seed, pixels=pixels)
@@ -156,23 +237,24 @@ def _told(
             return
         if paths.lanes == 0:
             return
-        groups = paths.pixel_groups()
-        samples = scene.evaluator(paths, groups).samples(known.x)
-        numbers = paths.pixel % (size[1] * len(views)) // size[1]
+        groups = paths.pixel_groups() if block == 1 else paths.tile_groups(side=block)
+        at = scene.evaluator(paths, groups)
+        samples, others = at.samples(known.x), [at.samples(doubt.rival.x) for doubt in known.doubts]
+        numbers = groups.pixels[groups.first[:-1]] % (size[1] * len(views)) // size[1]
         for number in np.unique(numbers):
             here = numbers == number
-            mean = samples.mean[here]
-            half = None if samples.half_difference is None else samples.half_difference[here]
-            rows, own = rows_of_samples(TwoSamples(mean, half), RelativeResidual(np.maximum(mean[:, :, 0], 0.0)))
-            yield int(number), _gram(rows, own, table) * share
+            residual = RelativeResidual(np.maximum(samples.mean[here][:, :, 0], 0.0))
+            rows, own = rows_of_samples(_of(samples, here), residual)
+            apart = [_distance(*rows_of_samples(_of(other, here), residual), own) for other in others]
+            yield int(number), _Told(rows, own, np.array(apart))
 
     choices = list(views)
-    yield from ((choices[number], gram) for number, gram in grams())
+    yield from ((choices[number], told) for number, told in seen())
     present = np.zeros((size[0], size[1] * len(views)), np.bool_)
     present[:, : size[1]] = True
     for choice, light in _other_light(scene, candidates, center):
         with light:
-            yield from ((choice, gram) for _, gram in grams(present))
+            yield from ((choice, told) for _, told in seen(present))
 
 
 def _other_light(
@@ -192,6 +274,23 @@ def _other_light(
             yield Choice(light=each.name, light_turn=float(degrees)), turned(lamp, turn_about(center, degrees))
 
 
+def _whole_tiles(pixels: float) -> int:
+    return max(round(pixels / TILE), 1) * TILE
+
+
+def _of(samples: TwoSamples, here: NDArray[np.bool_]) -> TwoSamples:
+    half = samples.half_difference
+    return TwoSamples(samples.mean[here], None if half is None else half[here])
+
+
+def _distance(rows: Vector, own: Vector | None, own_at_solution: Vector | None) -> float:
+    """Sum of the squares of what a picture differs in, without the recording's own noise."""
+    total = float(np.square(rows[:, :, 0]).sum())
+    if own is None or own_at_solution is None:
+        return total
+    return max(total - float(np.square(own[:, :, 0] - own_at_solution[:, :, 0]).sum()), (1.0 - MOST_OWN) * total)
+
+
 def _gram(rows: Vector, own: Vector | None, table: ParameterTable) -> Vector:
     """Products of derivatives by values in widths of the box, summed, without the recording's own noise."""
     width = table.upper - table.lower
@@ -200,10 +299,6 @@ def _gram(rows: Vector, own: Vector | None, table: ParameterTable) -> Vector:
         return scaled.T @ scaled
     half = (own[:, :, 1:] * width).reshape(-1, table.length)
     return without_own_noise(scaled.T @ scaled, half.T @ half)
-
-
-def _regular(matrix: Vector) -> Vector:
-    return matrix + _RIDGE * max(float(np.diag(matrix).max()), 1e-300) * np.eye(len(matrix))
 
 
 def _score(after: Vector, now: Vector, wanted: Sequence[str], table: ParameterTable) -> float:

@@ -19,6 +19,7 @@ from ...render.sheet.turned_camera import View, view_of
 from ...types.certainty import Certainty
 from ...types.image import Pixels
 from ...types.result import Contradiction, NextPicture
+from ..alike.compare import compare
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.covariance import certainties_away
 from ..certainty.weak_combinations import weak_combinations
@@ -26,7 +27,7 @@ from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from ..pictures.contradiction import contradiction
-from ..pictures.next_picture import Known, next_picture
+from ..pictures.next_picture import Doubt, Evidence, Known, next_picture
 from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..result.course import Course
@@ -43,7 +44,7 @@ from ..squares.residuals import (
 )
 from ..squares.stage_residuals import finishing_residuals
 from ..tolerances import AT_NOISE, NOISY, VISIBLE
-from .keep_user_values import Kept, keep_values
+from .keep_user_values import Judged, Kept, keep_values
 from .perceptual_stages import perceptual_ends
 from .recording import Setting, Vector
 from .refine import OnRecording, refine_exact, refine_sampled
@@ -166,17 +167,26 @@ class RecordedRoute:
             stages=tuple(course.reports),
             notes=tuple(notes),
             contradiction=disagree,
-            next_picture=None if disagree else self._next_picture(kept),
+            next_picture=None if disagree else self._next_picture(end, kept),
         )
 
-    def _next_picture(self, kept: Kept) -> NextPicture | None:
+    def _next_picture(self, end: OnRecording, kept: Kept) -> NextPicture | None:
         """The further picture that would tell most of the weak values."""
         task = self._task
         if task.settings.preset == "fast" or not self._alone or task.should_stop():
             return None
         scene = self._scene if isinstance(self._scene, RecordedScene) else self._scene.first
         pictures = 1 if task.sheet is None else len(task.sheet)
-        known = Known(kept.x, kept.spread, kept.certainty, self._renderer.start, pictures, self._views())
+        setting = end.recording.setting
+        width = setting.table.upper - setting.table.lower
+        doubts = tuple(
+            Doubt(rival, (rival.x - kept.x) / width, compare(end.refined.all, kept.x, rival.x))
+            for rival in end.refined.rivals
+        )
+        judged = Judged(setting, end.refined, setting.sampled)
+        evidence = Evidence(*judged.rows(kept.x), judged.model_error, pictures)
+        user = self._renderer.start
+        known = Known(kept.x, kept.spread, kept.certainty, user, evidence, self._views(), doubts)
         return next_picture(scene, known, task.candidates, Stream.NEXT_PICTURE.seed(task.settings.seed))
 
     def _views(self) -> tuple[View, ...]:

@@ -50,7 +50,7 @@ def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], fl
     setting, refined = end.recording.setting, end.refined
     table, user = setting.table, setting.user
     found, problem = refined.x, refined.all
-    judged, unseen_change = _Judged(setting, refined, weighted), _UnseenChange(end.recording, refined, seen)
+    judged, unseen_change = Judged(setting, refined, weighted), _UnseenChange(end.recording, refined, seen)
     cost, certainty, spread = judged(found)
     off = list(refined.off)
     if not off:
@@ -102,21 +102,31 @@ def _sets_to_return(
         some = some[: len(some) // 2]  # the cheapest
 
 
-class _Judged:
+class Judged:
     """Mean square residual, certainty and covariance at a vector."""
 
     def __init__(self, setting: Setting, refined: Refined, weighted: bool) -> None:
         self._setting, self._problem, self._weighted, self._rivals = setting, refined.all, weighted, refined.rivals
 
     def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
+        """All of them."""
         problem, table = self._problem, self._setting.table
-        residual = problem.residual
-        if not self._weighted:
-            residual = RelativeResidual(problem.groups.average(self._setting.reference))
-        rows, own = rows_of_samples(problem.evaluate.samples(x), residual)
-        spread = covariance(rows, own, table, model_error=0.0 if self._weighted else MODEL_ERROR)
+        rows, own = self.rows(x)
+        spread = covariance(rows, own, table, model_error=self.model_error)
         spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
         return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table, spread), spread
+
+    @property
+    def model_error(self) -> float:
+        """The least error of a residual."""
+        return 0.0 if self._weighted else MODEL_ERROR
+
+    def rows(self, x: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Residuals and derivatives (g, 3, 1 + k) that certainty is taken from, and the recording's noise in them."""
+        problem, residual = self._problem, self._problem.residual
+        if not self._weighted:
+            residual = RelativeResidual(problem.groups.average(self._setting.reference))
+        return rows_of_samples(problem.evaluate.samples(x), residual)
 
     def noise(self, cost: float) -> float:
         """Mean square of a residual that is noise."""
