@@ -3,7 +3,8 @@
 
     python -m studies.verdicts KIND [--first 0] [--count 60] [--rows verdicts.jsonl] [--folder DIR]
 
-KIND is `planted`, `classes` (from Blender's own material to each class) or `plain` (materials without coat and sheen).
+KIND is `planted`, `denoised` (the same from pictures as Blender's defaults make them), `classes` (from Blender's own
+material to each class) or `plain` (materials without coat and sheen).
 Every case is one line of the rows' file, so a run that was stopped goes on where it was. Needs a Python with `bpy`.
 """
 

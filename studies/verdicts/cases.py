@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import colorsys
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 CLASSES = ("plastic", "metal", "coat", "cloth", "glass", "cutout", "glowing")
@@ -39,11 +39,17 @@ class Case:
     start: str  # default: Blender's own Principled; other: a random plastic or metal
     size: int
     samples: int
+    denoised: bool = False  # as Blender renders by default: adaptive sampling, then OpenImageDenoise
 
     @property
     def name(self) -> str:
         """A name for files and rows."""
         return f"{self.number:03d}-{self.plant or 'plain'}-{self.material}-{self.light}"
+
+    @property
+    def judge_samples(self) -> int:
+        """Samples a pixel, without denoising, of the pictures that judge: as many as denoising stands for, about."""
+        return 8 * self.samples if self.denoised else self.samples
 
 
 def planted_case(number: int) -> Case:
@@ -77,7 +83,13 @@ def plain_case(number: int) -> Case:
     return Case(number, "", material, draw.choice(LIGHTS), draw.choice(SHAPES), picture, "default", 64, 64)
 
 
-KINDS = {"planted": planted_case, "classes": class_case, "plain": plain_case}
+def denoised_case(number: int) -> Case:
+    """Case `number` of pictures as Blender's defaults make them: those of the verdicts, denoised."""
+    draw = random.Random(4000 + number)
+    return replace(planted_case(number), size=draw.choice((64, 96, 128)), samples=draw.choice((32, 128)), denoised=True)
+
+
+KINDS = {"planted": planted_case, "classes": class_case, "plain": plain_case, "denoised": denoised_case}
 
 
 def sockets_of(case: Case) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
     code, result = run_module("mfo_backend", "blend", *asked, allowed=MATCHED_OR_NOT)
     after = folder / "after.exr"
     run_module("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job", "--out", after,
-        "--samples", case.samples, "--seed", 2)  # fmt: skip
+        "--samples", case.judge_samples, "--seed", 2)  # fmt: skip
     truth = {"metallic": 0.0} | {name.lower().replace(" ", "_"): value for name, value in sockets_of(case).items()}
     values = {
         name: {

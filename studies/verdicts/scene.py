@@ -47,6 +47,8 @@ def build(case: Case, folder: Path) -> None:
         _set_material(sockets_of(case))
         _plant(case)
     _render(case, folder / "reference.exr", seed=0)
+    bpy.context.scene.cycles.samples = case.judge_samples
+    bpy.context.scene.cycles.use_denoising = bpy.context.scene.cycles.use_adaptive_sampling = False
     _render(case, folder / "floor.exr", seed=1)
 
 
@@ -57,7 +59,7 @@ def _scene(case: Case) -> None:
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device, scene.cycles.samples = "CPU", case.samples
-    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = case.denoised
     scene.render.resolution_x = scene.render.resolution_y = case.size
     scene.render.resolution_percentage = 100
     scene.render.use_compositing = scene.render.use_sequencer = False
