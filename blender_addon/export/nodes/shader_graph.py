@@ -235,6 +235,10 @@ def _image(node: bpy.types.Node, output: str) -> Texture:
     if node.extension not in WRAPS:
         raise UnsupportedNodeError(f"the node '{node.name}' with extension Clip")
     wrap = WRAPS[node.extension]
+    if wrap == "clamp" and node.interpolation in ("Cubic", "Smart"):  # beyond the edge its curve goes on for two pixels
+        raise UnsupportedNodeError(
+            f"the node '{node.name}' with extension Extend and {node.interpolation} interpolation"
+        )
     try:
         pixels = filtered_pixels(node.image, node.interpolation, wrap, alpha_read=_is_read(node.outputs["Alpha"]))
     except MissingImageError as problem:

@@ -42,6 +42,7 @@ SCENE = {
     "the node '{}' ({})": "le nœud '{}' ({})",
     "the node '{}' among more than {}": "le nœud '{}' parmi plus de {}",
     "the node '{}' in mode {}": "le nœud '{}' en mode {}",
+    "the node '{}' with extension Extend and {} interpolation": "le nœud '{}' avec l'extension Extend et l'interpolation {}",
     "the node '{}' with extension Clip": "le nœud '{}' avec l'extension Clip",
     "the node '{}' with mirror ball projection": "le nœud '{}' avec la projection boule miroir",
     "the node '{}' with two pictures": "le nœud '{}' avec deux images",

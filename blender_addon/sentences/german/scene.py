@@ -43,6 +43,8 @@ SCENE = {
     "the node '{}' among more than {}": "der Node '{}' unter mehr als {}",
     "the node '{}' in mode {}": "der Node '{}' im Modus {}",
     "the node '{}' with extension Clip": "der Node '{}' mit der Erweiterung Clip",
+    "the node '{}' with extension Extend and {} interpolation": "der Node '{}' mit der Erweiterung Extend und der "
+    "Interpolation {}",
     "the node '{}' with mirror ball projection": "der Node '{}' mit der Projektion Spiegelkugel",
     "the node '{}' with two pictures": "der Node '{}' mit zwei Bildern",
     "the node '{}' with {} projection": "der Node '{}' mit der Projektion {}",
