@@ -38,15 +38,16 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
             put(collection, "hide_viewport", False)
         # instances and geometry nodes show objects and collections that no view layer has
         for inner in bpy.data.collections:
-            if not inner.hide_render:
-                put(inner, "hide_viewport", False)
+            put(inner, "hide_viewport", inner.hide_render)
         if scene.render.use_simplify:
             put(scene.render, "simplify_subdivision", scene.render.simplify_subdivision_render)
         in_layer = set(view_layer.objects)
         for item in bpy.data.objects:
+            # what is hidden is left out of collections' instances; particles and nodes that name it still show it
+            if item.mode == "OBJECT" or not item.hide_render:
+                put(item, "hide_viewport", item.hide_render)
             if item.hide_render:
                 continue
-            put(item, "hide_viewport", False)
             if item in in_layer and item.hide_get(view_layer=view_layer):
                 hidden.append(item)
                 item.hide_set(False, view_layer=view_layer)

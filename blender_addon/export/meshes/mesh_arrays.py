@@ -23,7 +23,6 @@ class CornerMesh:
     normals: NDArray[np.float32]  # (triangles, 3, 3)
     uvs: NDArray[np.float32]  # (triangles, 3, 2)
     slots: NDArray[np.int32]  # (triangles,)
-    is_closed: bool  # every edge has two faces
 
 
 def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:

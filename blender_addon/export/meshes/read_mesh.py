@@ -61,13 +61,11 @@ def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:
     if layer is not None:
         layer.uv.foreach_get("vector", uvs)
     places = positions.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
-    faces_at_edge = np.bincount(_edge_of_corner(mesh), minlength=len(mesh.edges))
     return CornerMesh(
         positions=places,
         normals=_shading_normals(mesh, places, corners, vertex_of_corner),
         uvs=uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2),
         slots=slots,
-        is_closed=bool((faces_at_edge == 2).all()),
     )
 
 
@@ -99,9 +97,3 @@ def _triangle_normals(places: NDArray[np.float32]) -> NDArray[np.float32]:
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
     return np.repeat(normals[:, None, :], 3, axis=1).astype(np.float32)
-
-
-def _edge_of_corner(mesh: bpy.types.Mesh) -> np.ndarray:
-    edges = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("edge_index", edges)
-    return edges

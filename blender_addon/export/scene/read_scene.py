@@ -189,7 +189,7 @@ class _Walk:
         self.data, self.targets = data, targets
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
-        self.target_pieces: list[list[tuple[TriangleMesh, bool]]] = [[] for _ in targets]
+        self.target_pieces: list[list[TriangleMesh]] = [[] for _ in targets]
         self.targets_left_out = [0] * len(targets)  # triangles
         self.places: list[tuple[str, TriangleMesh]] = []
         self.custom_normals = set[str]()
@@ -220,17 +220,16 @@ class _Walk:
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
         for number, pieces in reversed(list(enumerate(self.target_pieces))):  # the first one comes first
             if pieces:
-                meshes, closed = zip(*pieces, strict=True)
                 each = self.targets[number]
                 terminator = Terminator(*shadow_terminator(each.object))
                 shadow = self._shadow_transmission(each.object, each.slot)
                 names = target_shape(number), target_bsdf(number)
-                self.data.shapes.insert(0, Shape(names[0], joined(meshes), names[1], all(closed), terminator, shadow))
+                self.data.shapes.insert(0, Shape(names[0], joined(pieces), names[1], terminator, shadow))
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
             parent = instance.parent
-            return parent is not None and parent.original.name_full in self.rendered and not item.hide_render
+            return parent is not None and parent.original.name_full in self.rendered
         if item.original.name_full not in self.rendered:
             return False
         return not item.is_instancer or item.show_instancer_for_render
@@ -276,11 +275,11 @@ class _Walk:
                 continue
             self.places.append((item.name, piece))
             if slot in fitted:
-                self.target_pieces[fitted[slot]].append((piece, mesh.is_closed))
+                self.target_pieces[fitted[slot]].append(piece)
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
             terminator, shadow = Terminator(*shadow_terminator(item)), self._shadow_transmission(item, slot)
-            shape = Shape(name, piece, bsdf, mesh.is_closed, terminator, shadow)
+            shape = Shape(name, piece, bsdf, terminator, shadow)
             if bsdf in self.baked:
                 self._note_generated(item, slot)
             if self.bakes is not None and bsdf in self.baked:

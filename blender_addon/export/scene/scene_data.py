@@ -46,7 +46,6 @@ class Shape:
     identifier: str
     mesh: TriangleMesh
     bsdf: str
-    is_closed: bool
     terminator: Terminator = Terminator()
     shadow_transmission: float | None = None
 

@@ -19,12 +19,15 @@ from ..lights.light_elements import light_element
 from ..lights.light_model import irradiance_at
 from ..material_model import Texture
 from ..materials.material_elements import bsdf_element, emission_element
+from ..meshes.enclosed import is_closed, looks_outwards, winding_numbers
 from ..meshes.mesh_arrays import turned
 from .scene_data import SceneData, Shape, target_bsdf
 from .world_model import camera_world_element, world_element, world_irradiance
 
 # the back of an open emitter lies this part of the scene's radius behind its front
 BACK_OFFSET = 1e-5
+# vertices of another shape, about, that are looked for inside of an emitter
+POINTS_OF_A_SHAPE = 64
 # a weak emitter may still matter elsewhere: it is sampled at least this often, relative to the strongest
 LEAST_WEIGHT = 0.1
 # Clamping of indirect light by the radiance of a white matt surface at the target. At 1 plastic, metal and coat were
@@ -135,7 +138,7 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
     material = scene.materials[shape.bsdf]
     sides = [(shape.identifier, shape.mesh)]
     # an area emitter of Mitsuba shines on one side, a surface of Blender on both
-    if not shape.is_closed and material.emission.max(initial=0.0) > 0.0:
+    if material.emission.max(initial=0.0) > 0.0 and _shows_its_back(shape, scene):
         sides.append((f"{shape.identifier}_back", turned(shape.mesh, offset)))
     elements = []
     for identifier, mesh in sides:
@@ -146,6 +149,18 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
         emitter = emission_element(material, scene.settings.exposure, files.texture)
         elements.append(element if emitter is None else add(element, emitter))
     return elements
+
+
+def _shows_its_back(shape: Shape, scene: SceneData) -> bool:
+    """Whether light from the back of faces gets anywhere: in a lamp whose inside shows nothing it does not."""
+    if not is_closed(shape.mesh) or not looks_outwards(shape.mesh):
+        return True
+    _, depths = scene.camera.project(shape.mesh.positions.astype(np.float64))
+    if depths.min() < scene.camera.clip_start < depths.max():  # around the camera, or cut open by near clipping
+        return True
+    others = [other.mesh.positions for other in scene.shapes if other is not shape]
+    points = [some[:: max(1, len(some) // POINTS_OF_A_SHAPE)].astype(np.float64) for some in others]
+    return any((winding_numbers(shape.mesh, some) > 0.5).all() for some in points)
 
 
 def _shadows(shape: Shape) -> list[Element]:

@@ -174,23 +174,42 @@ def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycle
         np.testing.assert_allclose(found[area].mean(axis=(0, 1)), expected[area].mean(axis=(0, 1)), rtol=0.02)
 
 
-@pytest.mark.parametrize("closed", [False, True])
-def test_glowing_mesh_lights_both_sides(
-    closed: bool, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+def _lamp_box(glow: Any, size: float, *, around: bool = False, inwards: bool = False, faces: Any = None) -> None:
+    bpy.ops.mesh.primitive_cube_add(size=size, location=(0.3, 0.2, 0.0 if around else 8.0))
+    mesh = bpy.context.object.data
+    if inwards:
+        mesh.flip_normals()
+    for material in (new_material("Dark", Base_Color=(0, 0, 0)), glow) if faces else (glow,):
+        mesh.materials.append(material)
+    for polygon in mesh.polygons if faces else ():
+        polygon.material_index = int(faces(polygon.center))
+
+
+@pytest.mark.parametrize(
+    ("build", "sides"),
+    [
+        pytest.param(lambda glow: add_quad("Glow", 1.5, 8.0, glow), 2, id="a quad, its back to the floor"),
+        pytest.param(lambda glow: _lamp_box(glow, 0.8), 1, id="a box"),
+        pytest.param(lambda glow: _lamp_box(glow, 0.8, inwards=True), 2, id="a box inside out"),
+        pytest.param(lambda glow: _lamp_box(glow, 60.0, around=True), 2, id="a box around everything"),
+        pytest.param(
+            lambda glow: _lamp_box(glow, 60.0, around=True, faces=lambda at: at.z > 1.0), 2, id="the ceiling of a box"
+        ),
+        pytest.param(lambda glow: _lamp_box(glow, 0.8, faces=lambda at: at.z < -0.1), 2, id="one side of a box"),
+    ],
+)
+def test_glowing_mesh_lights_what_its_faces_see(
+    build: Any, sides: int, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
 ) -> None:
+    """Oracle: Cycles, in which both sides of every face give light."""
     from ..scene.test_light_levels import floor, tiles
 
     target = floor()
-    glow = new_material("Glow", Base_Color=(0, 0, 0), Emission_Color=(1.0, 0.5, 0.2), Emission_Strength=4.0)
-    if closed:
-        bpy.ops.mesh.primitive_cube_add(size=0.8, location=(0.3, 0.2, 8.0))
-        bpy.context.object.data.materials.append(glow)
-    else:  # its back faces the floor
-        add_quad("Glow", 1.5, 8.0, glow)
+    build(new_material("Glow", Base_Color=(0, 0, 0), Emission_Color=(1.0, 0.5, 0.2), Emission_Strength=4.0))
     scene.cycles.samples = 256
     report = export(target)
-    assert len(list((report.folder / "meshes").glob("*_back.ply"))) == (not closed)
-    expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 256))
+    assert len(list((report.folder / "meshes").glob("*_back.ply"))) == sides - 1
+    expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 256 * sides))
     assert expected.mean() > 0.002
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
 

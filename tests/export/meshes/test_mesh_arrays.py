@@ -59,7 +59,7 @@ def test_every_corner_is_moved_as_one(arrays: ModuleType, matrix: np.ndarray, wi
     corners = grid(12, without_normal)
     count = len(corners["positions"])
     chosen = np.arange(count) % 7 != 0
-    mesh = arrays.CornerMesh(**corners, slots=np.zeros(count, np.int32), is_closed=False)
+    mesh = arrays.CornerMesh(**corners, slots=np.zeros(count, np.int32))
     moved = arrays.world_mesh(mesh, chosen, matrix)
 
     linear, sign = matrix[:3, :3], -1.0 if np.linalg.det(matrix[:3, :3]) < 0 else 1.0
@@ -103,7 +103,7 @@ def test_triangles_out_of_reach_are_left_out(arrays: ModuleType, value: float) -
     corners["positions"][5, 1, 0] = value
     corners["uvs"] = corners["uvs"].copy()
     corners["uvs"][7, 0, 0] = np.nan
-    mesh = arrays.CornerMesh(**corners, slots=np.zeros(32, np.int32), is_closed=False)
+    mesh = arrays.CornerMesh(**corners, slots=np.zeros(32, np.int32))
     moved = arrays.world_mesh(mesh, np.ones(32, bool), MATRIX)
     assert moved.triangles.shape == (31, 3)
     assert all(np.isfinite(part).all() for part in (moved.positions, moved.normals, moved.uvs))

@@ -43,8 +43,8 @@ def test_an_object_that_only_an_instance_shows_is_fitted(scene: Any, export: Any
     assert render_mitsuba(export(item)).mean() == pytest.approx(theirs.mean(), rel=0.02)
 
 
-def scatter(item: Any, material: Any) -> None:
-    """Put a small cube that the tree makes itself, with a material of its own, on every vertex of `item`."""
+def scatter(item: Any, material: Any = None, of: Any = None) -> None:
+    """Put `of`, or a small cube of that material that the tree makes itself, on every vertex of `item`."""
     group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -55,7 +55,11 @@ def scatter(item: Any, material: Any) -> None:
     cube.inputs["Size"].default_value = (0.4, 0.4, 0.4)
     painted.inputs["Material"].default_value = material
     link(cube.outputs["Mesh"], painted.inputs["Geometry"])
-    link(painted.outputs[0], instances.inputs["Instance"])
+    source = painted
+    if of is not None:
+        source = nodes.new("GeometryNodeObjectInfo")
+        source.inputs["Object"].default_value, source.inputs["As Instance"].default_value = of, True
+    link(source.outputs["Geometry"], instances.inputs["Instance"])
     link(start.outputs[0], instances.inputs["Points"])
     link(instances.outputs[0], join.inputs[0])
     link(start.outputs[0], join.inputs[0])
@@ -73,6 +77,45 @@ def test_meshes_that_geometry_nodes_make_are_instanced_with_their_material(scene
     assert len(list((report.folder / "meshes").glob("*.ply"))) == 1 + 4
     ours = render_mitsuba(report)
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.02)
+
+
+def sprinkle(item: Any, source: Any, *, collection: bool) -> None:
+    """Let hair particles of `item` be `source`, by itself or as what a collection holds."""
+    made = item.modifiers.new("Sprinkles", "PARTICLE_SYSTEM").particle_system.settings
+    made.type, made.count, made.use_advanced_hair, made.particle_size = "HAIR", 6, True, 1.0
+    if not collection:
+        made.render_type, made.instance_object = "OBJECT", source
+        return
+    holder = bpy.data.collections.new("Sprinkles")
+    bpy.context.scene.collection.children.link(holder)
+    holder.objects.link(source)
+    made.render_type, made.instance_collection = "COLLECTION", holder
+
+
+@pytest.mark.parametrize(
+    ("put", "shown"),
+    [
+        pytest.param(lambda item, cube: sprinkle(item, cube, collection=False), True, id="particles"),
+        pytest.param(lambda item, cube: sprinkle(item, cube, collection=True), False, id="particles of a collection"),
+        pytest.param(lambda item, cube: scatter(item, of=cube), True, id="nodes"),
+    ],
+)
+def test_a_hidden_object_is_instanced_where_cycles_shows_it(
+    put: Any, shown: bool, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    """The source of what is scattered is often hidden itself: particles and nodes that name it show it all the same."""
+    item = lit_quad(scene)
+    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0.0, 0.0, -9.0))
+    cube = bpy.context.object
+    cube.data.materials.append(emission_material("Sprinkle", (0.2, 0.5, 1.0)))
+    cube.hide_render = True
+    put(item, cube)
+    bpy.context.view_layer.update()
+    theirs = render_cycles()
+    report = export(item)
+    assert (len(list((report.folder / "meshes").glob("*.ply"))) > 1) is shown
+    assert render_mitsuba(report).mean() == pytest.approx(theirs.mean(), rel=0.02)
+    assert not cube.hide_viewport
 
 
 def test_the_view_layer_that_renders_is_exported(scene: Any, export: Any) -> None:
