@@ -33,8 +33,7 @@ from ..export.reference.reference_view import SCENE, mixed_by, needs_table, outp
 from ..export.reference.turned_picture import turn_notes
 from ..export.render_state import instanced_objects, rendered_objects
 from ..export.scene.read_scene import MESH_TYPES
-from ..graph_values.mix_values import inside_values, mix_values
-from ..graph_values.table import chosen_values, graph_values
+from ..graph_values.mix_values import default_values, inside_values
 from ..properties import SOCKET_ITEMS, crossed_limits
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
@@ -160,9 +159,7 @@ def _inside(settings: bpy.types.PropertyGroup, target: TargetShader, material: b
         return []
     if settings.parameter_set == "chosen":
         return [value.name for value in inside_values(target) if value.name in settings.node_values]
-    if not target.is_mixed:
-        return [value.name for value in chosen_values(graph_values(target), "all")]
-    return [value.name for value in mix_values(target) if value.by_default] if fits_all_leaves(material) else []
+    return [value.name for value in default_values(target, all_leaves=fits_all_leaves(material))]
 
 
 def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:

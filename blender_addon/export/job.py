@@ -208,12 +208,15 @@ def partial_export(
     findings = Findings()
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
-    of_mix, fit = ([], fit) if targets else named_mix_values(obj, fit)
-    values, fit = chosen_graph_values(obj, fit, findings, together="materials" if targets else together)
+    of_mix, wanted = ([], fit) if targets else named_mix_values(obj, fit)
+    together = "materials" if targets else together
+    values, fit = chosen_graph_values(obj, wanted, findings, together=together)
     with probe_for(fitted, always=bool(values)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
         leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
+        if leaves and leaves[0] is not None:  # whose numbers and values are others
+            values, fit = chosen_graph_values(obj, wanted, Findings(), together=together, leaf=leaves[0])
         with SceneBakes(context, probe) as bakes:
             fitted = [replace(each, leaf=leaf) for each, leaf in zip(fitted, leaves, strict=True)]
             data = read_scene(context, obj, findings, bakes, leaves[0] if leaves else None, fitted if targets else ())

@@ -47,6 +47,11 @@ class Socket:
     seen: Path | None = None
     elsewhere: Path | None = None
 
+    @property
+    def varies(self) -> bool:
+        """Whether it has other values elsewhere on the surface; what is held counts as linked, too."""
+        return self.by_graph or self.texture is not None
+
 
 @dataclass
 class Material:
@@ -59,7 +64,8 @@ class Material:
     The target may be one leaf of a mix: `weight` is its share, and `leaves` are the others with theirs. `node` is the
     path of names to its node, `labels` what that calls sockets that have another name here, and `is_nearest` says that
     its model is only the nearest. Free besides the fitted leaf's values are sockets of leaves, `free` with the names of
-    their values, and Mix `factors`, which a weight depends on by its `ways`; both as in request.json.
+    their values, and Mix `factors`, which a weight depends on by its `ways`; both as in request.json. Values inside
+    nodes change sockets or weight of a leaf that `varies`.
     """
 
     name: str
@@ -79,6 +85,7 @@ class Material:
     free: Mapping[str, str] = field(default_factory=dict)
     factors: tuple[dict[str, Any], ...] = ()
     ways: tuple[dict[str, Any], ...] = ()
+    varies: bool = False
 
     @property
     def is_mixed(self) -> bool:
@@ -91,8 +98,8 @@ class Material:
         if self.model == "null" or self.shader in ("glass", "refraction", "translucent"):
             return True
         alpha, glass = self.sockets.get("Alpha"), self.sockets.get("Transmission Weight")
-        is_cut = alpha is not None and (alpha.linked or alpha.value != 1.0) and self.model == "principled"
-        is_glass = glass is not None and (glass.linked or glass.value != 0.0)
+        is_cut = alpha is not None and (alpha.varies or alpha.value != 1.0) and self.model == "principled"
+        is_glass = glass is not None and (glass.varies or glass.value != 0.0)
         return is_cut or is_glass or any(leaf.passes_light for leaf in self.leaves)
 
     @property

@@ -103,7 +103,8 @@ def _material(material: Material, files: SceneFiles, *, seen: bool) -> dict[str,
         described["shader"] = shader
     if material.is_mixed:
         described["weight"] = _socket(material.weight, files, seen)
-    extra = {"free": dict(material.free), "factors": list(material.factors), "ways": list(material.ways)}
+    extra: dict[str, Any] = {"free": dict(material.free), "factors": list(material.factors)}
+    extra |= {"ways": list(material.ways), "varies": material.varies}
     described |= {name: value for name, value in extra.items() if value}
     if material.leaves:
         described["leaves"] = [_material(leaf, files, seen=seen) for leaf in material.leaves]

@@ -13,7 +13,8 @@ from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
 from .place import INPUT, Place
-from .table import GraphValue, graph_values, named_apart, one_word
+from .ranges import BY_DEFAULT
+from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word
 
 # what a leaf has to have so that light only returns from it, and none is its own
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
@@ -23,7 +24,7 @@ NOT_FITTED = (
     *("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Subsurface Weight"),
 )
 # of a Principled BSDF those that *All* takes: one picture tells little more of several, but for lobes that are there
-BY_DEFAULT = ("Base Color", "Metallic", "Roughness", "Specular IOR Level")
+OF_PRINCIPLED = ("Base Color", "Metallic", "Roughness", "Specular IOR Level")
 WITH = {
     "Coat Weight": ("Coat Weight", "Coat Roughness"),
     "Sheen Weight": ("Sheen Weight", "Sheen Roughness", "Sheen Tint"),
@@ -51,8 +52,27 @@ class MixValue:
 
 
 def inside_values(target: TargetShader) -> Sequence[GraphValue | MixValue]:
-    """The values beside the sockets of the target that a fit may change: of its nodes, or of a mix the others'."""
-    return mix_values(target) if target.is_mixed else graph_values(target)
+    """The values beside the sockets of the target that a fit may change: of a mix the others', and of its nodes."""
+    if not target.is_mixed:
+        return graph_values(target)
+    values: list[GraphValue | MixValue] = [*mix_values(target)]
+    return named_apart(values + graph_values(target)) if why_no_mix_values(target) is None else []
+
+
+def default_values(target: TargetShader, *, all_leaves: bool) -> list[GraphValue | MixValue]:
+    """Those of them that *All* takes, of all shaders of a mix or of the fitted one alone.
+
+    What nodes make of a weight is named by the user: colours and weights show as products.
+    """
+    return [value for value in inside_values(target) if _is_default(value, target, all_leaves=all_leaves)]
+
+
+def _is_default(value: GraphValue | MixValue, target: TargetShader, *, all_leaves: bool) -> bool:
+    if isinstance(value, MixValue):
+        return all_leaves and value.by_default
+    of_one = not any("/" in name for name in value.sockets)
+    is_weight = any(name.rpartition("/")[2] == WEIGHT for name in value.sockets) and target.is_mixed
+    return value.range.group in BY_DEFAULT and not is_weight and (all_leaves or of_one)
 
 
 def why_no_mix_values(target: TargetShader) -> str | None:
@@ -175,7 +195,7 @@ def _default_names(shader: TargetShader) -> list[str]:
     if shader.node.bl_idname != PRINCIPLED:
         return [name for name in shader.places if not _is_absent(shader, name)]
     present = [extra for name, extras in WITH.items() if not _is_absent(shader, name) for extra in extras]
-    return [*BY_DEFAULT, *present]
+    return [*OF_PRINCIPLED, *present]
 
 
 def _is_absent(shader: TargetShader, name: str) -> bool:

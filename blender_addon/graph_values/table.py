@@ -11,10 +11,12 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 import bpy
 
+from ..export.nodes.closure_leaves import ClosureLeaf
 from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
+from ..export.nodes.leaf_kinds import KINDS
 from ..export.nodes.shader_graph import Links, source_of
+from ..export.nodes.target_shader import DIRECTIONS, TargetShader
 from ..export.nodes.target_shader import Place as SocketPlace
-from ..export.nodes.target_shader import TargetShader
 from . import ranges
 from .place import CURVE_POINT, INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, Place, Value, read
 from .ranges import COLOR, GAIN, NUMBER, OFFSET, Range, plain_range, range_of_input, range_of_stop
@@ -22,6 +24,7 @@ from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
 # what a fit on recorded light does not change: light that the target emits, and what lets light through
 NOT_FITTED = ("Emission Color", "Emission Strength", "Alpha", "Transmission Weight")
+WEIGHT = "Weight"  # the share of a shader in a mix, among the names of its sockets
 MOST = 256  # values of one graph; what lies further upstream is not offered
 _AXES = ("X", "Y", "Z", "W")
 
@@ -71,15 +74,18 @@ class GraphValue:
 
 
 def graph_values(target: TargetShader) -> list[GraphValue]:
-    """The values of the graph of a target, in the order in which they are met on the way up from its sockets."""
+    """The values of the graph of a target, in the order in which they are met on the way up from its sockets.
+
+    Of a mix they are those of all its shaders and of their weights, whichever shader is fitted; `_reached` has the
+    names of what they reach.
+    """
     tree = (target.groups[0] if target.groups else target.node).id_data
     found: dict[Place, _Met] = {}
     links = Links()
-    for name, place in target.places.items():
-        if name in NOT_FITTED or not place.socket.is_linked:
-            continue
+    held = {met.place for place in _held(target) for met in _upstream(place.socket, place.groups, links)}
+    for name, label, place in _reached(target):
         is_color = place.socket.type == "RGBA"
-        for met in _tints(name, place):
+        for met in _tints(name, label, place):
             found[met.place] = met
         for met in _upstream(place.socket, place.groups, links):
             known = found.setdefault(met.place, met)
@@ -88,20 +94,49 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
             known.is_direction &= met.is_direction
             if len(found) >= MOST:
                 break
-    return named_apart([_finished(met, tree) for met in found.values() if not (met.is_color and met.is_direction)])
+    return named_apart([
+        _finished(met, tree)
+        for met in found.values()
+        if met.place not in held and not (met.is_color and met.is_direction)
+    ])  # fmt: skip
 
 
-def chosen_values(values: Sequence[GraphValue], wanted: str | Sequence[str]) -> list[GraphValue]:
-    """Those of a set, ``"all"`` or ``"reduced"``, or of a list of names, which other names may be in.
+def _reached(target: TargetShader) -> Iterator[tuple[str, str, SocketPlace]]:
+    """The linked sockets that a fit may change, each with its name and with what a tint of it is called.
 
-    Raises
-    ------
-    GraphValueError
-        If a name with a slash is none of theirs.
+    Those of a mix's other shaders that reflect light have their number and a slash before; `WEIGHT` is a factor that
+    the weight of a shader hangs on.
     """
-    if isinstance(wanted, str):
-        return [v for v in values if v.range.group in ranges.BY_DEFAULT] if wanted == "all" else []
-    return named(values, wanted)
+    if not target.is_mixed:
+        yield from ((name, name, place) for name, place in target.places.items() if _is_free(name, place))
+        return
+    reflecting = [leaf for leaf in target.others if leaf.node.bl_idname in KINDS]
+    leaves = [(f"{number}/", leaf) for number, leaf in enumerate(reflecting)]
+    leaves.insert(sum(leaf.node.bl_idname in KINDS for leaf in target.others[: target.before]), ("", target.leaf))
+    for before, leaf in leaves:
+        shader, label = TargetShader(leaf), one_word(leaf.node.label or leaf.node.name)
+        for name, place in shader.places.items():
+            if _is_free(name, place) and name not in DIRECTIONS:
+                yield f"{before}{name}", f"{label} {shader.own_name(name)}", place
+        yield from ((f"{before}{WEIGHT}", label, place) for place in _factors_of(leaf))
+
+
+def _is_free(name: str, place: SocketPlace) -> bool:
+    return name not in NOT_FITTED and place.socket.is_linked
+
+
+def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:
+    """The factors that the weight of a leaf hangs on."""
+    factors = [factor for way in leaf.ways for factor in way]
+    return [SocketPlace(factor.socket, factor.groups) for factor in factors if factor.value is None]
+
+
+def _held(target: TargetShader) -> Iterator[SocketPlace]:
+    """What no value that is fitted may reach: a mix's shaders of which the fit holds a picture."""
+    for leaf in target.others:
+        if leaf.node.bl_idname not in KINDS:
+            yield from (SocketPlace(socket, leaf.groups) for socket in leaf.node.inputs)
+            yield from _factors_of(leaf)
 
 
 def named(values: Sequence[Named], wanted: Sequence[str]) -> list[Named]:
@@ -178,7 +213,7 @@ def _as_direction(values: Iterable[_Met], is_direction: bool) -> Iterator[_Met]:
         yield met
 
 
-def _tints(name: str, place: SocketPlace) -> Iterator[_Met]:
+def _tints(name: str, label: str, place: SocketPlace) -> Iterator[_Met]:
     """Gain and offset of a picture that is linked to a socket as it is."""
     tint = tint_of(place.socket)
     source = source_of(place.socket if tint is None else tint.inputs[0])
@@ -187,7 +222,7 @@ def _tints(name: str, place: SocketPlace) -> Iterator[_Met]:
     is_color, path = place.socket.type == "RGBA", _path(place.socket.node, place.groups)
     for kind, inside, limits in ((TINT_GAIN, "Gain", GAIN), (TINT_OFFSET, "Offset", OFFSET)):
         where = Place(path, kind, place.socket.identifier, size=3 if is_color else 1)
-        yield _Met(where, place.socket.node, place.groups, inside, False, limits, [name], is_color, label=name)
+        yield _Met(where, place.socket.node, place.groups, inside, False, limits, [name], is_color, label=label)
 
 
 def _path(node: bpy.types.Node, groups: tuple[bpy.types.Node, ...]) -> tuple[str, ...]:

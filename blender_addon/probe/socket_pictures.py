@@ -196,18 +196,24 @@ def _leaf_outputs(tree: bpy.types.NodeTree, leaves: list[Mapping[str, Any]]) -> 
             outputs.append(_Output(names[name], kind, number, name))
         if not leaf["weight"] or closures is None:
             continue
-        ways = [each.weight for each in closures.leaves if _path(each) == leaf["node"]]
-        total = tree.nodes.new("ShaderNodeValue").outputs[0]
-        total.default_value = sum(way for way in ways if isinstance(way, float))
-        for way in ways:
-            if not isinstance(way, float):
-                node = tree.nodes.new("ShaderNodeMath")  # an Add: not clamped
-                tree.links.new(total, node.inputs[0])
-                tree.links.new(way, node.inputs[1])
-                total = node.outputs[0]
-        outputs.append(_Output(f"mfo {number} weight", "VALUE", number, None))
-        _output(tree, outputs[-1].name, total, False)
+        name = f"mfo {number} weight"
+        outputs.append(_Output(name, write_weight(tree, closures, leaf["node"], name), number, None))
     return outputs
+
+
+def write_weight(tree: bpy.types.NodeTree, closures: ClosureTree, path: list[str], output: str) -> str:
+    """Put an output node of the given name on the weight of a shader, the sum over all ways to it; returns its type."""
+    ways = [each.weight for each in closures.leaves if _path(each) == path]
+    total = tree.nodes.new("ShaderNodeValue").outputs[0]
+    total.default_value = sum(way for way in ways if isinstance(way, float))
+    for way in ways:
+        if not isinstance(way, float):
+            node = tree.nodes.new("ShaderNodeMath")  # an Add: not clamped
+            tree.links.new(total, node.inputs[0])
+            tree.links.new(way, node.inputs[1])
+            total = node.outputs[0]
+    _output(tree, output, total, False)
+    return "VALUE"
 
 
 def _path(leaf: Leaf) -> list[str]:

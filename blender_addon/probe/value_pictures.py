@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ..graph_values.place import Place, write
 from .aov_render import Frame, frame_of, world_to_frame
-from .graph_copy import own_copy, remove_copy, variant_of
+from .closure_tree import ClosureTree
+from .graph_copy import node_at, own_copy, remove_copy, variant_of
 from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
 from .server import ProbeRequestError
 from .socket_pictures import (
@@ -31,6 +32,7 @@ from .socket_pictures import (
     whole,
     widen_bumps,
     write_outputs,
+    write_weight,
 )
 
 # of the nodes in one render: more overflow the memory that Cycles has for a material's nodes, at 128 noises all of it
@@ -43,12 +45,13 @@ _Found = tuple[dict[tuple[int, str], NDArray[np.float32]], NDArray[np.float32], 
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """Write one .npy file, float32 (height, width, 1 or 3), for each socket of each variant.
 
-    Requested are `scene`, `layer`, `object`, `slot` and the shader's `node` as of the command `sockets`, the `places`
-    of the values (entries of request.json), `variants`, each with a number or colour for every place in `values` and
-    with the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder`
-    for the files; `elsewhere` where the files of that name are asked for, too, for the first variant. Answered are
-    `files`, by socket for each variant, `elsewhere`, by socket as of the command `sockets`, and of the target the file
-    `positions`, NaN beside it, and the `camera` of that command.
+    Requested are `scene`, `layer`, `object` and `slot` as of the command `sockets`, the `sockets` by name, each a
+    path of names to it, of which the last is empty for the weight of a shader in a mix, the `places` of the values
+    (entries of request.json), `variants`, each with a number or colour for every place in `values` and with the
+    names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder` for
+    the files; `elsewhere` where the files of that name are asked for, too, for the first variant. Answered are
+    `files`, by socket for each variant, `elsewhere`, by socket as of the command `sockets`, and of the target the
+    file `positions`, NaN beside it, and the `camera` of that command.
 
     Raises
     ------
@@ -94,11 +97,12 @@ def _all(
             if most > 1:
                 raise _TooManyError
             raise ProbeRequestError(NOT_SEEN.format(obj=target.obj.name, material=target.material.name))
-        kinds = _kinds(target.material, request["node"])
+        kinds = _kinds(target.material, request["sockets"])
         for k, (_, names) in enumerate(some):
             files.append({})
             for name in names:
-                values = cleaned(found[k, name] / np.maximum(mask, SEEN), seen, name, kinds[name])
+                own = request["sockets"][name][-1]
+                values = cleaned(found[k, name] / np.maximum(mask, SEEN), seen, own, kinds[name])
                 files[-1][name] = f"value_{begin + k:02d}_{len(files[-1]):02d}.npy"
                 np.save(Path(request["folder"]) / files[-1][name], values)
     return files, mask, positions
@@ -106,7 +110,8 @@ def _all(
 
 def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets) -> dict[str, str]:
     """Files by socket of what rays from elsewhere find of a variant, at each angle."""
-    names, kinds = variants[0][1], _kinds(target.material, request["node"])
+    names, paths = variants[0][1], request["sockets"]
+    kinds = _kinds(target.material, paths)
     frame = frame_of(target.scene, target.obj, ELSEWHERE_SCALE, len(names) + 2)
     ways = []
     for angle in range(ANGLES):
@@ -114,7 +119,8 @@ def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], 
         ways.append({MASK: mask} | {name: found[0, name] for name in names})
     files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(names)}
     for name, file in files.items():
-        np.save(Path(request["folder"]) / file, np.concatenate([whole(way, name, name, kinds[name]) for way in ways]))
+        found_at = [whole(way, name, paths[name][-1], kinds[name]) for way in ways]
+        np.save(Path(request["folder"]) / file, np.concatenate(found_at))
     return files
 
 
@@ -138,9 +144,9 @@ def _rendered(
             tree = variant_of(base.node_tree)
             copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
             _put(tree, places, values, target.material.name)
-            _only_nodes(tree)
-            kinds = write_outputs(tree, request["node"], {name: _name(k, i) for i, name in enumerate(names)})
-            wanted += [(_name(k, i), kinds[name] != "VALUE") for i, name in enumerate(names)]
+            outputs = {name: _name(k, i) for i, name in enumerate(names)}
+            kinds = _put_outputs(tree, request["sockets"], outputs)
+            wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
         found = target.outputs(copy, wanted, frame, request["samples"])
     finally:
         remove_copy(copy)
@@ -163,19 +169,33 @@ def _put(tree: bpy.types.NodeTree, places: list[Place], values: Sequence[Any], m
             ) from error
 
 
-def _only_nodes(tree: bpy.types.NodeTree) -> None:
-    """Leave out what only a material has."""
-    for node in list(_outputs(tree)):
+def _put_outputs(
+    tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]
+) -> dict[str, str]:
+    """Put an output node of the given name on each of these sockets of a variant; returns the sockets' types."""
+    closures = ClosureTree(tree, own_groups=False) if not all(paths[name][-1] for name in outputs) else None
+    for node in list(_outputs(tree)):  # what only a material has
         tree.nodes.remove(node)
+    kinds = {}
+    for name, output in outputs.items():
+        *shader, socket = paths[name]
+        if socket:
+            kinds[name] = write_outputs(tree, shader, {socket: output})[socket]
+        else:
+            assert closures is not None
+            kinds[name] = write_weight(tree, closures, shader, output)
+    return kinds
 
 
 def _outputs(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
     yield from (node for node in tree.nodes if node.bl_idname in ("ShaderNodeOutputMaterial", "ShaderNodeOutputAOV"))
 
 
-def _kinds(material: bpy.types.Material, path: list[str]) -> dict[str, str]:
-    tree = material.node_tree
-    assert tree is not None
-    for group in path[:-1]:
-        tree = tree.nodes[group].node_tree
-    return {s.name: s.type if s.type in ("RGBA", "VECTOR") else "VALUE" for s in tree.nodes[path[-1]].inputs}
+def _kinds(material: bpy.types.Material, paths: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """The types of the sockets at these paths, by name."""
+    kinds = {}
+    for name, (*path, socket) in paths.items():
+        _, shader = node_at(material.node_tree, path)
+        found = shader.inputs[socket].type if socket else "VALUE"
+        kinds[name] = found if found in ("RGBA", "VECTOR") else "VALUE"
+    return kinds

@@ -20,10 +20,10 @@ from ..export.nodes.target_shader import (
     target_shader,
     why_no_target,
 )
-from ..graph_values.mix_values import MixValue, mix_values
+from ..graph_values.mix_values import MixValue, inside_values
 from ..graph_values.own_groups import make_groups_own
 from ..graph_values.place import INPUT, TINTS, Place, as_held, held, hold, holder_of, is_there
-from ..graph_values.table import GraphValue, graph_values
+from ..graph_values.table import GraphValue
 from ..versions import node_tree_of
 from .animated_sockets import DRIVER, KEYFRAMES, LEAVE, REPLACE, animation_at, key_here, left_note, remove_driver
 from .job_result import JobResult, Value
@@ -206,10 +206,10 @@ def _key(target: TargetShader, name: str) -> str:
 
 
 def _key_inside(target: TargetShader, value: GraphValue | MixValue) -> str:
-    """The same of a value beside the sockets; that of another leaf has one whichever leaf is fitted."""
-    if not isinstance(value, MixValue):
-        return _key(target, value.name)
-    if value.factor is not None:
+    """The same of a value beside the sockets: of a mix it has one whichever leaf is fitted."""
+    if not target.is_mixed:
+        return value.name
+    if not isinstance(value, MixValue) or value.factor is not None:
         return f"{ALL_LEAVES}{OF_LEAF}{value.name}"
     return f"{leaf_name(target.others[value.leaf])}{OF_LEAF}{value.socket}"
 
@@ -244,7 +244,7 @@ def _make_own(material: bpy.types.Material, names: Collection[str], leaf: str | 
     notes = make_own(material, [name for name in names if "/" not in name], leaf)
     if not any("/" in name for name in names):
         return notes
-    places = [value.place for value in _inside(fitted_shader(material, leaf)) if value.name in names]
+    places = [value.place for value in inside_values(fitted_shader(material, leaf)) if value.name in names]
     return notes + make_groups_own(material, places)
 
 
@@ -322,11 +322,6 @@ def _slots(material: bpy.types.Material, leaf: str | None) -> dict[str, _Slot]:
         path = (*(group.name for group in found.groups), found.socket.node.name)
         place = Place(path, INPUT, found.socket.identifier)
         slots[name] = _Slot(tree, place, target.own_name(name), found.socket.is_linked, _key(target, name))
-    for value in _inside(target):
+    for value in inside_values(target):
         slots[value.name] = _Slot(tree, value.place, value.name, False, _key_inside(target, value))
     return slots
-
-
-def _inside(target: TargetShader) -> list[GraphValue | MixValue]:
-    """Values inside nodes, and of a mix those of its other shaders and factors."""
-    return [*graph_values(target), *(mix_values(target) if target.is_mixed else ())]

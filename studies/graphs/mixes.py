@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The series *mixes*: fits of several shaders of a mix at once, 5 to 9 numbers, from random starts."""
+"""The series *mixes*: fits of several shaders of a mix at once, and of values inside its nodes, 5 to 10 numbers, from
+random starts."""
 
 from __future__ import annotations
 
@@ -31,6 +32,22 @@ def _noise(tree: Any) -> Any:
     low.position, high.position = 0.45, 0.55
     tree.links.new(node.outputs[0], ramp.inputs[0])
     return ramp.outputs[0]
+
+
+def _colored(shader: Build, *kinds: str) -> Build:
+    """A shader whose colour nodes give, the one into the other, the first a texture."""
+
+    def build(tree: Any) -> Any:
+        output, last = shader(tree), None
+        for kind in kinds:
+            node = tree.nodes.new(f"ShaderNode{kind}")
+            if last is not None:
+                tree.links.new(last, next(s for s in node.inputs if s.name in ("Fac", "Factor", "Color") and s.enabled))
+            last = next(socket for socket in node.outputs if socket.name in ("Color", "Fac", "Factor"))
+        tree.links.new(last, next(s for s in output.node.inputs if s.type == "RGBA"))
+        return output
+
+    return build
 
 
 def _fresnel(tree: Any) -> Any:
@@ -74,6 +91,16 @@ MIXES: dict[str, tuple[Build, tuple[str, ...]]] = {
         _mix(_noise, _DIFFUSE, _mix(None, _GLOSSY, _SHEEN)),
         ("Mix Shader.001/Factor", "Diffuse BSDF/Color", "Glossy BSDF/Roughness", "Sheen BSDF/Color"),
     ),
+    "worn": (
+        _mix(_noise, _colored(_PLASTIC, "TexVoronoi", "ValToRGB"), _METAL),
+        ("Color Ramp/Position 0", "Color Ramp.001/Stop 0", "Color Ramp.001/Stop 1", "Principled BSDF/Roughness",
+         "Principled BSDF.001/Roughness"),
+    ),
+    "faded": (
+        _mix(None, _colored(_DIFFUSE, "TexMagic", "HueSaturation"), _colored(_GLOSSY, "TexNoise", "ValToRGB")),
+        ("Mix Shader/Factor", "Hue Saturation Value/Saturation", "Hue Saturation Value/Value", "Color Ramp/Stop 0",
+         "Glossy BSDF/Roughness"),
+    ),
 }  # fmt: skip
 
 
@@ -89,7 +116,15 @@ class DrawnMix:
     """The values that are fitted of a mix, drawn at random and put where they are."""
 
     def __init__(self, name: str, target: Any) -> None:
+        from blender_addon.export.nodes.target_shader import target_shader
+        from blender_addon.graph_values.mix_values import inside_values
+        from blender_addon.graph_values.table import GraphValue
+
         self._tree, self.names = target.active_material.node_tree, MIXES[name][1]
+        shader = target_shader(target.active_material)
+        assert shader is not None
+        inside = [value for value in inside_values(shader) if isinstance(value, GraphValue)]
+        self._inside = {value.name: value for value in inside if value.name in self.names}
 
     def draw(self, seed: random.Random, *, near: dict[str, Any] | None = None) -> dict[str, Any]:
         """Values by name, evenly from their ranges."""
@@ -97,12 +132,23 @@ class DrawnMix:
 
     def put(self, values: dict[str, Any]) -> None:
         """Set them."""
+        from blender_addon.graph_values.place import write
+
         for name, value in values.items():
-            self._socket(name).default_value = (*value, 1.0) if isinstance(value, tuple) else value
+            if name in self._inside:
+                write(self._tree, self._inside[name].place, value)
+            else:
+                self._socket(name).default_value = (*value, 1.0) if isinstance(value, tuple) else value
 
     def errors(self, truth: dict[str, Any]) -> dict[str, float]:
         """The largest difference of each value's numbers from the truth."""
-        here = {name: np.ravel(self._socket(name).default_value)[: np.size(value)] for name, value in truth.items()}
+        from blender_addon.graph_values.place import read
+
+        def at(name: str) -> Any:
+            inside = self._inside.get(name)
+            return self._socket(name).default_value if inside is None else read(self._tree, inside.place)
+
+        here = {name: np.ravel(at(name))[: np.size(value)] for name, value in truth.items()}
         return {name: float(np.abs(here[name] - np.ravel(value)).max()) for name, value in truth.items()}
 
     def share(self, name: str, deviation: float, truth: Any) -> float:
@@ -110,8 +156,10 @@ class DrawnMix:
         return deviation
 
     def _one(self, name: str, seed: random.Random) -> Any:
-        low, high = LIMITS[name.rpartition("/")[2]]
-        return tuple(seed.uniform(low, high) for _ in range(3)) if "Color" in name else seed.uniform(low, high)
+        inside = self._inside.get(name)
+        low, high = LIMITS[name.rpartition("/")[2]] if inside is None else (inside.range.lower, inside.range.upper)
+        is_color = "Color" in name.rpartition("/")[2] if inside is None else inside.place.size == 3
+        return tuple(seed.uniform(low, high) for _ in range(3)) if is_color else seed.uniform(low, high)
 
     def _socket(self, name: str) -> Any:
         node, _, value = name.rpartition("/")

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ...graph_values.mix_values import MixValue, mix_values, ways_of, why_no_mix_values
+from ...graph_values.mix_values import MixValue, inside_values, ways_of, why_no_mix_values
 from ...graph_values.place import read
 from ...graph_values.table import GraphValueError, named, one_word, plain_name
 from ..findings import ExportError, Findings
@@ -22,7 +22,7 @@ MOST_UNKNOWN = 0.5  # share of a mix that a shader without an exact model may ha
 def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple[list[str], dict[str, Any]]:
     """The values of a mix that `fit` names beside its fitted leaf, and the fit without them.
 
-    The fitted leaf's own values may be named after its node, too.
+    Those inside nodes stay in it. The fitted leaf's own values may be named after its node, too.
 
     Raises
     ------
@@ -41,10 +41,12 @@ def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple
     if inside and problem is not None:
         raise ExportError(f"{', '.join(inside)} cannot be fitted: {problem}.")
     try:
-        found = named(mix_values(target), inside)
+        found = named(inside_values(target), inside)
     except GraphValueError as error:
         raise ExportError(str(error)) from error
-    return [value.name for value in found], fit | {"parameters": [name for name in wanted if "/" not in name]}
+    of_mix = [value.name for value in found if isinstance(value, MixValue)]
+    in_nodes = [value.name for value in found if value.name not in of_mix]
+    return of_mix, fit | {"parameters": [*(name for name in wanted if "/" not in name), *in_nodes]}
 
 
 def chosen_mix_values(
@@ -58,7 +60,7 @@ def chosen_mix_values(
     if problem is not None:
         findings.note(f"Of the mix '{target.name}' alone is fitted: {problem}.")
         return []
-    values = mix_values(target)
+    values = [value for value in inside_values(target) if isinstance(value, MixValue)]
     left = [value.name for value in values if by_all and value.factor is not None and not value.by_default]
     if left:
         findings.note(

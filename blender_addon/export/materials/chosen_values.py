@@ -10,15 +10,17 @@ from typing import Any
 
 import bpy
 
+from ...graph_values.mix_values import default_values, inside_values
 from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
-from ...graph_values.table import GraphValue, GraphValueError, chosen_values, graph_values, plain_name
+from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, plain_name
 from ...probe.own_blender import save_copy
 from ..findings import ExportError, Findings
 from ..material_model import Material
 from ..nodes.graph_findings import graph_problem
+from ..nodes.leaf_kinds import KINDS
 from ..nodes.shader_graph import plain_value
-from ..nodes.target_shader import TargetShader, target_shader
+from ..nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 
 COPY = "scene.blend"  # of the file, in the folder of the graph's pictures: the backend has it evaluated
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}  # what a fit on recorded light asks of a material
@@ -26,11 +28,17 @@ ON_RECORDED_LIGHT = ("fast", "balanced", "best")
 
 
 def chosen_graph_values(
-    obj: bpy.types.Object | None, fit: dict[str, Any], findings: Findings, *, together: str = ""
+    obj: bpy.types.Object | None,
+    fit: dict[str, Any],
+    findings: Findings,
+    *,
+    together: str = "",
+    leaf: str | None = None,
 ) -> tuple[list[GraphValue], dict[str, Any]]:
     """The values inside the graph that `fit` asks for, and the fit of the sockets alone.
 
-    `together` says what there are several of in the fit, pictures or materials.
+    `together` says what there are several of in the fit, pictures or materials, and `leaf` names the fitted one of a
+    mix.
 
     Raises
     ------
@@ -40,12 +48,13 @@ def chosen_graph_values(
     wanted = fit.get("parameters", "all")
     names = () if isinstance(wanted, str) else tuple(name for name in wanted if "/" in str(name))
     rest = fit if isinstance(wanted, str) else fit | {"parameters": [name for name in wanted if name not in names]}
-    target = None if obj is None else target_shader(obj.active_material)
+    target = None if obj is None else target_shader(obj.active_material, leaf)
     if obj is None or target is None or (isinstance(wanted, str) and wanted != "all"):
         return [], rest
-    values = graph_values(target)
+    values = [value for value in inside_values(target) if isinstance(value, GraphValue)]
+    by_all = default_values(target, all_leaves=fits_all_leaves(obj.active_material))
     try:
-        chosen = chosen_values(values, wanted if isinstance(wanted, str) else names)
+        chosen = named(values, names) if names else [v for v in by_all if v in values] if wanted == "all" else []
     except GraphValueError as error:
         raise ExportError(str(error)) from error
     _check_not_nodes(rest.get("parameters", "all"), target, values)
@@ -82,8 +91,6 @@ def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:
         return "the model mitsuba_principled takes the averages of what nodes give"
     if fit.get("preset", "balanced") not in ON_RECORDED_LIGHT or fit.get("losses"):
         return "the preset paper fits the values of sockets alone"
-    if target.is_mixed:
-        return "the material mixes shaders, and nodes may feed several of them"
     for name, opaque in OPAQUE.items():
         socket = target.sockets.get(name)
         if socket is not None and (socket.is_linked or plain_value(socket) != opaque):
@@ -92,9 +99,25 @@ def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:
 
 
 def by_graph(material: Material, target: TargetShader, values: Sequence[GraphValue], findings: Findings) -> Material:
-    """The material whose sockets that chosen values reach are evaluated by Cycles."""
-    sockets = dict(material.sockets)
-    for name in dict.fromkeys(name for value in values for name in value.sockets):
+    """The material whose sockets and weights that chosen values reach are evaluated by Cycles."""
+    names = list(dict.fromkeys(name for value in values for name in value.sockets))
+    numbers = _numbers_of_leaves(target)
+    leaves = list(material.leaves)
+    for number, position in enumerate(numbers):
+        own = [name.partition("/")[2] for name in names if name.startswith(f"{number}/")]
+        leaves[position] = _by_graph(leaves[position], TargetShader(target.others[position]), own, findings)
+    own = [name for name in names if "/" not in name]
+    return replace(_by_graph(material, target, own, findings), leaves=tuple(leaves))
+
+
+def _by_graph(material: Material, target: TargetShader, names: Sequence[str], findings: Findings) -> Material:
+    """A leaf, of which these are evaluated; what is linked to factors has been looked at."""
+    if not names:
+        return material
+    sockets, weight = dict(material.sockets), material.weight
+    for name in names:
+        if name == WEIGHT:
+            weight = replace(weight, by_graph=True, linked=True, texture=None)
         if name not in sockets or sockets[name].by_graph:
             continue
         place = target.places[name]
@@ -102,7 +125,12 @@ def by_graph(material: Material, target: TargetShader, values: Sequence[GraphVal
         if problem is not None:
             findings.error(f"{name} of material '{material.name}' is linked to {problem}: mend or unlink it.")
         sockets[name] = replace(sockets[name], by_graph=True, linked=True, texture=None)
-    return replace(material, sockets=sockets)
+    return replace(material, sockets=sockets, weight=weight, varies=True)
+
+
+def _numbers_of_leaves(target: TargetShader) -> list[int]:
+    """Where in a mix's other shaders those are that the names of what values reach have numbers of."""
+    return [position for position, leaf in enumerate(target.others) if leaf.node.bl_idname in KINDS]
 
 
 def request_of(
@@ -111,12 +139,18 @@ def request_of(
     """What the entry `graph` of request.json has besides for these values."""
     tree = obj.active_material.node_tree
     used = dict.fromkeys(name for value in values for name in value.sockets)
+    numbers = _numbers_of_leaves(target)
+
+    def path(name: str) -> list[str]:
+        leaf, _, own = name.rpartition("/")
+        shader = TargetShader(target.others[numbers[int(leaf)]]) if leaf else target
+        return [*shader.path, "" if own == WEIGHT else shader.own_name(own)]
+
     return {
         "values": [value.request(read(tree, value.place)) for value in values],
         "evaluate": {
             "scene": context.scene.name, "layer": context.view_layer.name, "object": obj.name,
-            "slot": obj.active_material_index, "node": target.path,
-            "sockets": {name: target.own_name(name) for name in used},
+            "slot": obj.active_material_index, "sockets": {name: path(name) for name in used},
         },
     }  # fmt: skip
 

@@ -31,10 +31,12 @@ class Place:
 
 @dataclass(frozen=True)
 class TargetShader:
-    """The leaf of a material's shaders that is fitted, a Principled BSDF or another of `leaf_kinds`, and the others."""
+    """The leaf of a material's shaders that is fitted, a Principled BSDF or another of `leaf_kinds`, and the others, of
+    which so many come `before` it in the tree."""
 
     leaf: ClosureLeaf
     others: tuple[ClosureLeaf, ...] = ()
+    before: int = 0
 
     @property
     def node(self) -> bpy.types.Node:
@@ -127,7 +129,7 @@ def target_shader(material: bpy.types.Material | None, leaf: str | None = None) 
     if named is None and leaf:
         return None
     chosen = named or max(fitted, key=lambda each: each.share)
-    return TargetShader(chosen, tuple(each for each in leaves if each is not chosen))
+    return TargetShader(chosen, tuple(each for each in leaves if each is not chosen), leaves.index(chosen))
 
 
 def chosen_leaf(material: bpy.types.Material | None) -> str:

@@ -16,7 +16,7 @@ COPY = "graph/scene.blend"  # of the file, which a Blender evaluates while value
 LARGEST = 1e6  # of a bound
 MOST_VALUES = 256
 MOST_DEPTHS = 32
-_EVALUATE = ("scene", "layer", "object", "slot", "node", "sockets")
+_EVALUATE = ("scene", "layer", "object", "slot", "sockets")
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class NodeGraph:
 
     Files have so many `depths` one below the other: what the camera sees, what it would see were that away, and so on.
     `values` are those of the nodes that are fitted, beside the sockets; `evaluate` says where the material is in the
-    copy of the file, for the Blender that evaluates it, with what its shader calls the sockets.
+    copy of the file, for the Blender that evaluates it, with the path of names to each socket, whose last word is empty
+    for the weight of a shader in a mix.
     """
 
     camera: tuple[tuple[float, ...], ...]
@@ -104,11 +105,11 @@ def _number_or_color(entry: CheckedObject) -> Value:
 def _evaluate(data: Any, where: str) -> dict[str, Any]:
     entry = CheckedObject(data, where, _EVALUATE)
     sockets = entry.mapping("sockets")
-    if not all(isinstance(name, str) for name in sockets.values()):
-        raise entry.wrong("sockets", "names by names")
+    for path in sockets.values():
+        if not (isinstance(path, (list, tuple)) and len(path) > 1 and all(isinstance(name, str) for name in path)):
+            raise entry.wrong("sockets", "paths of a node's names and a socket's by names")
     return {
         **{key: entry.text(key) for key in ("scene", "layer", "object")},
         "slot": entry.integer("slot", 0, 32766),
-        "node": list(entry.texts("node")),
-        "sockets": dict(sockets),
+        "sockets": {name: list(path) for name, path in sockets.items()},
     }

@@ -12,7 +12,7 @@ from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
 from ...types.errors import BadInputError
 from .checked_object import CheckedObject
 
-MIX_KEYS = ("free", "factors", "ways")
+MIX_KEYS = ("free", "factors", "ways", "varies")
 MOST_FACTORS = 64  # of a mix
 MOST_WAYS = 256  # to a leaf, as in the add-on
 LARGEST_SHARE = 1e6  # of a way: a weight whose share is 1 / this is not seen

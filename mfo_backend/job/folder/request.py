@@ -4,22 +4,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ...fit.candidates import Candidates
 from ...fit.settings import FitSettings
-from ...material.cycles_model import SHADERS
 from ...metrics.display.tone_mapping import DisplayView
 from ...types.errors import BadInputError
 from ...types.image import Encoding
 from ...types.light_paths import LightPaths
-from .checked_object import CheckedObject, is_number, shown
+from .checked_object import CheckedObject, shown
 from .graph_files import check_graph_files
 from .graph_request import NodeGraph, graph_from_json, graph_to_json
 from .job_folder import JobFolder
-from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
+from .material_request import Material, material_from_json, without_nothing
 from .picture_part import PicturePart, part_from_json, part_to_json
 from .picture_request import Picture, candidates_from_json, candidates_to_json, picture_from_json
 from .scene_files import check_scene_files
@@ -28,8 +27,6 @@ from .view_request import ViewTable, light_paths_from_json, table_from_json, vie
 SCHEMA_VERSION = 1
 MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
 MOST_TARGETS = 32  # materials of one fit; the number of free values mostly says no before
-MOST_LEAVES = 64  # of a mix
-OTHER_LEAVES = ("transparent", "emission")
 _MOST_OF = {"more_pictures": (MOST_PICTURES, "pictures"), "targets": (MOST_TARGETS, "materials")}
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
@@ -38,7 +35,6 @@ _KEYS = (
     *("film_exposure", "graph", "fit", "notes", "left_out", "picture", "more_pictures", "targets"),
     *("cameras", "lights"),
 )
-_MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", *MIX_KEYS)
 
 
 @dataclass(frozen=True)
@@ -56,51 +52,6 @@ class Target:
     slot: int = 0
     node: tuple[str, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
-
-
-_FILES = ("texture", "graph", "elsewhere")  # of a socket
-
-
-@dataclass(frozen=True)
-class Socket:
-    """A socket of a Blender Principled node; a linked one stays as it is.
-
-    Files of the job: a `texture` over the UV map, a `graph` as the camera sees it, and `elsewhere` for other rays.
-    """
-
-    value: Any = None
-    linked: bool = False
-    texture: str | None = None
-    graph: str | None = None
-    elsewhere: str | None = None
-
-
-@dataclass(frozen=True)
-class Material:
-    """A Blender Principled material, or another `shader` by the sockets it has in common, by socket name.
-
-    Colours are linear Rec.709. A mix has the `weight` of its fitted material and the other `leaves` with theirs, among
-    them what is "transparent" (Base Color passes straight through) and "emission" (Emission Color and Strength).
-    """
-
-    name: str
-    distribution: str
-    sockets: Mapping[str, Socket]
-    subsurface_method: str = "RANDOM_WALK"
-    shader: str = "principled"
-    weight: Socket = field(default_factory=lambda: Socket(1.0))
-    leaves: tuple[Material, ...] = ()
-    free: Mapping[str, str] = field(default_factory=dict)
-    factors: tuple[MixFactor, ...] = ()
-    ways: tuple[MixWay, ...] = ()
-
-    @property
-    def all_sockets(self) -> Iterator[tuple[str, Socket]]:
-        """Every socket with a name that says where it is, weights and those of leaves included."""
-        yield "weight", self.weight
-        yield from self.sockets.items()
-        for leaf in self.leaves:
-            yield from ((f"{name} of {leaf.name}", socket) for name, socket in leaf.all_sockets)
 
 
 @dataclass(frozen=True)
@@ -212,7 +163,10 @@ def request_from_json(data: Any) -> Request:
         view_table=table_from_json(top.raw("view", None), WHERE),
         light_paths=light_paths_from_json(top.raw("light_paths", None), WHERE),
         film_exposure=top.number("film_exposure", 1e-6, 1e6, 1.0),
-        materials={key: _material(key, value) for key, value in top.mapping("materials", {}).items()},
+        materials={
+            key: material_from_json(f"{WHERE}: materials.{key}", value)
+            for key, value in top.mapping("materials", {}).items()
+        },
         graph=graph_from_json(top.raw("graph", None), WHERE),
         fit=_fit(top.raw("fit", {})),
         notes=top.texts("notes", ()),
@@ -266,7 +220,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
     """The JSON form of a request; `request_from_json` is its inverse."""
     materials = asdict(request)["materials"]
     for material in materials.values():
-        _without_nothing(material)
+        without_nothing(material)
     view = asdict(request.view) if request.view is not None else None
     if request.view_table is not None:
         view = {**(view or {}), "lut": asdict(request.view_table)}
@@ -299,19 +253,6 @@ def request_to_json(request: Request) -> dict[str, Any]:
     }
 
 
-def _without_nothing(material: dict[str, Any]) -> None:
-    """Leave out files that are not there."""
-    for socket in (*material["sockets"].values(), material["weight"]):
-        for key in _FILES:
-            if socket[key] is None:
-                del socket[key]
-    for key in ("free", "factors", "ways"):
-        if not material[key]:
-            del material[key]
-    for leaf in material["leaves"]:
-        _without_nothing(leaf)
-
-
 def _generator(data: Mapping[str, Any]) -> dict[str, Any]:
     version = data.get("blender", [5, 0])
     if not isinstance(version, (list, tuple)) or not all(type(part) is int and 0 <= part < 1000 for part in version):
@@ -332,46 +273,6 @@ def _target(data: Any) -> Target:
         node=target.texts("node", ()),
         labels={key: str(label) for key, label in target.mapping("labels", {}).items()},
     )
-
-
-def _material(bsdf_id: str, data: Any) -> Material:
-    where = f"{WHERE}: materials.{bsdf_id}"
-    material = _shader(data, where, SHADERS)
-    check_mix(where, material.factors, [material, *material.leaves])
-    return material
-
-
-def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
-    material = CheckedObject(data, where, _MATERIAL_KEYS)
-    leaves = material.raw("leaves", [])
-    if not isinstance(leaves, (list, tuple)) or len(leaves) > MOST_LEAVES:
-        raise material.wrong("leaves", f"a list of at most {MOST_LEAVES} materials")
-    if leaves and shaders is not SHADERS:
-        raise material.wrong("leaves", "empty: a leaf has none")
-    sockets = {name: _socket(entry, f"{where}.sockets.{name}") for name, entry in material.mapping("sockets").items()}
-    is_leaf = shaders is not SHADERS
-    return Material(
-        name=material.text("name"),
-        distribution=material.text("distribution", "MULTI_GGX"),
-        sockets=sockets,
-        subsurface_method=material.text("subsurface_method", "RANDOM_WALK"),
-        shader=material.choice("shader", list(shaders), "principled"),
-        weight=_socket(material.raw("weight", {"value": 1.0}), f"{where}.weight"),
-        free=free_from_json(material, sockets) if is_leaf else {},
-        factors=() if is_leaf else factors_from_json(material),
-        ways=ways_from_json(material),
-        leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", (*SHADERS, *OTHER_LEAVES)) for k, leaf in enumerate(leaves)),
-    )
-
-
-def _socket(data: Any, where: str) -> Socket:
-    socket = CheckedObject(data, where, ("value", "linked", *_FILES))
-    value = socket.raw("value", None)
-    numbers = value if isinstance(value, list) else [value]
-    if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
-        raise socket.wrong("value", "a number, a list of one to four, true, false or null")
-    files = {key: socket.text(key) for key in _FILES if socket.raw(key, None) is not None}
-    return Socket(value, socket.boolean("linked", False), **files)
 
 
 def _fit(data: Any) -> FitSettings:

@@ -81,19 +81,18 @@ class GraphBlender:
 
     def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
         """See `render.graph_pictures.Evaluate`."""
-        where, own = self._evaluate, self._evaluate["sockets"]
+        where = self._evaluate
         answer = self._ask({
-            "command": "values", **{key: where[key] for key in ("scene", "layer", "object", "slot", "node")},
+            "command": "values", **{key: where[key] for key in ("scene", "layer", "object", "slot", "sockets")},
             "places": [dict(value.place) for value in self._graph.values],
             "variants": [
-                {"values": [list(v) if isinstance(v, tuple) else v for v in values], "sockets": [own[n] for n in names]}
+                {"values": [list(v) if isinstance(v, tuple) else v for v in values], "sockets": list(names)}
                 for values, names in variants
             ],
             "scale": scale, "samples": samples, "elsewhere": elsewhere, "folder": str(self._folder),
         })  # fmt: skip
-        names = {theirs: ours for ours, theirs in own.items()}
-        pictures = [{names[socket]: self._picture(file) for socket, file in files.items()} for files in answer["files"]]
-        others = {names[socket]: self._picture(file) for socket, file in answer.get("elsewhere", {}).items()}
+        pictures = [{socket: self._picture(file) for socket, file in files.items()} for files in answer["files"]]
+        others = {socket: self._picture(file) for socket, file in answer.get("elsewhere", {}).items()}
         camera = np.array(answer["camera"], np.float64)
         return Evaluated(pictures, self._picture(answer["positions"]), camera, others)
 
@@ -199,7 +198,7 @@ def evaluated_graph(
         yield None, (_NO_COPY.format(names=", ".join(value.name for value in asked.values)),)
         return
     copy = folder.file(COPY, what="request.json: graph.values, and the copy of the file")
-    linked = [name for name, socket in request.materials[request.target.bsdf_id].sockets.items() if socket.graph]
+    linked = request.materials[request.target.bsdf_id].graph_names
     with GraphBlender(blender, copy, asked) as evaluate:
         yield GraphPictures(asked.values, evaluate, linked, request.width * request.height), ()
 

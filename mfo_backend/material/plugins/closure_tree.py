@@ -8,8 +8,8 @@ all, as Mix and Add Shader of Blender have it.
 
 `factor_0`, `factor_1`, ... are factors of Mix Shaders that may change; a leaf that hangs on them has `ways` (that of
 number k `ways_k`) which its weight is multiplied with: the sum over words such as "1.5 -0 +1", a share times 1 - factor
-0 times factor 1. `mi.traverse` shows the factors, the fitted material's values, and those of leaves that have `free`
-ones.
+0 times factor 1. `varies`, and `varies_0` and so on, say that somebody changes the textures of a leaf or of its weight.
+`mi.traverse` shows the factors, the fitted material's values, and those of leaves that have `free` ones or vary.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
@@ -34,12 +34,16 @@ LEAST = 1e-3  # of the weights that choose a leaf: none has no chance where all 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A material and its weight, a number or a texture, times what the `factors` of the tree make of its `ways`."""
+    """A material and its weight, a number or a texture, times what the `factors` of the tree make of its `ways`.
+
+    Textures of one that `varies` change.
+    """
 
     material: BlenderPrincipled
     weight: Any
     ways: tuple[Way, ...]
     factors: Sequence[Any]
+    varies: bool
 
     def weight_at(self, si: Any, active: Any = True) -> Any:
         """The weight at a surface point."""
@@ -53,7 +57,7 @@ class Leaf:
     @property
     def is_free(self) -> bool:
         """Whether something of it may change."""
-        return bool(self.ways or self.material.free)
+        return bool(self.ways or self.material.free or self.varies)
 
 
 @dataclass(frozen=True)
@@ -82,8 +86,8 @@ class ClosureTree(mi.BSDF):
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
         self.factors = [dr.opaque(mi.Float, float(props[f"factor_{k}"])) for k in _counted(props, "factor_")]
-        self.fitted = self._leaf(props, "fitted", "weight", "ways")
-        self.held = tuple(self._leaf(props, f"leaf_{k}", f"weight_{k}", f"ways_{k}") for k in _counted(props, "leaf_"))
+        self.fitted = self._leaf(props, "fitted", "")
+        self.held = tuple(self._leaf(props, f"leaf_{k}", f"_{k}") for k in _counted(props, "leaf_"))
         self.clear = tuple(
             (_colour(props[f"clear_{k}"]), _number(props.get(f"clear_weight_{k}", 1.0)))
             for k in _counted(props, "clear_")
@@ -101,9 +105,10 @@ class ClosureTree(mi.BSDF):
             flags |= flag
         self.m_flags = flags
 
-    def _leaf(self, props: mi.Properties, leaf: str, weight: str, ways: str) -> Leaf:
-        words = str(props.get(ways, ""))
-        return Leaf(props[leaf], _number(props.get(weight, 1.0)), ways_in(words), self.factors)
+    def _leaf(self, props: mi.Properties, leaf: str, end: str) -> Leaf:
+        """The leaf whose own properties end so."""
+        weight, ways = _number(props.get(f"weight{end}", 1.0)), ways_in(str(props.get(f"ways{end}", "")))
+        return Leaf(props[leaf], weight, ways, self.factors, bool(props.get(f"varies{end}", False)))
 
     @property
     def free_leaves(self) -> dict[int, Leaf]:
@@ -113,7 +118,7 @@ class ClosureTree(mi.BSDF):
     @property
     def is_open(self) -> bool:
         """Whether more than the fitted material may change."""
-        return bool(self.factors or self.free_leaves)
+        return bool(self.factors or self.free_leaves or self.fitted.varies)
 
     @property
     def leaves(self) -> tuple[Leaf, ...]:
@@ -150,6 +155,12 @@ class ClosureTree(mi.BSDF):
         """Keep the factors what no kernel knows."""
         for factor in self.factors:
             dr.make_opaque(factor)
+
+    def picture_of(self, name: str) -> Any:
+        """The texture of a value of `values_at`, or of a direction of the fitted material, that has one."""
+        number, _, own = name.removeprefix("leaf_").rpartition(".")
+        leaf = self.held[int(number)] if number else self.fitted
+        return leaf.weight if own == "weight" else leaf.material.picture_of(own)
 
     def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
         """The fitted material's values at a surface point; where more is free, those of free leaves and weights."""

@@ -135,6 +135,10 @@ class BlenderPrincipled(mi.BSDF):
         for name in changed:
             dr.make_opaque(getattr(self, name))
 
+    def picture_of(self, name: str) -> Any:
+        """The texture of a parameter or a direction that has one."""
+        return self.directions[name] if name in self.directions else getattr(self, name)
+
     def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
         """Parameter values at a surface point, by name."""
         values: dict[str, Any] = {}

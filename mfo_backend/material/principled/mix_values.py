@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...types.parameter import Parameter, Value
-from .principled_dict import held_leaves, socket_value
+from .principled_dict import held_leaves, is_mixed, socket_value
 from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 
 # At its ends a factor takes a shader out of the mix, whose values then have no place to go back to
@@ -51,7 +51,7 @@ class MixValues:
 
 
 def mix_values(material: Mapping[str, Any]) -> MixValues | None:
-    """Those of a material of request.json; None where there are none."""
+    """Those of a material of request.json; None where there are none, and nothing of the mix varies."""
     leaves, start = {}, {}
     for number, leaf in enumerate(held_leaves(material)):
         free = leaf.get("free", {})
@@ -59,7 +59,8 @@ def mix_values(material: Mapping[str, Any]) -> MixValues | None:
             leaves[number] = {PARAMETER_OF_SOCKET[socket]: shown for socket, shown in free.items()}
             start |= {shown: socket_value(s, leaf["sockets"][s]["value"]) for s, shown in free.items()}
     factors = material.get("factors", ())
-    if not leaves and not factors:
+    varies = is_mixed(material) and any(leaf.get("varies") for leaf in (material, *material.get("leaves", ())))
+    if not leaves and not factors and not varies:
         return None
     start |= {factor["name"]: float(factor["value"]) for factor in factors}
     return MixValues(leaves, tuple(factor["name"] for factor in factors), start)

@@ -83,7 +83,7 @@ def closure_tree_dict(
     """
     result: dict[str, Any] = {"type": "closure_tree", "fitted": dict(fitted), "weight": _amount(material["weight"])}
     result |= {f"factor_{k}": float(factor["value"]) for k, factor in enumerate(material.get("factors", ()))}
-    result |= _ways("ways", material)
+    result |= _ways("ways", material) | _varies("varies", material)
     for k, leaf in enumerate(held_leaves(material)):
         result[f"leaf_{k}"] = blender_principled_dict(
             leaf["sockets"],
@@ -94,7 +94,7 @@ def closure_tree_dict(
             shader=leaf["shader"],
         )
         result[f"weight_{k}"] = _amount(leaf["weight"])
-        result |= _ways(f"ways_{k}", leaf)
+        result |= _ways(f"ways_{k}", leaf) | _varies(f"varies_{k}", leaf)
     clear = [leaf for leaf in material["leaves"] if leaf["shader"] == "transparent"]
     for k, leaf in enumerate(clear):
         result[f"clear_{k}"] = _amount(leaf["sockets"].get("Base Color", {"value": [1.0, 1.0, 1.0]}))
@@ -115,6 +115,10 @@ def _ways(name: str, leaf: Mapping[str, Any]) -> dict[str, str]:
         for way in ways
     )
     return {name: ",".join(words)} if ways else {}
+
+
+def _varies(name: str, leaf: Mapping[str, Any]) -> dict[str, float]:
+    return {name: 1.0} if leaf.get("varies") else {}
 
 
 def is_mixed(material: Mapping[str, Any]) -> bool:

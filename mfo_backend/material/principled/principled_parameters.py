@@ -44,3 +44,4 @@ def parameter_to_socket(name: str) -> str:
 
 SOCKET_OF_PARAMETER = {name: parameter_to_socket(name) for name in BLENDER_PRINCIPLED.names}
 PARAMETER_OF_SOCKET = {socket: name for name, socket in SOCKET_OF_PARAMETER.items()}
+WEIGHT = "Weight"  # what the share of a shader in a mix is called among its sockets

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.principled.principled_dict import DIRECTIONS
-from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
+from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, WEIGHT
 from ...types.errors import BadInputError
 from ...types.node_value import NodeValue, table_of
 from ...types.parameter import Value, Vector
@@ -249,8 +249,11 @@ def _bend(a: GraphState, b: GraphState, width: Vector, way: Vector) -> Vector:
 
 
 def name_of(socket: str) -> str:
-    """The material's name for what a socket of the shader takes: a parameter or a direction."""
-    return DIRECTIONS[socket] if socket in DIRECTIONS else PARAMETER_OF_SOCKET[socket]
+    """The material's name for what a socket of the shader takes: a parameter or a direction; the `WEIGHT` of a shader
+    in a mix, and what is behind the number of another one and a slash, as `recorded_models.MixedModel` calls them."""
+    leaf, _, own = socket.rpartition("/")
+    name = DIRECTIONS.get(own) or ("weight" if own == WEIGHT else PARAMETER_OF_SOCKET[own])
+    return f"leaf_{leaf}.{name}" if leaf else name
 
 
 def _flat(picture: Picture, seen: NDArray[np.bool_]) -> NDArray[np.float32]:

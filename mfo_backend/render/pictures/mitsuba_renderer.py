@@ -221,8 +221,7 @@ class MitsubaRenderer:
 
     def _texture(self, name: str) -> Any:
         """The texture of a parameter or direction that nodes give the target."""
-        bsdf: Any = self.shape.bsdf()
-        return bsdf.directions[name] if name in bsdf.directions else getattr(bsdf, name)
+        return self.shape.bsdf().picture_of(name)
 
 
 _LOADED = itertools.count()  # scenes of this process

@@ -12,6 +12,7 @@ import pytest
 
 FLOAT32 = 1e-6
 JOB = Path("job")
+PATHS = {name: ["Principled BSDF", name] for name in ("Base Color", "Roughness", "Coat Roughness")}
 
 
 @pytest.fixture
@@ -95,17 +96,20 @@ def test_a_colour_that_is_a_direction_is_no_value(graph: SimpleNamespace) -> Non
 
 
 def test_sets_and_names(graph: SimpleNamespace) -> None:
-    from blender_addon.graph_values.table import GraphValueError, chosen_values
+    from blender_addon.export.nodes.target_shader import target_shader
+    from blender_addon.graph_values.mix_values import default_values
+    from blender_addon.graph_values.table import GraphValueError, named
 
     values = list(values_of(graph.material).values())
-    names = {value.name for value in chosen_values(values, "all")}
+    shader = target_shader(graph.material)
+    assert shader is not None
+    names = {value.name for value in default_values(shader, all_leaves=False)}
     assert {"Color Ramp/Stop 0", "Mix/Factor", "Wash  thin/Paint"} <= names
     assert not any(name.endswith("Scale") or "Position" in name for name in names)
-    assert chosen_values(values, "reduced") == []
-    chosen = chosen_values(values, ["base_color", "noise texture/scale", "Mix/Factor"])
+    chosen = named(values, ["base_color", "noise texture/scale", "Mix/Factor"])
     assert [value.name for value in chosen] == ["Noise Texture/Scale", "Mix/Factor"]
     with pytest.raises(GraphValueError, match=r"no value 'Color Ramp/Stop 7' \(the nearest is 'Color Ramp/Stop \d'\)"):
-        chosen_values(values, ["Color Ramp/Stop 7"])
+        named(values, ["Color Ramp/Stop 7"])
 
 
 def test_apply_toggle_and_revert(graph: SimpleNamespace) -> None:
@@ -177,7 +181,7 @@ def test_pictures_of_variants(graph: SimpleNamespace, tmp_path: Path) -> None:
     before = {name: len(getattr(bpy.data, name)) for name in ("materials", "node_groups")}
     found = answer({
         "scene": scene.name, "layer": bpy.context.view_layer.name, "object": "Väse", "slot": 0,
-        "node": ["Principled BSDF"], "places": [factor.place.request(), stop.place.request()], "variants": variants,
+        "sockets": PATHS, "places": [factor.place.request(), stop.place.request()], "variants": variants,
         "scale": 1, "samples": 1, "folder": str(tmp_path),
     })  # fmt: skip
     assert {name: len(getattr(bpy.data, name)) for name in before} == before
@@ -234,7 +238,7 @@ def test_a_picture_is_tinted_by_a_node_that_apply_puts_there(graph: SimpleNamesp
     variants = [{"values": [(2.0, 1.0, 1.0), (0.0, 0.25, 0.0), 0.5], "sockets": ["Base Color", "Roughness"]}]
     found = answer({
         "scene": scene.name, "layer": bpy.context.view_layer.name, "object": "Väse", "slot": 0,
-        "node": ["Principled BSDF"], "places": [values[n].place.request() for n in names], "variants": variants,
+        "sockets": PATHS, "places": [values[n].place.request() for n in names], "variants": variants,
         "scale": 1, "samples": 1, "folder": str(tmp_path),
     })  # fmt: skip
     seen = np.isfinite(np.load(tmp_path / found["positions"])).all(axis=2)

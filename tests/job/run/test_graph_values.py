@@ -35,8 +35,8 @@ ENTRY: dict[str, Any] = {
             "step": 0.06, "sockets": ["Base Color"], "place": {"node": ["Noise Texture"]},
         },
     ],
-    "evaluate": {"scene": "Scene", "layer": "ViewLayer", "object": "Head", "slot": 0, "node": ["Principled BSDF"],
-                 "sockets": {"Base Color": "Color"}},
+    "evaluate": {"scene": "Scene", "layer": "ViewLayer", "object": "Head", "slot": 0,
+                 "sockets": {"Base Color": ["Diffuse BSDF", "Color"]}},
 }  # fmt: skip
 
 
@@ -58,7 +58,7 @@ def test_the_entry_comes_back() -> None:
         (("values", 1, "sockets"), ["Normal"], "graph.evaluate.sockets has no 'Normal'"),
         (("values",), "all", "must be a list of at most 256"),
         (("evaluate", "slot"), -1, "slot is -1"),
-        (("evaluate", "sockets"), {"Base Color": 3}, "must be names by names"),
+        (("evaluate", "sockets"), {"Base Color": 3}, "must be paths of a node's names and a socket's by names"),
         (("evaluate", "command"), "rm", "unknown key 'command'"),
         (("evaluate",), None, "graph.evaluate"),
     ],
