@@ -25,7 +25,8 @@ def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> di
 def _stretched(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
     """Anisotropy of a Glossy BSDF as that of a Principled BSDF.
 
-    Cycles divides and multiplies alpha by 1 - a there (a > 0 widens across the tangent), and by sqrt(1 - 0.9 A) here.
+    Cycles divides and multiplies alpha by 1 - a there (a > 0 widens across the tangent), and by sqrt(1 - 0.9 A) here:
+    A goes beyond 1, which a Glossy BSDF of the backend takes.
     """
     anisotropy, rotation = (node.inputs.get(name) for name in ("Anisotropy", "Rotation"))
     if anisotropy is None or rotation is None:
@@ -35,7 +36,7 @@ def _stretched(material: str, node: bpy.types.Node, findings: Findings) -> dict[
     amount = float(anisotropy.default_value)
     if anisotropy.is_linked or amount == 0.0:
         return {}
-    wide = min((1.0 - (1.0 - min(abs(amount), 0.99)) ** 2) / 0.9, 1.0)
+    wide = (1.0 - (1.0 - min(abs(amount), 0.99)) ** 2) / 0.9
     turn = float(rotation.default_value) + (0.25 if amount > 0.0 else 0.0)
     return {"Anisotropic": Socket(wide, True), "Anisotropic Rotation": Socket(turn % 1.0, True)}
 

@@ -32,6 +32,9 @@ from .bumped_normals import BumpedNormals, about
 from .needed_lobes import Lobes
 from .principled_parameters import BLENDER_PRINCIPLED
 
+# A Glossy BSDF narrows alpha by up to 1 - 0.99 where a Principled BSDF's `anisotropic` of 1 leaves sqrt(0.1)
+GLOSSY_ANISOTROPY = (1.0 - 0.01**2) / 0.9
+
 
 @dataclass(frozen=True)
 class Layers:
@@ -118,7 +121,8 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
     ax = ay = dr.maximum(dr.square(roughness), 1e-6)
     lobe_roughness = roughness
     if lobes.anisotropic:
-        stretch = dr.sqrt(1 - 0.9 * saturate(p["anisotropic"]))
+        most = GLOSSY_ANISOTROPY if model.shader == "glossy" else 1.0
+        stretch = dr.sqrt(1 - 0.9 * dr.clip(p["anisotropic"], 0, most))
         ax, ay = dr.minimum(ax / stretch, 1), ay * stretch
         lobe_roughness = dr.sqrt(dr.sqrt(ax * ay))
     stack |= {"ax": ax, "ay": ay}

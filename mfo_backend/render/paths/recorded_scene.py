@@ -233,7 +233,7 @@ class RecordedScene:
     def _highlights(self, vector: NDArray[np.float64]) -> Highlights:
         """How finely highlights of the material `vector` are recorded: an anisotropic lobe is narrow along one axis."""
         anisotropy, turn = (self._value(vector, name) for name in ("anisotropic", "anisotropic_rotation"))
-        narrow = 1.0 - 0.9 * anisotropy if isinstance(anisotropy, float) else 1.0  # of both models
+        narrow = max(1.0 - 0.9 * anisotropy, 0.1) if isinstance(anisotropy, float) else 1.0  # of both models
         return Highlights(share=SHARE_NEAR, narrow=narrow, turn=turn if isinstance(turn, float) else 0.0)
 
     def _affordable(
