@@ -15,7 +15,9 @@ BUILD = """
 from studies.graphs.measure import build_scene
 target, _ = build_scene("factor", "lamp", 48)
 tree = target.active_material.node_tree
-nodes, color = tree.nodes, tree.nodes.new("ShaderNodeRGB").outputs[0]
+nodes, paint = tree.nodes, tree.nodes.new("ShaderNodeRGB")
+paint.name = "Paint"
+color = paint.outputs[0]
 tree.links.new(color, nodes["Diffuse BSDF"].inputs["Color"])
 values = nodes["Mix Shader"].inputs[0], color, nodes["Glossy BSDF"].inputs["Roughness"]
 for socket, value in zip(values, (0.3, (0.6, 0.2, 0.1, 1.0), 0.35)):
@@ -34,7 +36,7 @@ SHOW = """
 import json
 bpy.ops.wm.open_mainfile(filepath=argv[0])
 nodes = bpy.data.objects["Suzanne"].active_material.node_tree.nodes
-values = nodes["Mix Shader"].inputs[0], nodes["RGB"].outputs[0], nodes["Glossy BSDF"].inputs["Roughness"]
+values = nodes["Mix Shader"].inputs[0], nodes["Paint"].outputs[0], nodes["Glossy BSDF"].inputs["Roughness"]
 found = values[0].default_value, list(values[1].default_value)[:3], values[2].default_value
 open(argv[1], "w").write(json.dumps(found))
 """
@@ -43,7 +45,7 @@ open(argv[1], "w").write(json.dumps(found))
 def test_two_shaders_and_their_factor_are_found_and_applied(tmp_path: Path) -> None:
     start, picture, saved = tmp_path / "start.blend", tmp_path / "reference.exr", tmp_path / "saved.blend"
     run_bpy(BUILD, start, picture)
-    names = "Mix Shader/Factor, RGB/Color, glossy bsdf/roughness"
+    names = "Mix Shader/Factor, Paint/Color, glossy bsdf/roughness"
     done = run_mfo(
         "blend", start, "--object", "Suzanne", "--reference", picture, "--parameters", names, "--preset", "fast",
         "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",

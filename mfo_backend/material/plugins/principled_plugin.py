@@ -164,7 +164,12 @@ class BlenderPrincipled(mi.BSDF):
             if name not in given:
                 return instead
             length = dr.norm(given[name])
-            return dr.select(length > 0.1, given[name] / dr.maximum(length, 1e-6), instead)
+            found = given[name] / dr.maximum(length, 1e-6)
+            if name != "tangent":  # nodes gave it for the side that the camera sees: a bump is mirrored on the other
+                # at silhouettes a point takes its value from one that looks another way, on the same side of the mesh
+                behind = self.directions[name].surface.is_behind(si) & (dr.dot(found, smooth) < 0)
+                found = dr.select(behind, found - 2 * dr.dot(found, smooth) * smooth, found)
+            return dr.select(length > 0.1, found, instead)
 
         bumped = normal("normal", smooth)
         coat = valid_normal(geometric, view, normal("coat_normal", smooth))

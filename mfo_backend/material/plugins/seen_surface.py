@@ -23,6 +23,7 @@ NEAR_NEIGHBOURS, NEAR_EXTENT = 2.0, 1e-3
 # Cosine to the direction of the camera above which a ray counts as the camera's: 2.6 degrees, for a lens has a width;
 # of all other rays 0.1 % are as near to it
 FROM_CAMERA = 0.999
+PARALLEL = 1e-9  # w of a camera with parallel rays, which rounding leaves, by the length of the rest
 
 
 class SeenSurface:
@@ -48,15 +49,23 @@ class SeenSurface:
         steps = np.concatenate([_steps(each) for each in pictures])
         reach = NEAR_NEIGHBOURS * steps + NEAR_EXTENT * float(np.linalg.norm(extent))
         self._reach = own_memory(reach.ravel()[np.maximum(source, 0).ravel()], mi.Float)
-        self._eye = np.linalg.svd(camera)[2][3]  # the point that the matrix leads to 0
+        self._eye = _eye_of(camera)
         self._camera = [[dr.opaque(mi.Float, float(v)) for v in row] for row in camera]
         dr.eval(self._source, self._positions, self._reach)
 
     def is_from_camera(self, si: mi.SurfaceInteraction3f) -> mi.Bool:
         """Whether the ray that met the surface came from where the camera is."""
+        return dr.dot(si.to_world(si.wi), dr.normalize(self._towards(si))) > FROM_CAMERA
+
+    def is_behind(self, si: mi.SurfaceInteraction3f) -> mi.Bool:
+        """Whether the ray met the other side of the surface than the camera would."""
+        normal = mi.Vector3f(si.n)
+        return dr.dot(normal, self._towards(si)) * dr.dot(normal, si.to_world(si.wi)) < 0
+
+    def _towards(self, si: mi.SurfaceInteraction3f) -> mi.Vector3f:
+        """The direction of the camera, of any length."""
         x, y, z, w = (dr.opaque(mi.Float, float(number)) for number in self._eye)
-        towards = mi.Vector3f(x, y, z) - mi.Vector3f(si.p) * w  # parallel rays of an orthographic one: w is 0
-        return dr.abs(dr.dot(si.to_world(si.wi), dr.normalize(towards))) > FROM_CAMERA
+        return mi.Vector3f(x, y, z) - mi.Vector3f(si.p) * w  # parallel rays of an orthographic one: w is 0
 
     def row_of(self, point: mi.Point3f) -> mi.UInt32:
         """The subpixel that holds the point's value, or the number of them where the camera does not see it."""
@@ -84,6 +93,16 @@ class SeenSurface:
         known = active & (source != NOWHERE)
         found = dr.gather(mi.Point3f, self._positions, index, known)
         return source, known & (dr.norm(found - point) <= dr.gather(mi.Float, self._reach, index, known))
+
+
+def _eye_of(camera: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The homogeneous point that the matrix leads to 0: the camera with a positive w, or the way back to one whose rays
+    are parallel, with w 0."""
+    eye = np.linalg.svd(camera)[2][3]
+    if abs(eye[3]) > PARALLEL * np.linalg.norm(eye[:3]):
+        return eye * np.sign(eye[3])
+    ahead = np.cross(camera[0, :3], camera[1, :3])  # columns count to the right, rows down
+    return -eye * np.sign(eye[:3] @ ahead)
 
 
 def _filled(seen: NDArray[np.bool_]) -> NDArray[np.int64]:

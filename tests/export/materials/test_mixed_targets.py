@@ -89,7 +89,6 @@ GLOW = shader("Emission", Color=BLUE, Strength=0.3)
 CASES = {
     "glossy": GLOSSY,
     "single scattering": shader("BsdfAnisotropic", {"distribution": "GGX"}, Color=GOLD, Roughness=0.6),
-    "stretched": shader("BsdfAnisotropic", Color=GOLD, Roughness=0.6, Anisotropy=0.85, Rotation=0.1),
     "metallic": shader("BsdfMetallic", Base_Color=GOLD, Edge_Tint=RED, Roughness=0.35),
     "sheen": SHEEN,
     "diffuse under a fresnel": mix(fresnel, DIFFUSE, GLOSSY),

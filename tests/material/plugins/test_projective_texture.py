@@ -51,3 +51,37 @@ def test_just_beside_the_surface_a_neighbour_counts(texture: Any) -> None:
 def test_behind_it_beside_it_and_outside_of_the_picture_nothing_is_seen(texture: Any) -> None:
     found = at(texture, (1.5, 1.5, 40.0), (5.9, 1.5, 0.0), (-0.5, 1.5, 0.0), (1.5, 4.5, 0.0))
     np.testing.assert_array_equal(found, [[7, 8, 9]] * 4)
+
+
+PERSPECTIVE = "1,0,0,0, 0,1,0,0, 0,0,1,5"  # from z = -5
+
+
+def seen_along(direction: tuple[float, float, float]) -> Any:
+    """A hit of the plane z = 0 whose mesh looks to the camera, by a ray that came from there."""
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.p, si.n = mi.Point3f(1.5, 1.5, 0.0), mi.Normal3f(0.0, 0.0, -1.0)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0.0, 0.0, -1.0))
+    si.wi = si.to_local(dr.normalize(mi.Vector3f(*direction)))
+    return si
+
+
+@pytest.mark.parametrize("camera", [CAMERA, PERSPECTIVE])
+def test_a_bump_is_mirrored_on_the_side_that_the_camera_does_not_see(tmp_path: Path, camera: str) -> None:
+    from mfo_backend.material.plugins import principled_plugin, projective_texture
+
+    projective_texture.register()
+    principled_plugin.register()
+    row, column = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    depth = 5.0 if camera == PERSPECTIVE else 1.0
+    positions = np.stack([(column + 0.5) * depth, (row + 0.5) * depth, np.zeros_like(row)], axis=-1)
+    np.save(tmp_path / "positions.npy", positions)
+    np.save(tmp_path / "normals.npy", np.tile(np.float32((0.6, 0.0, -0.8)), (HEIGHT, WIDTH, 1)))
+    bsdf: Any = mi.load_dict({
+        "type": "blender_principled",
+        "normal": {"type": "projective", "filename": str(tmp_path / "normals.npy"), "camera": camera,
+                   "positions": str(tmp_path / "positions.npy"), "outside": mi.ScalarColor3f(0.0)},
+    })  # fmt: skip
+    for z in (-1.0, 1.0):
+        frame, _, normals = bsdf.bumped_frame(seen_along((0.2, 0.1, z)), mi.Bool(True))
+        found = np.array(frame.to_world(normals["bumped_normal"])).ravel()
+        np.testing.assert_allclose(found, (0.6, 0.0, 0.8 * z), atol=1e-6)

@@ -34,10 +34,17 @@ class Node:
     shader: str = "principled"
 
 
+STRETCHED = {"anisotropic": (0.0, 1.108), "anisotropic_rotation": (0.0, 1.0)}
 METAL = {**parity.BASE, "specular_tint": (0.0, 1.0), **parity.TURN}
 NODES = (
     Node("BsdfAnisotropic", COLOUR, parity.Group("glossy", parity.BASE, {"metallic": 1.0}), shader="glossy"),
     Node("BsdfAnisotropic", COLOUR, parity.Group("glossy, GGX", parity.BASE, {"metallic": 1.0}), "GGX", "glossy"),
+    Node(
+        "BsdfAnisotropic",
+        {**COLOUR, "anisotropic": "Anisotropy", "anisotropic_rotation": "Rotation"},
+        parity.Group("glossy, stretched", {**parity.BASE, **STRETCHED}, {"metallic": 1.0}),
+        shader="glossy",
+    ),
     Node(
         "BsdfMetallic",
         {
@@ -75,6 +82,8 @@ def answers() -> dict[str, tuple[parity.Cases, Any]]:
     batches = []
     for node, drawn in zip(NODES, cases, strict=True):
         sockets = {node.names[name]: value for name, value in drawn.values.items() if name in node.names}
+        if "stretched" in node.group.name:  # its own measure: along the tangent below 0
+            sockets["Anisotropy"] = np.sqrt(1.0 - 0.9 * sockets["Anisotropy"]) - 1.0
         asked = {"view": drawn.view, "light": drawn.light, "sockets": sockets}
         batches.append({**asked, "node": f"ShaderNode{node.kind}", "distribution": node.distribution})
     found = parity.ask_cycles(batches)
