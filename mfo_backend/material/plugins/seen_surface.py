@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which subpixel of a camera's picture shows a point of a surface."""
 
-# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportReturnType=false
 # Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
 
 from __future__ import annotations

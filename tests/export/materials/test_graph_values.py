@@ -102,8 +102,9 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     assert (report.folder / "graph" / "scene.blend").is_file()
     linked = request.materials["target_bsdf"].graph_names
     renderer = load_renderer(
-        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=request.fit.parameters,
-        materials=request_materials(folder, request), light_paths=request.light_paths,
+        folder.root / request.scene, request.target.shape_id, model="blender_principled",
+        parameters=request.fit.parameters, materials=request_materials(folder, request),
+        light_paths=request.light_paths,
         graph=GraphPictures(request.graph.values, evaluator(request, tmp_path), linked),
     )  # fmt: skip
     assert isinstance(renderer, MitsubaRenderer)

@@ -61,7 +61,7 @@ def seen_along(direction: tuple[float, float, float]) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, 1)
     si.p, si.n = mi.Point3f(1.5, 1.5, 0.0), mi.Normal3f(0.0, 0.0, -1.0)
     si.sh_frame = mi.Frame3f(mi.Vector3f(0.0, 0.0, -1.0))
-    si.wi = si.to_local(dr.normalize(mi.Vector3f(*direction)))
+    si.wi = si.to_local(dr.normalize(mi.Vector3f(*direction)))  # pyright: ignore[reportArgumentType]
     return si
 
 
