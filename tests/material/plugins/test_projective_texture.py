@@ -75,7 +75,7 @@ def test_a_bump_is_mirrored_on_the_side_that_the_camera_does_not_see(tmp_path: P
     depth = 5.0 if camera == PERSPECTIVE else 1.0
     positions = np.stack([(column + 0.5) * depth, (row + 0.5) * depth, np.zeros_like(row)], axis=-1)
     np.save(tmp_path / "positions.npy", positions)
-    np.save(tmp_path / "normals.npy", np.tile(np.float32((0.6, 0.0, -0.8)), (HEIGHT, WIDTH, 1)))
+    np.save(tmp_path / "normals.npy", np.tile(np.array((0.6, 0.0, -0.8), np.float32), (HEIGHT, WIDTH, 1)))
     bsdf: Any = mi.load_dict({
         "type": "blender_principled",
         "normal": {"type": "projective", "filename": str(tmp_path / "normals.npy"), "camera": camera,
