@@ -149,6 +149,11 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
     )
     pictures: CollectionProperty(type=MFO_PG_picture)  # those after the first one
     first_picture: PointerProperty(type=MFO_PG_picture)  # what of the first one counts, and what it shows among others
+    queue: BoolProperty(
+        name="Queue",
+        description="Fit each once and quickly, in the light that the others' base colours give; without it at most "
+        "120 values together",
+    )
     targets: CollectionProperty(type=MFO_PG_target)  # materials to be fitted together; empty: the active one alone
     overlay_opacity: FloatProperty(
         name="Opacity",

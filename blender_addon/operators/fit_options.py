@@ -105,6 +105,8 @@ class FitOptions:
         is_new = not folder.exists()
         name = f"{len(materials)} materials" if targets else material.name
         uids, chosen = tuple(each.session_uid for each in materials), self._fit(settings, obj)
+        if targets and settings.queue:
+            chosen["queue"] = True
         try:
             if isinstance(reference, Sequence):  # each picture changes the scene's frame while it is exported
                 report = export_job(

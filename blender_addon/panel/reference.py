@@ -111,3 +111,4 @@ def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         row = box.row(align=True)
         row.prop(entry, "use", text=entry.material.name, translate=False)
         row.label(text=entry.object.name, icon="OBJECT_DATA", translate=False)
+    box.prop(context.scene.mfo, "queue")

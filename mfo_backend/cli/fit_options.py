@@ -9,7 +9,17 @@ from typing import Any
 from ..fit.settings import PAPER_LOSSES
 from ..types.errors import BadInputError
 
-_OPTIONS = ("preset", "model", "range", "seed", "max_iterations", "spp", "learning_rate", "keep_optimizer_state")
+_OPTIONS = (
+    "preset",
+    "model",
+    "range",
+    "seed",
+    "max_iterations",
+    "spp",
+    "learning_rate",
+    "keep_optimizer_state",
+    "queue",
+)
 
 
 def add_fit_options(parser: argparse.ArgumentParser) -> None:

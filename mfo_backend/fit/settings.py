@@ -63,6 +63,8 @@ class FitSettings:
         Narrower limits by parameter name, (lower, upper) for every component; see `types.parameter_bounds`.
     region
         Pixels the losses look at: those that see the target, or all.
+    queue
+        Fit each of many materials once and quickly, in the light that the others' base colours give.
     """
 
     model: str = "auto"
@@ -79,6 +81,7 @@ class FitSettings:
     schedule: str = "decay"
     keep_optimizer_state: bool = False
     region: str = "target"
+    queue: bool = False
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -94,10 +97,9 @@ class FitSettings:
         rate = self.learning_rate
         if not isinstance(rate, (int, float)) or isinstance(rate, bool) or not 0.0 < rate <= 1.0:
             raise BadInputError(f"Fit setting 'learning_rate' is {rate!r}: give a number above 0 and at most 1.")
-        if not isinstance(self.keep_optimizer_state, bool):
-            raise BadInputError(
-                f"Fit setting 'keep_optimizer_state' is {self.keep_optimizer_state!r}: give true or false."
-            )
+        for name in ("keep_optimizer_state", "queue"):
+            if not isinstance(getattr(self, name), bool):
+                raise BadInputError(f"Fit setting {name!r} is {getattr(self, name)!r}: give true or false.")
         if not isinstance(self.model, str):
             raise BadInputError(f"Fit setting 'model' is {self.model!r}: give the name of a material model.")
         if self.losses is not None:

@@ -53,6 +53,7 @@ def test_both_are_fitted_shown_applied_and_kept(two: SimpleNamespace, monkeypatc
     assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
     request = json.loads((Path(two.job) / "request.json").read_text("utf-8"))
     assert request["targets"] == ["targets/1", "targets/2"]
+    assert "queue" not in request["fit"]
     assert [(row.name, row.words) for row in runtime.materials] == [("Wood", "same"), ("Glaze", "same")]
     assert shown_result.result is not None
     assert shown_result.result.material_name == "Wood"
@@ -61,6 +62,9 @@ def test_both_are_fitted_shown_applied_and_kept(two: SimpleNamespace, monkeypatc
     assert runtime.shown_material == 1
     histories = [bpy.data.materials[name].mfo.history for name in ("Wood", "Glaze")]
     assert [Path(history[0].job_folder).name for history in histories] == ["1", "2"]
+    bpy.context.scene.mfo.queue = True
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    assert json.loads((Path(two.job) / "request.json").read_text("utf-8"))["fit"]["queue"] is True
 
     bpy.ops.ed.undo_push(message="before apply")
     assert bpy.ops.mfo.apply("EXEC_DEFAULT", True) == {"FINISHED"}

@@ -28,6 +28,8 @@ LABELS = {
     "Use Alpha": "Utiliser l'alpha",
     "What is transparent in the picture itself does not count": "Ce qui est transparent dans l'image elle-même ne compte pas",
     "Fit together": "Ajuster ensemble",
+    "Queue": "File",
+    "Fit each once and quickly, in the light that the others' base colours give; without it at most 120 values together": "Ajuster chacun une fois et vite, dans la lumière que donnent les couleurs de base des autres ; sans cela, 120 valeurs au plus ensemble",
     "Fit this material together with the others": "Ajuster ce matériau avec les autres",
     "List the materials that the camera sees, to fit several of them together": "Lister les matériaux que la caméra voit, pour en ajuster plusieurs ensemble",
     "Fit the material of the active object alone again": "Ajuster de nouveau le seul matériau de l'objet actif",

@@ -28,6 +28,8 @@ LABELS = {
     "Use Alpha": "Alpha verwenden",
     "What is transparent in the picture itself does not count": "Was im Bild selbst durchsichtig ist, zählt nicht",
     "Fit together": "Zusammen anpassen",
+    "Queue": "Warteschlange",
+    "Fit each once and quickly, in the light that the others' base colours give; without it at most 120 values together": "Jedes einmal und schnell anpassen, im Licht, das die Grundfarben der anderen geben; ohne das höchstens 120 Werte zusammen",
     "Fit this material together with the others": "Dieses Material mit den anderen zusammen anpassen",
     "List the materials that the camera sees, to fit several of them together": "Die Materialien auflisten, die die Kamera sieht, um mehrere davon zusammen anzupassen",
     "Fit the material of the active object alone again": "Wieder das Material des aktiven Objekts allein anpassen",

@@ -53,6 +53,12 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     )
     parser.add_argument("file", type=Path, help="the .blend file; it is not changed unless --apply is given alone")
     parser.add_argument("--object", required=True, action="append", metavar="NAME[@KEY=VALUE]", help=TARGET_HELP)
+    parser.add_argument(
+        "--queue",
+        action="store_const",
+        const=True,
+        help="fit each of many materials once and quickly, in the light that the others' base colours give",
+    )
     parser.add_argument("--reference", required=True, action="append", metavar="PATH[@KEY=VALUE,...]", help=HELP)
     parser.add_argument(
         "--leave-out", action="append", type=int, default=[], metavar="NUMBER",

@@ -31,6 +31,10 @@ NOT_STILL = (
     "The light between the materials still moved after {rounds} rounds: fit again from the applied values, or fit "
     "fewer at once."
 )
+ONCE = (
+    "Each material of the queue was fitted once, beside the others' base colours: fit together what does not match or "
+    "gives much light to others."
+)
 OTHERS_HELD = "How sure a value is holds with the other materials as they were found."
 
 
@@ -86,6 +90,8 @@ def fit_together(
     end = np.mean(halves, axis=0, dtype=np.float32)
     stopped = should_stop()
     said = () if turns.still or stopped else (NOT_STILL.format(rounds=MOST_ROUNDS),)
+    if members[0].settings.queue:
+        said = (*said, ONCE)
     outcomes = []
     for result, task in zip(judged, tasks, strict=True):
         gap = None if stopped else model_gap(reference, halves, task.mask, task.view)

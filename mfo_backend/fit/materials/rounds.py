@@ -24,7 +24,7 @@ from ..recover_material import recover_material
 from ..result.outcome import FitOutcome
 from ..settings import FitSettings
 from .evened_light import evened_light
-from .whole_course import WholeCourse
+from .whole_course import SHARES, WholeCourse
 
 MOST_VALUES = 120  # free values of all materials together: about six with all that one picture may show
 # The first one searches and the second has the preset's plan. In rooms of six materials
@@ -67,7 +67,7 @@ def check_members(members: Sequence[Member], reference: Image) -> None:
     """
     counts = {member.name: member.renderer.table.length for member in members}
     total = sum(counts.values())
-    if total > MOST_VALUES:
+    if total > MOST_VALUES and not members[0].settings.queue:
         names, over = [], total - MOST_VALUES
         for name, count in sorted(counts.items(), key=lambda pair: -pair[1]):
             if over <= 0:
@@ -75,7 +75,7 @@ def check_members(members: Sequence[Member], reference: Image) -> None:
             names, over = [*names, f"'{name}' ({count})"], over - count
         raise BadInputError(
             f"The {len(counts)} materials have {total} free values, and at most {MOST_VALUES} are fitted together: "
-            f"leave out {' and '.join(names)}, or choose fewer parameters."
+            f"leave out {' and '.join(names)}, or choose fewer parameters, or a queue."
         )
     if members[0].settings.preset == "paper":
         raise BadInputError(
@@ -103,8 +103,8 @@ def take_turns(
 
     The first round searches from nothing, quickly. The second has the preset's plan and searches again what sees other
     light than at its own first fit: in wrong light a coat or a sheen is easily missed, and no solution nearby has it.
-    Those after it fit again what sees other light than at its own last fit, from its values there. `light` is the
-    reference as scene-linear radiance.
+    Those after it fit again what sees other light than at its own last fit, from its values there. A queue ends with
+    the first. `light` is the reference as scene-linear radiance.
 
     Raises
     ------
@@ -116,14 +116,15 @@ def take_turns(
     seed = members[0].settings.seed
     masks = [check_reference(reference, member.renderer.target_mask()) for member in members]
     present = evened_light([member.renderer for member in members], masks, light, Stream.TOGETHER.seed(seed))
-    course = WholeCourse([member.name for member in members], listener)
+    queue = members[0].settings.queue
+    course = WholeCourse([member.name for member in members], listener, SHARES[:1] if queue else SHARES)
     outcomes: list[FitOutcome | None] = [None for _ in members]
     seen: list[Pixels | None] = [None for _ in members]
     order = sorted(range(len(members)), key=lambda k: -int(masks[k].sum()))  # what lights the others most comes first
     number, still = 0, False
     while not (still or number == MOST_ROUNDS or should_stop()):
         number += 1
-        still = number > 2
+        still = number > 2 or queue
         for k in order:
             if should_stop():
                 still = False
@@ -131,7 +132,7 @@ def take_turns(
             moved = number > 1 and _moved(_look(members, present, seed), seen[k], masks[k]) > LIGHT_MOVED
             if number > 2 and not moved:
                 continue
-            still = False
+            still = queue
             member = members[k]
             quick = replace(member.settings, preset="fast", verify_spp=LOOK_SAMPLES, losses=None)
             plan = None if number == 1 else RecordedPlan.of(member.settings.preset).among_others()
@@ -147,7 +148,7 @@ def take_turns(
                 break  # the round before has said more
             outcomes[k] = outcome
             present[k] = member.renderer.table.pack(outcome.result.recovered)
-            seen[k] = _look(members, present, seed)
+            seen[k] = None if queue else _look(members, present, seed)
     if not any(outcomes):
         raise Interrupted
     ended = [outcome or _as_it_was(member) for outcome, member in zip(outcomes, members, strict=True)]

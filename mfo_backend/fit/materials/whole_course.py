@@ -17,16 +17,17 @@ SHARES = (0.36, 0.5, 0.14)
 class WholeCourse:
     """Tells a listener of fits that follow each other; stages are named after their materials."""
 
-    def __init__(self, names: Sequence[str], listener: Listener) -> None:
+    def __init__(self, names: Sequence[str], listener: Listener, shares: Sequence[float] = SHARES) -> None:
         self._names, self._listener = list(names), listener
+        self._shares = [share / sum(shares) for share in shares]
         self._began, self._started, self._done = time.monotonic(), False, set[tuple[int, int]]()
 
     def of(self, member: int, round_number: int) -> Listener:
         """The listener for the fit of one of them in a round, counted from 1."""
         self._done.add((member, round_number))
         before = sum(1 for _, number in self._done if number == round_number) - 1
-        part = min(round_number, len(SHARES)) - 1
-        beginning = sum(SHARES[:part])
+        part = min(round_number, len(self._shares)) - 1
+        beginning = sum(self._shares[:part])
 
         def heard(event: Event) -> None:
             if isinstance(event, Started):
@@ -35,7 +36,7 @@ class WholeCourse:
                     self._listener(event)
             elif isinstance(event, Progress):
                 share = min((before + event.fraction) / len(self._names), 1.0)
-                whole = beginning + SHARES[part] * share
+                whole = beginning + self._shares[part] * share
                 seconds = time.monotonic() - self._began
                 left = seconds * (1.0 - whole) / max(whole, 1e-3)
                 self._listener(

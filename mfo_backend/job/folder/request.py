@@ -26,7 +26,7 @@ from .view_request import ViewTable, light_paths_from_json, table_from_json, vie
 
 SCHEMA_VERSION = 1
 MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
-MOST_TARGETS = 32  # materials of one fit; the number of free values mostly says no before
+MOST_TARGETS = 64  # materials of one fit; without a queue the number of free values says no before
 _MOST_OF = {"more_pictures": (MOST_PICTURES, "pictures"), "targets": (MOST_TARGETS, "materials")}
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"

@@ -73,9 +73,9 @@ def test_colours_are_evened_with_the_light_that_the_walls_give_each_other() -> N
         assert vector[:3] == pytest.approx(colour, abs=0.01)
 
 
-def members(values: int, preset: str = "balanced") -> list[Member]:
+def members(values: int, preset: str = "balanced", *, queue: bool = False) -> list[Member]:
     return [
-        Member(name, wall, FitSettings(preset=preset))  # type: ignore[arg-type]
+        Member(name, wall, FitSettings(preset=preset, queue=queue))  # type: ignore[arg-type]
         for name, wall in zip(("Left", "Right"), walls(values), strict=True)
     ]
 
@@ -87,6 +87,10 @@ def test_120_values_are_fitted_together_and_121_are_not() -> None:
     check_members(members(MOST_VALUES // 2), LIT)
     with pytest.raises(BadInputError, match=r"have 122 free values, and at most 120 .*: leave out 'Left' \(61\), or"):
         check_members(members(MOST_VALUES // 2 + 1), LIT)
+
+
+def test_a_queue_holds_any_number_of_values() -> None:
+    check_members(members(MOST_VALUES, queue=True), LIT)
 
 
 def test_what_fits_one_material_alone_is_refused() -> None:
@@ -144,11 +148,12 @@ class Fits:
         return len(self.calls) >= self.stop_after
 
 
-def turns(fits: Fits, monkeypatch: pytest.MonkeyPatch) -> rounds.Turns:
+def turns(fits: Fits, monkeypatch: pytest.MonkeyPatch, *, queue: bool = False) -> rounds.Turns:
     monkeypatch.setattr(rounds, "recover_material", fits)
     monkeypatch.setattr(rounds, "evened_light", lambda renderers, *_: [r.start.copy() for r in renderers])
     return take_turns(
-        members(3), SHOWN, SHOWN.pixels, display=None, listener=lambda event: None, should_stop=fits.stopped
+        members(3, queue=queue), SHOWN, SHOWN.pixels,
+        display=None, listener=lambda event: None, should_stop=fits.stopped,
     )  # fmt: skip
 
 
@@ -163,6 +168,13 @@ def test_turns_end_when_the_light_holds_still(monkeypatch: pytest.MonkeyPatch) -
     assert fits.calls[2:4] == [("left", "balanced", False), ("right", "balanced", False)]
     assert set(fits.calls[4:]) <= {("left", "balanced", True), ("right", "balanced", True)}
     assert len(fits.calls) < 2 * rounds.MOST_ROUNDS  # what sees the same light is not fitted again
+
+
+def test_a_queue_fits_each_once_and_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = Fits()
+    found = turns(fits, monkeypatch, queue=True)
+    assert fits.calls == [("left", "fast", False), ("right", "fast", False)]
+    assert (found.rounds, found.still) == (1, True)
 
 
 def test_what_was_found_before_a_stop_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
