@@ -48,6 +48,19 @@ def _mirrored_lamp(rig: Rig, _: Draw) -> None:
     rig.light.scale = (-1.0, 1.0, 1.0)
 
 
+def _glowing_mesh(size: float, *, inwards: bool) -> Any:
+    def put(rig: Rig, draw: Draw) -> None:
+        """A box that glows: around everything, or a lamp inside out."""
+        bpy.ops.mesh.primitive_cube_add(size=size, location=(0.0, 0.0, 0.0 if size > 1.0 else 3.5))
+        item = bpy.context.object
+        item.data.materials.append(rig.box.data.materials[0].copy())
+        principled(item).inputs["Emission Strength"].default_value = float(draw.uniform(0.2, 1.0)) / min(size, 1.0) ** 2
+        if inwards:
+            item.data.flip_normals()
+
+    return put
+
+
 def _slot_of_object(rig: Rig, draw: Draw) -> None:
     other = rig.box.data.materials[0].copy()
     rig.box.material_slots[0].link = "OBJECT"
@@ -289,6 +302,7 @@ def _background_set(rig: Rig, _: Draw) -> None:
 def _all() -> Iterator[Setting]:
     exported = {
         "sheared": _sheared, "scaled scene": _scaled_scene, "stretched lamp": _stretched_lamp,
+        "glowing room": _glowing_mesh(40.0, inwards=False), "lamp inside out": _glowing_mesh(0.5, inwards=True),
         "mirrored lamp": _mirrored_lamp, "slot of object": _slot_of_object, "two materials": _two_materials,
         "render border": _border, "vertical sensor": _vertical_sensor,
         "clipped": _clipped, "particles": _particles, "on faces": _on_faces,
