@@ -45,8 +45,11 @@ class Check:
             header.label(text="What Was Checked")
             for finding in folded if body else ():
                 _draw_finding(body, context, finding)
-        text = "Check Everything Again" if preflight.is_thorough else "Check Everything"
-        layout.operator("mfo.check", text=text, icon="VIEWZOOM")
+        layout.operator(
+            "mfo.check",
+            text="Check Everything Again" if preflight.is_thorough else "Check Everything",
+            icon="VIEWZOOM",
+        )
 
 
 def _draw_finding(layout: bpy.types.UILayout, context: bpy.types.Context, finding: Finding) -> None:

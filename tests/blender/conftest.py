@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 ADDON_ID = "bl_ext.user_default.material_fit_mfo"
 PROGRAMS = [p for p in os.environ.get("MFO_BLENDER", "").split(os.pathsep) if p]
+PATIENCE = 400.0  # seconds; a walk through windows takes 60 on two quiet cores
 WINDOWED = [p for p in os.environ.get("MFO_BLENDER_WINDOWS", "").split(os.pathsep) if p]
 
 
@@ -35,16 +37,22 @@ class RealBlender:
     ) -> subprocess.CompletedProcess[str]:
         """Start it and wait: in background unless with `windows`; `factory`: not with the profile's preferences."""
         environment = os.environ | {"BLENDER_USER_RESOURCES": str(self.profile)} | variables
-        done = subprocess.run(
-            [
-                self.program,
-                *([] if windows else ["--background"]),
-                *(["--factory-startup"] if factory and not online else []),  # what it keeps goes into the profile
-                "--online-mode" if online else "--offline-mode",
-                *arguments,
-            ],
-            capture_output=True, text=True, env=environment, timeout=250, check=False,
-        )  # fmt: skip
+        command = [
+            self.program,
+            *([] if windows else ["--background"]),
+            *(["--factory-startup"] if factory and not online else []),  # what it keeps goes into the profile
+            "--online-mode" if online else "--offline-mode",
+            *arguments,
+        ]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment, start_new_session=True
+        )
+        try:
+            stdout, stderr = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)  # the program may be a script that started Blender and a screen
+            raise
+        done = subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
         if check:
             assert done.returncode == 0, f"{done.stdout[-4000:]}\n{done.stderr[-4000:]}"
         return done

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
@@ -33,6 +34,19 @@ def test_backend_set_up_in_windows(windowed: RealBlender, tmp_path: Path, monkey
     assert "ALL GOOD" in out, out[-4000:]
     assert "script error" not in out, out[-4000:]
     print(next(line for line in out.splitlines() if "ALL GOOD" in line))
+
+
+def test_whole_way_by_real_events(windowed: RealBlender, tmp_path: Path) -> None:
+    """From the zip to the question at the end, in a Blender that never had the extension, by events of an X server."""
+    fresh = dataclasses.replace(windowed, profile=tmp_path / "profile")
+    fresh.profile.mkdir()
+    fake_backend.png(tmp_path / "reference.png", (180, 60, 40))
+    python = str(fake_backend.write_interpreter(tmp_path / "backend_python"))
+    arguments = [ADDON_ID, str(tmp_path), "1", "220", str(windowed.package)]
+    script = ["--python-exit-code", "3", "--python", str(SCRIPT.with_name("by_hand.py")), "--", *arguments]
+    out = fresh.run(*script, windows=True, MFO_BACKEND_PYTHON=python).stdout
+    assert "ALL GOOD by hand" in out, out[-4000:]
+    assert "script error" not in out, out[-4000:]
 
 
 @pytest.mark.parametrize(("scale", "width"), [(1, 220), (2, 400)])

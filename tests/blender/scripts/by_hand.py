@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walk the main way by simulated mouse and keys alone: choose the reference, check, fit, apply, undo, history, asset.
+"""Walk the main way by mouse and keys alone: choose the reference, check, fit, apply, undo, history, asset.
 
-Started with `--enable-event-simulate`. Pictures of the screen go to the folder MFO_SCREENSHOTS, where it is set.
+With `--enable-event-simulate` the events begin in Blender. Without it they come from the X server, and the walk begins
+with a Blender that has no extension yet: the zip is installed from disk, the reference dropped onto the panel, and at
+the end Blender is left. Pictures of the screen go to the folder MFO_SCREENSHOTS, where it is set.
 """
 
 import importlib
@@ -15,20 +17,35 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
+import from_disk
 import steps
-from hand import area, click, find, key, move, side_bar, typed, view, wheel, widen, window
+from hand import (
+    SCREEN_HEIGHT,
+    click,
+    drag,
+    drop,
+    find,
+    key,
+    move,
+    side_bar,
+    typed,
+    view,
+    wheel,
+    widen,
+)
 from steps import material, plain_picture, roughness, runtime
 
 addon_id, *words = sys.argv[sys.argv.index("--") + 1 :]
 folder, scale, width = Path(words[0]), float(words[1]), int(words[2])
-running_job, preflight, shown_result, waiting_backend = (
-    importlib.import_module(f"{addon_id}.blender_addon.{name}")
-    for name in ("running.running_job", "check.preflight", "result.shown_result", "process.waiting_backend")
-)
-HEIGHT = 1000  # of the screen
+package = Path(words[3]) if len(words) > 3 else None
 preferences = bpy.context.preferences
 preferences.view.show_splash = False
 preferences.view.ui_scale = scale
+
+
+def module(name):
+    """One of the add-on, which may be installed on the way."""
+    return importlib.import_module(f"{addon_id}.blender_addon.{name}")
 
 
 def press(words, label="", part=0.3):
@@ -38,15 +55,25 @@ def press(words, label="", part=0.3):
     yield from click(*place)
 
 
-def shot(name):
-    if "MFO_SCREENSHOTS" in os.environ:
-        preflight.redraw()
-        yield 1.5  # panels grow and shrink in steps
+def shot(name, *, whole=False):
+    """Of the side bar, or of the screen."""
+    if "MFO_SCREENSHOTS" not in os.environ:
+        return
+    yield 0.7
+    crop = []
+    if not whole:
         region = side_bar()
-        crop = f"{region.width}x{region.height}+{region.x}+{HEIGHT - region.y - region.height}"
-        tag = f"{bpy.app.version[0]}.{bpy.app.version[1]}_{scale:g}_{width}"
-        path = os.path.join(os.environ["MFO_SCREENSHOTS"], f"hand_{tag}_{name}.png")
-        subprocess.run(["import", "-window", "root", "-crop", crop, "+repage", path])
+        module("check.preflight").redraw()
+        yield 1.0  # panels grow and shrink in steps
+        place = f"{region.width}x{region.height}+{region.x}+{SCREEN_HEIGHT - region.y - region.height}"
+        crop = ["-crop", place, "+repage"]
+    tag = f"{bpy.app.version[0]}.{bpy.app.version[1]}_{scale:g}_{width}{'_x' if package else ''}"
+    path = os.path.join(os.environ["MFO_SCREENSHOTS"], f"hand_{tag}_{name}.png")
+    subprocess.run(["import", "-window", "root", *crop, path])
+
+
+def screen_shot(name):
+    yield from shot(name, whole=True)
 
 
 def until(condition, seconds):
@@ -59,14 +86,32 @@ def until(condition, seconds):
 def set_the_scene():
     plain_picture()
     os.environ["MFO_FAKE"] = json.dumps({"seconds": 4})
-    with bpy.context.temp_override(window=window(), area=area(), region=view()):
-        bpy.ops.screen.screen_full_area(use_hide_panels=False)
-    yield 0.8
-    area().spaces.active.show_region_ui = True
-    yield 0.5
-    side_bar().active_panel_category = "Material Fit"
+    middle = (view().x + view().width // 2, view().y + view().height // 2)
+    move(*middle)
+    yield 0.3
+    yield from key("SPACE", *middle, ctrl=True)
+    yield 1.0
+    yield from from_disk.side_bar_by_key()
     yield 0.8
     yield from widen(width)
+
+
+def choose(reference):
+    """Drop it onto the panel, or write its path."""
+    place = []
+    if package:
+        bar = side_bar()
+        yield from drop(reference, bar.x + 0.4 * bar.width, bar.y + 0.6 * bar.height)
+        yield from key("RET", bar.x, bar.y)  # Blender 5.2 asks what it is for; the mouse is on the answer
+        yield 0.5
+    yield from find("reference_path", place)
+    if not package:
+        for _ in range(2):  # a double click edits a text
+            yield from click(*place)
+        yield from typed(str(reference), *place)
+    assert bpy.context.scene.mfo.reference_path.endswith("reference.png"), bpy.context.scene.mfo.reference_path
+    yield from until(lambda: module("check.preflight").summary()[1] == "CHECKMARK", 10)
+    return place
 
 
 def draw_part(path_field):
@@ -79,13 +124,7 @@ def draw_part(path_field):
     yield 0.5
     region = view()
     corners = [(region.x + a * region.width, region.y + b * region.height) for a, b in ((0.35, 0.65), (0.5, 0.45))]
-    move(*corners[0])
-    yield 0.2
-    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(corners[0][0]), y=int(corners[0][1]))
-    for share in (0.3, 0.7, 1.0):
-        yield 0.1
-        move(*(a + share * (b - a) for a, b in zip(*corners, strict=True)))
-    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(corners[1][0]), y=int(corners[1][1]))
+    yield from drag(*corners)
     yield from until(lambda: not part.is_whole, 5)
     assert 0.0 <= part.left < part.right <= 100.0, tuple(part.crop)
     assert not bpy.context.scene.render.use_border
@@ -96,18 +135,17 @@ def draw_part(path_field):
 
 
 def story():
+    if package:
+        yield from from_disk.install(package, screen_shot)
+        yield from from_disk.installed(addon_id)
+        yield from screen_shot("i5_installed")
+        yield from from_disk.close_preferences()
     yield from set_the_scene()
-    place = []
     yield from shot("1_first_look")
-    yield from find("reference_path", place)
-    for _ in range(2):  # a double click edits a text
-        yield from click(*place)
-    yield from typed(str(folder / "reference.png"), *place)
-    assert bpy.context.scene.mfo.reference_path.endswith("reference.png"), bpy.context.scene.mfo.reference_path
-    yield from until(lambda: preflight.summary()[1] == "CHECKMARK", 5)
+    place = yield from choose(folder / "reference.png")
     yield from draw_part(place)
     yield from press("mfo.check(")
-    assert preflight.is_thorough
+    assert module("check.preflight").is_thorough
     yield from shot("2_checked")
     yield from press("mfo.fit(", "3_before_fit")
     yield from until(lambda: runtime().state == "RUNNING" and runtime().fraction > 0.1, 20)
@@ -137,6 +175,10 @@ def story():
     yield from wheel(60)
     yield from shot("9_end")
     print("ALL GOOD by hand", flush=True)
+    if package:
+        yield from from_disk.leave(screen_shot)
+        yield 10.0
+        print("script error: Blender is still there", flush=True)
 
 
 steps.take(story())

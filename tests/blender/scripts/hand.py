@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hand for walks through Blender's windows: simulated mouse and keys, and buttons found as a hand finds them.
+"""A hand for walks through Blender's windows: mouse and keys, and buttons found as a hand finds them.
 
-Blender is started with `--enable-event-simulate`. The mouse goes down the sidebar, and Blender says what lies under it.
-Everything yields the seconds to wait before its next step.
+With `--enable-event-simulate` the events begin in Blender, without it in the X server. The mouse goes down a region,
+and Blender says what lies under it. Everything yields the seconds to wait before its next step.
 """
+
+import subprocess
+import sys
+from pathlib import Path
 
 import bpy
 
-STEP = 9  # pixels between two looks of the mouse, less than half a button's height at scale 1
+STEP = 14  # pixels between two looks of the mouse, less than the height of a button at scale 1
+SCREEN_HEIGHT = 1000  # pixels
+_screen = None
+_window = None  # that the hand is over; the first where none is named
 
 
 def scale():
@@ -15,7 +22,28 @@ def scale():
 
 
 def window():
-    return bpy.context.window_manager.windows[0]
+    return _window or bpy.context.window_manager.windows[0]
+
+
+def go_to(other):
+    """Work in another window; None: the first."""
+    global _window
+    _window = other
+
+
+def real():
+    """The X server, where events come from there."""
+    global _screen
+    if _screen is None and "--enable-event-simulate" not in sys.argv:
+        from screen import Screen
+
+        _screen = Screen()
+    return _screen
+
+
+def on_screen(x, y):
+    """A place of the window, from below, on the screen, from above."""
+    return window().x + x, SCREEN_HEIGHT - window().y - y
 
 
 def area():
@@ -31,20 +59,63 @@ def view():
 
 
 def move(x, y):
-    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=int(x), y=int(y))
+    if real():
+        real().move(*on_screen(x, y))
+    else:
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=int(x), y=int(y))
+
+
+def button(x, y, *, down, kind="LEFTMOUSE"):
+    if real():
+        real().button(kind, down=down)
+    else:
+        window().event_simulate(type=kind, value="PRESS" if down else "RELEASE", x=int(x), y=int(y))
 
 
 def click(x, y):
     """Press and release; Blender needs a moment in between, as with a hand."""
     move(x, y)
     yield 0.1
-    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x), y=int(y))
+    button(x, y, down=True)
     yield 0.1
-    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x), y=int(y))
+    button(x, y, down=False)
     yield 0.3
 
 
+def drag(begin, end):
+    """With the left button from one place to another."""
+    move(*begin)
+    yield 0.2
+    button(*begin, down=True)
+    for share in (0.3, 0.7, 1.0):
+        yield 0.1
+        move(*(a + share * (b - a) for a, b in zip(begin, end, strict=True)))
+    yield 0.1
+    button(*end, down=False)
+    yield 0.3
+
+
+def drop(path, x, y):
+    """A file from another program, at a place of the window."""
+    place = [str(int(value)) for value in on_screen(x, y)]
+    program = subprocess.Popen([sys.executable, str(Path(__file__).with_name("screen.py")), str(path), *place])
+    while program.poll() is None:
+        yield 0.1
+    yield 0.5
+
+
 def key(kind, x, y, text="", **held):
+    if real():
+        names = [{"ctrl": "Control_L", "shift": "Shift_L"}[name] for name in held]
+        for name in names:
+            real().key(name, down=True)
+        for down in (True, False):
+            real().key(text or kind.lower() if len(kind) == 1 else text or kind, down=down)
+            yield 0.02
+        for name in names:
+            real().key(name, down=False)
+        yield 0.02
+        return
     window().event_simulate(type=kind, value="PRESS", x=int(x), y=int(y), unicode=text, **held)
     yield 0.05
     window().event_simulate(type=kind, value="RELEASE", x=int(x), y=int(y), **held)
@@ -58,10 +129,10 @@ def typed(text, x, y):
     yield from key("RET", x, y)
 
 
-def under_mouse():
+def under_mouse(place=None, region=None):
     """What Blender would do if the button under the mouse were pressed, as Python; empty where there is none."""
     bpy.context.window_manager.clipboard = ""
-    with bpy.context.temp_override(window=window(), area=area(), region=side_bar()):
+    with bpy.context.temp_override(window=window(), area=place or area(), region=region or side_bar()):
         for copy in (bpy.ops.ui.copy_python_command_button, bpy.ops.ui.copy_data_path_button):
             if copy.poll():
                 copy()
@@ -74,9 +145,13 @@ def wheel(turns):
     """Over the sidebar; the wheel's events are as a mouse sends them."""
     region = side_bar()
     x, y = region.x + region.width // 3, region.y + region.height // 2
+    if real():
+        move(x, y)
     for _ in range(abs(turns)):
         kind = "WHEELDOWNMOUSE" if turns > 0 else "WHEELUPMOUSE"
-        window().event_simulate(type=kind, value="PRESS", x=x, y=y)
+        button(x, y, down=True, kind=kind)
+        if real():
+            button(x, y, down=False, kind=kind)
         yield 0.03
     yield 0.4
 
@@ -88,27 +163,28 @@ def find(words, place, part=0.3, turns=12):
     """
     place.clear()
     for turn in range(turns):
-        region = side_bar()
-        x = region.x + part * (region.width - 24 * scale())
-        for y in range(int(region.y + region.height - 8 * scale()), region.y + 4, -int(STEP * scale())):
-            move(x, y)
-            yield 0.01
-            if words in under_mouse():
-                place.extend((x, y))
-                return
+        yield from look_for(words, place, area(), side_bar(), part)
+        if place:
+            return
         yield from wheel(6 if turn else -60)
     raise AssertionError(f"no button for {words}")
+
+
+def look_for(words, place, where, region, part=0.3):
+    """Move down a region of an area once; `place` stays empty where no button has these words."""
+    place.clear()
+    x = region.x + part * (region.width - 24 * scale())
+    for y in range(int(region.y + region.height - 8 * scale()), region.y + 4, -int(STEP * scale())):
+        move(x, y)
+        yield 0.03 if real() else 0.01  # the server has to send it first
+        if words in under_mouse(where, region):
+            place.extend((x, y))
+            return
 
 
 def widen(width):
     """Drag the sidebar's edge, as its width is no property."""
     region = side_bar()
     y, target = region.y + region.height // 2, region.x + region.width - width
-    move(region.x, y)
-    yield 0.2
-    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=region.x, y=y)
-    for share in (0.3, 0.6, 1.0):
-        yield 0.1
-        move(region.x + share * (target - region.x), y)
-    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(target), y=y)
-    yield 0.5
+    yield from drag((region.x, y), (target, y))
+    yield 0.3
