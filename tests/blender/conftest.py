@@ -60,7 +60,8 @@ class RealBlender:
     def script(self, path: Path, *arguments: str, windows: bool = False, **variables: str) -> str:
         """Run a Python file with the extension enabled; an exception in it is a failed test."""
         options = ["--addons", ADDON_ID, "--python-exit-code", "3", "--python", str(path), "--", *arguments]
-        return self.run(*options, windows=windows, **variables).stdout
+        done = self.run(*options, windows=windows, **variables)  # pyright: ignore[reportArgumentType]
+        return done.stdout
 
 
 @pytest.fixture(scope="session", params=PROGRAMS or [None], ids=lambda p: Path(p).name if p else "none")

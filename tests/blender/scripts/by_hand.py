@@ -17,8 +17,9 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-import from_disk
+
 import steps
+from desktop import from_disk
 from hand import (
     SCREEN_HEIGHT,
     click,

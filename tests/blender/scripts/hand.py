@@ -8,12 +8,14 @@ and Blender says what lies under it. Everything yields the seconds to wait befor
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 STEP = 14  # pixels between two looks of the mouse, less than the height of a button at scale 1
 SCREEN_HEIGHT = 1000  # pixels
-_screen = None
+_screen: Any = None
+_last = None  # height at which a button was found
 _window = None  # that the hand is over; the first where none is named
 
 
@@ -31,11 +33,11 @@ def go_to(other):
     _window = other
 
 
-def real():
+def real() -> Any:
     """The X server, where events come from there."""
     global _screen
     if _screen is None and "--enable-event-simulate" not in sys.argv:
-        from screen import Screen
+        from desktop.screen import Screen
 
         _screen = Screen()
     return _screen
@@ -98,7 +100,9 @@ def drag(begin, end):
 def drop(path, x, y):
     """A file from another program, at a place of the window."""
     place = [str(int(value)) for value in on_screen(x, y)]
-    program = subprocess.Popen([sys.executable, str(Path(__file__).with_name("screen.py")), str(path), *place])
+    program = subprocess.Popen(
+        [sys.executable, str(Path(__file__).parent / "desktop" / "screen.py"), str(path), *place]
+    )
     while program.poll() is None:
         yield 0.1
     yield 0.5
@@ -159,22 +163,25 @@ def wheel(turns):
 def find(words, place, part=0.3, turns=12):
     """Move down the sidebar until a button's command has these words; `place` gets x and y.
 
-    What is in sight is looked at first, then all of the sidebar from its top.
+    What lies below the last one is looked at first, then what is in sight, then all of the sidebar from its top.
     """
+    global _last
     place.clear()
-    for turn in range(turns):
-        yield from look_for(words, place, area(), side_bar(), part)
+    for turn in range(-1, turns):
+        yield from look_for(words, place, area(), side_bar(), part, begin=_last if turn < 0 else None)
         if place:
+            _last = place[1] + 2 * STEP * scale()
             return
-        yield from wheel(6 if turn else -60)
+        if turn >= 0:
+            yield from wheel(6 if turn else -60)
     raise AssertionError(f"no button for {words}")
 
 
-def look_for(words, place, where, region, part=0.3):
-    """Move down a region of an area once; `place` stays empty where no button has these words."""
+def look_for(words, place, where, region, part=0.3, begin=None):
+    """Move down a region of an area once, from its top or `begin`; `place` stays empty where nothing has the words."""
     place.clear()
-    x = region.x + part * (region.width - 24 * scale())
-    for y in range(int(region.y + region.height - 8 * scale()), region.y + 4, -int(STEP * scale())):
+    x, top = region.x + part * (region.width - 24 * scale()), region.y + region.height - 8 * scale()
+    for y in range(int(top if begin is None else min(top, begin)), region.y + 4, -int(STEP * scale())):
         move(x, y)
         yield 0.03 if real() else 0.01  # the server has to send it first
         if words in under_mouse(where, region):
