@@ -192,7 +192,9 @@ def predictions(
     scene: RecordedScene, known: Known, candidates: Candidates, center: Vector, seed: int
 ) -> dict[Choice, Vector]:
     """The deviations (k,) in widths of the box that values would have after each of the pictures that could be made."""
-    told = dict(_told(scene, known, candidates, center, seed))
+    all_told = _told(scene, known, candidates, center, seed)
+    # a camera that stands inside of something may see derivatives that are no numbers
+    told = {choice: each for choice, each in all_told if np.isfinite(each.rows).all()}
     own = told.pop(PRESENT, None)
     if own is None:
         return {}

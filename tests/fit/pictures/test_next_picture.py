@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from mfo_backend.fit.pictures.next_picture import Choice, _proposal
+from mfo_backend.fit.pictures import next_picture
+from mfo_backend.fit.pictures.next_picture import PRESENT, Choice, Evidence, Known, _proposal, _Told, predictions
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
 TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coat_weight", 1, 0.0, 1.0, 0.5)])
@@ -33,3 +36,18 @@ def test_where_no_deviation_falls_nothing_is_proposed():
         _proposal(Choice(turn=60.0), np.zeros(3), np.array([0.015, 0.2]), np.array([0.019, 0.3]), TABLE.names, TABLE)
         is None
     )
+
+
+def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over(monkeypatch):
+    """From inside of a mesh some are not; the result of the fit was lost by it."""
+    random = np.random.default_rng(0)
+    rows = [random.normal(size=(40, 3, 3)) for _ in range(4)]
+    rows[2][5, 1, 2] = np.inf
+    choices = (PRESENT, Choice(turn=60.0), Choice(turn=90.0))
+    told = [(choice, _Told(each, None, np.empty(0))) for choice, each in zip(choices, rows[1:], strict=True)]
+    monkeypatch.setattr(next_picture, "_told", lambda *given: iter(told))
+    known = Known(np.full(2, 0.5), np.eye(2), {}, np.full(2, 0.5), Evidence(rows[0], None, 0.002, 1))
+    scene = SimpleNamespace(renderer=SimpleNamespace(table=TABLE))
+    found = predictions(scene, known, SimpleNamespace(), np.zeros(3), 0)
+    assert Choice(turn=60.0) not in found
+    assert np.isfinite(found[Choice(turn=90.0)]).all()
