@@ -32,6 +32,8 @@ def head_scene(light: str, size: int) -> Any:
         scene.collection.objects.link(item)
     else:
         scene.world = bpy.data.worlds.new("World")
+        if scene.world.node_tree is None:
+            scene.world.use_nodes = True
         tree = scene.world.node_tree
         picture = tree.nodes.new("ShaderNodeTexEnvironment")
         folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
@@ -44,5 +46,7 @@ def head_scene(light: str, size: int) -> Any:
     modifier.levels = modifier.render_levels = 2
     bpy.ops.object.shade_smooth()
     material = bpy.data.materials.new("Head")
+    if material.node_tree is None:  # before Blender 5
+        material.use_nodes = True
     target.data.materials.append(material)
     return target, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

@@ -53,7 +53,18 @@ class BumpedNormals:
 
 def about(normal: Any, direction: Any) -> Any:
     """`direction` in some frame whose third axis is `normal`: isotropic lobes ask for no more."""
-    vector = dr.kind_of(direction)
+    x, y = _axes(normal)
+    return dr.kind_of(direction)(dr.dot(direction, x), dr.dot(direction, y), dr.dot(direction, normal))
+
+
+def out_of(normal: Any, direction: Any) -> Any:
+    """The inverse of `about`."""
+    x, y = _axes(normal)
+    return direction.x * x + direction.y * y + direction.z * normal
+
+
+def _axes(normal: Any) -> tuple[Any, Any]:
+    vector = dr.kind_of(normal)
     # the first axis of the layers' frame, made perpendicular
     x = dr.normalize(vector(1 - normal.x * normal.x, -normal.x * normal.y, -normal.x * normal.z))
     y = vector(
@@ -61,7 +72,7 @@ def about(normal: Any, direction: Any) -> Any:
         normal.z * x.x - normal.x * x.z,
         normal.x * x.y - normal.y * x.x,
     )
-    return vector(dr.dot(direction, x), dr.dot(direction, y), dr.dot(direction, normal))
+    return x, y
 
 
 def valid_normal(geometric: Any, view: Any, normal: Any) -> Any:

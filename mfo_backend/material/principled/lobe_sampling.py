@@ -16,6 +16,7 @@ from ..arrays.clamp import mean
 from ..lobes.fresnel import dielectric
 from ..lobes.microfacet import sample_visible, visible_pdf
 from .blender_principled import refraction_normal
+from .bumped_normals import about, out_of
 from .layers import Layers
 
 NAMES = ("transparent", "sheen", "coat", "base", "glass", "diffuse", "translucent")
@@ -80,8 +81,10 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = F
     density: Any = 0
     if choice["base"] is not None:
         density += choice["base"] * visible_pdf(wi, h, layers.ax, layers.ay) / (4 * c)
-    if choice["coat"] is not None:
+    if choice["coat"] is not None and layers.normals is None:
         density += choice["coat"] * visible_pdf(wi, h, layers.coat_alpha, layers.coat_alpha) / (4 * c)
+    elif choice["coat"] is not None:
+        density += choice["coat"] * _coat_pdf(layers, layers.normals.coat, wo)
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
         density += choice["glass"] * visible_pdf(wi, h, alpha, alpha) / (4 * c) * reflect_probability(layers, c)
@@ -99,6 +102,14 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = F
     if choice["translucent"] is not None:
         density += dr.select(wi.z > 0, choice["translucent"] * dr.maximum(-wo.z, 0) / dr.pi, 0)
     return dr.detach(density)
+
+
+def _coat_pdf(layers: Layers, normal: Any, wo: Any) -> Any:
+    """Density of the lobe of a coat with a normal of its own."""
+    wi, wo = about(normal, layers.wi), about(normal, wo)
+    h = dr.normalize(wi + wo)
+    density = visible_pdf(wi, h, layers.coat_alpha, layers.coat_alpha) / (4 * dr.maximum(dr.dot(wi, h), 1e-7))
+    return dr.select((wi.z > 0) & (wo.z > 0), density, 0)
 
 
 def reflect_probability(layers: Layers, c: Any) -> Any:
@@ -137,6 +148,11 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
         for name in ("base", "coat"):
             if name in chosen:
                 wo = dr.select(chosen[name], reflected, wo)
+        if "coat" in chosen and layers.normals is not None:
+            normal, view = layers.normals.coat, about(layers.normals.coat, wi)
+            h_coat = sample_visible(view, layers.coat_alpha, layers.coat_alpha, u2)
+            mirrored = out_of(normal, h_coat * (2 * dr.dot(view, h_coat)) - view)
+            wo = dr.select(chosen["coat"], mirrored, wo)
         if "glass" in chosen:
             through, refracts = _through_glass(layers, h, reused)
             wo = dr.select(chosen["glass"], dr.select(refracts, through, reflected), wo)

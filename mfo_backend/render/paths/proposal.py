@@ -7,11 +7,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
+
+COAT_SHARE = 0.2  # of the samples, about the normal of a coat
+LEAST_COAT, ROUGH_COAT = 0.03, 0.1  # roughness: as of a fit, and where nodes give it
 
 
 @dataclass(frozen=True)
@@ -20,11 +23,14 @@ class DefensiveProposal:
 
     The default covers every opaque material a fit may try. Near a known material `around` narrows it, but keeps the
     cosine part and two wide lobes, so that no weight can explode. All proposals have equally many lobes, and their
-    numbers are data, so that every one of them uses the same kernels.
+    numbers are data, so that every one of them uses the same kernels. A coat with a normal of its own, of a
+    `coat_roughness`, has a lobe besides, about what callers give as `coat`: other lobes hardly ever meet its mirrored
+    view, and the mean of a few recordings was 0.8 % too dark.
     """
 
     roughness: tuple[float, float, float, float] = (0.1, 0.25, 0.5, 1.0)
     share: tuple[float, float, float, float] = (0.25, 0.25, 0.2, 0.0)
+    coat_roughness: float | None = None
 
     @property
     def cosine_share(self) -> float:
@@ -37,6 +43,10 @@ class DefensiveProposal:
         narrow = min(max(roughness, 0.03), 1.0)
         return DefensiveProposal((narrow, min(2.0 * narrow, 1.0), 0.1, 0.5), (0.45, 0.15, 0.05, 0.1))
 
+    def with_coat(self, roughness: object) -> DefensiveProposal:
+        """The same with a lobe for a coat of this roughness, a number unless nodes give it."""
+        return replace(self, coat_roughness=roughness if isinstance(roughness, float) else ROUGH_COAT)
+
     @cached_property
     def _lobes(self) -> tuple[mi.Float, list[tuple[mi.Float, mi.Float]]]:
         """The share of the cosine lobe, then alpha and share of each lobe."""
@@ -45,8 +55,20 @@ class DefensiveProposal:
             (dr.opaque(mi.Float, alpha), dr.opaque(mi.Float, share)) for alpha, share in alpha_and_share
         ]
 
-    def sample(self, wi: mi.Vector3f, lobe: mi.Float, u: mi.Point2f) -> mi.Vector3f:
+    @property
+    def _of_coat(self) -> mi.MicrofacetDistribution:
+        assert self.coat_roughness is not None
+        alpha = dr.opaque(mi.Float, max(self.coat_roughness, LEAST_COAT) ** 2)
+        return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, True)
+
+    def sample(self, wi: mi.Vector3f, lobe: mi.Float, u: mi.Point2f, coat: mi.Vector3f | None = None) -> mi.Vector3f:
         """A direction in the shading frame for the random numbers `lobe` and `u` in [0, 1)."""
+        if coat is not None:
+            frame = mi.Frame3f(coat)
+            local = frame.to_local(wi)
+            mirrored = mi.reflect(local, self._of_coat.sample(local, u)[0])
+            others = self.sample(wi, (lobe - COAT_SHARE) / (1.0 - COAT_SHARE), u)
+            return dr.select(lobe < COAT_SHARE, frame.to_world(mirrored), others)
         wo = mi.warp.square_to_cosine_hemisphere(u)
         cosine, lobes = self._lobes
         used = mi.Float(cosine)
@@ -58,8 +80,15 @@ class DefensiveProposal:
         normal, _ = distribution.sample(wi, u)
         return dr.select(lobe < cosine, wo, mi.reflect(wi, normal))
 
-    def density(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
+    def density(self, wi: mi.Vector3f, wo: mi.Vector3f, coat: mi.Vector3f | None = None) -> mi.Float:
         """Probability per solid angle of `sample`; 0 below the surface."""
+        if coat is not None:
+            frame = mi.Frame3f(coat)
+            from_coat, to_coat = frame.to_local(wi), frame.to_local(wo)
+            middle = dr.normalize(from_coat + to_coat)
+            own = self._of_coat.pdf(from_coat, middle) / (4.0 * dr.dot(to_coat, middle))
+            own = dr.select((from_coat.z > 0.0) & (to_coat.z > 0.0) & (wo.z > 0.0), own, 0.0)
+            return COAT_SHARE * own + (1.0 - COAT_SHARE) * self.density(wi, wo)
         half = dr.normalize(wi + wo)
         cosine, lobes = self._lobes
         result = cosine * mi.warp.square_to_cosine_hemisphere_pdf(wo)

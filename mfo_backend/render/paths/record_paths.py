@@ -79,6 +79,7 @@ class _Hits:
     """First hits of the camera rays on the target, and the number of `pixels`.
 
     Of a mix there is the `plugin`, and `own` are the hits in the frame of the mesh, which its held materials take.
+    `coat` is the normal that a coat has of its own.
     """
 
     si: Any
@@ -88,13 +89,14 @@ class _Hits:
     pixels: int
     plugin: Any = None
     own: Any = None
+    coat: Any = None
 
     def of_rays(self, ray: mi.UInt32) -> _Hits:
         """Those of some rays, which may repeat."""
         si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
-        own = None if self.own is None else dr.gather(type(self.own), self.own, ray)
+        own, coat = (None if a is None else dr.gather(type(a), a, ray) for a in (self.own, self.coat))
         held = tuple(dr.gather(type(a), a, ray) for a in self.held)
-        return _Hits(si, position, share, held, self.pixels, self.plugin, own)
+        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat)
 
 
 def record_paths(
@@ -143,14 +145,15 @@ def record_paths(
                 values["subpixel"] = settings.surface.row_of(si.p)
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
+        coat = _coat_normal(shape, settings, si)
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
-        dr.eval(si if sampled or settings.mixed else (), own, position, filter_weight, held)
+        dr.eval(si if sampled or settings.mixed else (), own, coat, position, filter_weight, held)
         pixels = len(rays.pixel)
-        hits = _Hits(si, position, filter_weight, held, pixels, shape.bsdf() if settings.mixed else None, own)
+        hits = _Hits(si, position, filter_weight, held, pixels, shape.bsdf() if settings.mixed else None, own, coat)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
@@ -233,6 +236,14 @@ def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction
     return si
 
 
+def _coat_normal(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.Vector3f | None:
+    """The normal that the coat of a bumped material has of its own, in the frame of its microfacets."""
+    if settings.proposal.coat_roughness is None:
+        return None
+    plugin: Any = shape.bsdf()
+    return plugin.bumped_frame(si, mi.Bool(True))[2]["coat_normal"]
+
+
 def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[TechniqueLanes]:
     """One exact sample for each light of no extent."""
     si = hits.si
@@ -288,14 +299,14 @@ def _sampled_lights(
         value *= passed.through
         lit &= dr.max(value) > 0.0
         light_density = ds.pdf * choice
-        mis = light_density / (light_density + proposal.density(si.wi, wo))
+        mis = light_density / (light_density + proposal.density(si.wi, wo, hits.coat))
         # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it
         mis = dr.select(passed.alpha, 1.0, mis)
         started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
 
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
-    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u))
-    density = proposal.density(si.wi, wo)
+    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat)
+    density = proposal.density(si.wi, wo, hits.coat)
     valid = front & (wo.z > 0.0) & (density > 0.0)
     ray = si.spawn_ray(si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
@@ -341,7 +352,7 @@ def _over_others(
     sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
     ray = si.spawn_ray(si.to_world(wo))
     radiance = traced_radiance(scene, sampler, ray, settings.light_paths, settings.depth - 1, before=before, met=met)
-    return radiance / settings.proposal.density(si.wi, wo)
+    return radiance / settings.proposal.density(si.wi, wo, hits.coat)
 
 
 def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], TechniqueLanes]:

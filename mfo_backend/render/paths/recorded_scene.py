@@ -154,10 +154,6 @@ class RecordedScene:
         """
         needs = needs or self.needs
         self.renderer.show(vector)
-        proposal = DefensiveProposal()
-        width = self._width(vector)
-        if near and width is not None:
-            proposal = DefensiveProposal.around(width)
         hide = bool(getattr(self._integrator, "hide_emitters", False))
         samples = samples if needs.sampled else 1
         lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if needs.sampled else 1)
@@ -165,21 +161,20 @@ class RecordedScene:
             grid = np.where(self._near_target, grid, 0)  # other rays cannot meet the target and are only memory
         stride = max(1, math.ceil(math.sqrt(lanes / (self._part * MOST_LANES))), int(math.sqrt(lanes / enough)))
         stride, pixels = self._affordable(grid, stride, samples, sampled=needs.sampled)
-        two_sided, held, light_paths = self.model.two_sided, self._held, self.renderer.light_paths
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
         settings = RecordSettings(
             grid=grid,
             seed=seed,
             depth=needs.depth,
-            proposal=proposal,
+            proposal=self._proposal(vector, near=near),
             hide_emitters=hide,
             stride=stride,
-            two_sided=two_sided,
-            held=held,
+            two_sided=self.model.two_sided,
+            held=self._held,
             bumped=self._bumped,
             surface=None if self._varying is None else self._varying.surface(vector),
             mixed=self._mixed,
-            light_paths=light_paths,
+            light_paths=self.renderer.light_paths,
             pixels=pixels,
             highlights=highlights,
             samples=samples,
@@ -207,12 +202,11 @@ class RecordedScene:
             If no pixel sees the target.
         """
         self.renderer.show(vector)
-        width = self._width(vector)
         settings = RecordSettings(
             grid=grid,
             seed=seed,
             depth=self.needs.depth,
-            proposal=DefensiveProposal() if width is None else DefensiveProposal.around(width),
+            proposal=self._proposal(vector, near=True),
             hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
             two_sided=self.model.two_sided,
             held=self._held,
@@ -345,6 +339,13 @@ class RecordedScene:
     def _share(self, groups: LaneGroups) -> float:
         """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""
         return len(groups.pixels) / max(self._covered, 1)
+
+    def _proposal(self, vector: NDArray[np.float64], *, near: bool) -> DefensiveProposal:
+        """The density of directions for the material `vector`, or for any; a coat's lobe is sharp wherever it is."""
+        width = self._width(vector) if near else None
+        proposal = DefensiveProposal() if width is None else DefensiveProposal.around(width)
+        is_turned = self._bumped and "coat_normal" in self.renderer.shape.bsdf().directions
+        return proposal.with_coat(self._value(vector, "coat_roughness")) if is_turned else proposal
 
     def _width(self, vector: NDArray[np.float64]) -> float | None:
         """The narrowest of the main lobes' widths; None where textures give all of them."""

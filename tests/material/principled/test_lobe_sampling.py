@@ -138,3 +138,21 @@ def test_a_diffuse_lobe_that_is_likely_or_alone_stays_as_it_is() -> None:
         assert {k: float(p[0]) for k, p in floored.probability.items()} == pytest.approx(
             {k: float(p[0]) for k, p in own.probability.items()}
         )
+
+
+def test_a_coat_is_drawn_about_its_own_normal() -> None:
+    """A sharp coat tilted by 20 degrees over black: each weight is near the albedo, whichever direction is drawn."""
+    up, tilted = mi.Vector3f(0.0, 0.0, 1.0), mi.Vector3f(*unit(20, 70))
+    parameters: dict[str, Any] = {
+        "base_color": mi.Color3f(0.0), "specular_ior_level": mi.Float(0.0), "coat_weight": mi.Float(1.0),
+        "coat_roughness": mi.Float(0.05), "smooth_normal": up, "bumped_normal": up, "coat_normal": tilted,
+    }  # fmt: skip
+    layers, choice = stack(parameters, unit(30, 100))
+    drawn, valid = draw(layers, choice)
+    density = pdf(layers, choice, drawn)
+    weights = np.array(dr.select(valid & (density > 0), evaluate(layers, drawn) / density, 0))[0]
+    directions, solid_angle = grid(1200, 2400)
+    integral = float((np.array(evaluate(layers, directions))[0] * solid_angle).sum())
+    assert integral > 0.03
+    assert weights.mean() == pytest.approx(integral, rel=0.02)
+    assert weights.std() < 0.5 * integral

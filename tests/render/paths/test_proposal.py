@@ -38,3 +38,18 @@ def test_no_weight_explodes():
     for proposal in PROPOSALS.values():
         density = np.array(proposal.density(mi.Vector3f(0.0, 0.0, 1.0), wo))
         assert (cosines / density).max() < np.pi / proposal.cosine_share * 1.001
+
+
+def test_a_coat_with_a_normal_of_its_own_has_a_lobe_there():
+    proposal, coat = DefensiveProposal.around(0.5).with_coat(0.05), mi.Vector3f(0.3, 0.0, 0.954)
+    n = 400_000
+    wi = mi.Vector3f(0.0, 0.6, 0.8)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(1, n)
+    wo = proposal.sample(wi, sampler.next_1d(), sampler.next_2d(), coat)
+    density = np.array(proposal.density(wi, wo, coat))
+    valid = (np.array(wo.z) > 0) & (density > 0)
+    ratio = np.where(valid, 1.0 / np.maximum(density, 1e-9), 0.0)
+    assert np.mean(ratio * np.array(wo.z)) == pytest.approx(np.pi, rel=0.015)
+    mirrored = mi.reflect(wi, coat)
+    assert proposal.density(wi, mirrored, coat)[0] > 100.0 * proposal.density(wi, mirrored)[0]
