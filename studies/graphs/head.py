@@ -34,7 +34,7 @@ def head_scene(light: str, size: int) -> Any:
         scene.world = bpy.data.worlds.new("World")
         if scene.world.node_tree is None:
             scene.world.use_nodes = True
-        tree = scene.world.node_tree
+        tree: Any = scene.world.node_tree
         picture = tree.nodes.new("ShaderNodeTexEnvironment")
         folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
         picture.image = bpy.data.images.load(str(folder / "courtyard.exr"))
@@ -45,8 +45,9 @@ def head_scene(light: str, size: int) -> Any:
     modifier = target.modifiers.new("Smooth", "SUBSURF")
     modifier.levels = modifier.render_levels = 2
     bpy.ops.object.shade_smooth()
-    material = bpy.data.materials.new("Head")
+    material: Any = bpy.data.materials.new("Head")
     if material.node_tree is None:  # before Blender 5
         material.use_nodes = True
     target.data.materials.append(material)
-    return target, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    nodes: Any = material.node_tree.nodes  # pyright: ignore[reportOptionalMemberAccess]
+    return target, next(node for node in nodes if node.type == "BSDF_PRINCIPLED")

@@ -36,7 +36,7 @@ def grid(rows: int = 300, columns: int = 600) -> tuple[mi.Vector3f, np.ndarray]:
 
 
 def draw(layers: Layers, choice: LobeChoice) -> tuple[mi.Vector3f, mi.Bool]:
-    rng = mi.PCG32(COUNT, initstate=7)
+    rng: Any = mi.PCG32(COUNT, initstate=7)  # pyright: ignore
     numbers = [mi.Float(rng.next_float32()) for _ in range(3)]
     direction, _, valid = sample(layers, choice, numbers[0], mi.Point2f(numbers[1], numbers[2]))
     return direction, valid

@@ -51,5 +51,5 @@ def test_a_coat_with_a_normal_of_its_own_has_a_lobe_there():
     valid = (np.array(wo.z) > 0) & (density > 0)
     ratio = np.where(valid, 1.0 / np.maximum(density, 1e-9), 0.0)
     assert np.mean(ratio * np.array(wo.z)) == pytest.approx(np.pi, rel=0.015)
-    mirrored = mi.reflect(wi, coat)
+    mirrored = 2.0 * dr.dot(wi, coat) * coat - wi
     assert proposal.density(wi, mirrored, coat)[0] > 100.0 * proposal.density(wi, mirrored)[0]
