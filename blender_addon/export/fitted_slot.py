@@ -10,7 +10,7 @@ import bpy
 
 from .findings import ExportError
 
-MOST_TARGETS = 32  # as the backend's `job.folder.request`
+MOST_TARGETS = 64  # as the backend's `job.folder.request`
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ def scene_with_light(scene: bpy.types.Scene, proposed: NextPicture) -> bpy.types
     """A scene of the same objects under the proposed light; the scene itself stays as it is."""
     light = scene.objects[proposed.light]
     other = scene.copy()
+    other.use_extra_user = True  # as every scene of Blender's own has: without it no file would keep it
     other.mfo.pictures.clear()
     replaced: dict[bpy.types.Object, bpy.types.Object | None]
     if proposed.light_turn:

@@ -95,6 +95,7 @@ def _other_light(scene: bpy.types.Scene) -> None:
     lamp = scene.objects["Lamp"]
     for degrees in LAMP_TURNS:
         other = scene.copy()
+        other.use_extra_user = True  # else no file keeps it
         other.name = f"L{degrees:03d}"
         if not degrees:
             other.world = None

@@ -175,6 +175,7 @@ def test_proposed_light_is_a_scene_of_its_own(scene: SimpleNamespace, turn: floa
     set_up(scene, turn=0.0, light="Key", light_turn=turn)
     entry = own.mfo.pictures[0]
     assert (entry.camera, bpy.context.scene) == (own.camera, own)
+    assert entry.scene.use_extra_user  # a file keeps it when the picture is taken off the list
     assert set(own.objects) == before
     there = {each.name for each in entry.scene.objects if each.type == "LIGHT"}
     others = {each.name for each in before if each.type == "LIGHT"} - {"Key"}
