@@ -72,7 +72,8 @@ class Judgement:
     """The verdict on a result, its likely cause where it can be told, and the differences it rests on.
 
     `around` is the difference outside of the target; None where there is nothing to compare. `picture` says which
-    of several pictures has decided.
+    of several pictures has decided. `may_hide` says that on so few pixels of so much noise a difference as fine as
+    noise would not have been found.
     """
 
     verdict: Verdict
@@ -80,12 +81,14 @@ class Judgement:
     target: Difference
     around: Difference | None = None
     picture: str | None = None
+    may_hide: bool = False
 
     @property
     def sentence(self) -> str:
         """Verdict and cause for a user."""
         verdict = self.verdict.sentence if self.picture is None else f"Picture {self.picture}: {self.verdict.sentence}"
-        return verdict if self.cause is None else f"{verdict} {self.cause.sentence}"
+        further = self.cause.sentence if self.cause is not None else MAY_HIDE if self.may_hide else ""
+        return f"{verdict} {further}".rstrip()
 
 
 def worst(judgements: Iterable[Judgement | None]) -> Judgement | None:
@@ -95,6 +98,7 @@ def worst(judgements: Iterable[Judgement | None]) -> Judgement | None:
     return max(judged, key=lambda found: (order.index(found.verdict), found.target.visible), default=None)
 
 
+MAY_HIDE = "So few pixels of so much noise may hide a fine difference: a larger or cleaner picture tells more."
 _SENTENCES = {
     Verdict.SAME: "The result looks the same as the reference.",
     Verdict.CLOSE: "The result is close to the reference: compare before applying.",

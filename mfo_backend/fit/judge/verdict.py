@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from ...metrics.display.colour import linear_from_srgb, srgb_from_linear
 from ...metrics.display.tone_mapping import DisplayView, View
 from ...metrics.flip.block_means import block_side, block_sums
+from ...metrics.flip.ldr_flip import flip_map
 from ...render.camera.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
 from ...types.result import PictureResult
 from ...types.verdict import Difference, Judgement, Verdict, worst
-from .beyond_noise import NEXT, beyond_noise
+from .beyond_noise import FEW_PIXELS, NEXT, beyond_noise
 from .likely_cause import likely_cause
 
 # Measured on Cycles scenes by `studies.verdicts` (docs/user/verdicts.md): with nothing planted at most 0.019, 0.005 and
@@ -30,6 +31,8 @@ AROUND_BLOCKS = 32  # along the longer side: the surroundings are rendered with 
 BESIDE = 3  # pixels next to the target that are not its surroundings
 PLAIN = 0.004  # deviation of display values: so even a background was cut out, not rendered
 BRIGHTEST = 4.0  # times a display's white: fireflies count as if they were so bright
+# FLIP of a difference that a verdict should not miss: a result that far above the noise is to be called so
+HIDDEN = 0.05
 WORSE = 0.01  # FLIP more than that of the start from which on a result is worse
 
 Mask = NDArray[np.bool_]
@@ -61,7 +64,8 @@ def judge(
     if verdict is Verdict.SAME and differs:
         verdict = Verdict.CLOSE
     if verdict is Verdict.SAME:
-        return Judgement(verdict, None, difference, around)
+        few = np.count_nonzero(inside) < FEW_PIXELS
+        return Judgement(verdict, None, difference, around, may_hide=few and _mean_flip(*target, inside) > HIDDEN)
     first, second = (_display(light) for light in surroundings)
     shown, result_shown = (_display(light) for light in target)
     cause = likely_cause(shown, result_shown, inside, (first, second, outside) if differs else None, noted=noted)
@@ -72,7 +76,8 @@ def worst_judgement(pictures: tuple[PictureResult, ...]) -> Judgement | None:
     """The verdict on all pictures: the worst one, with the name of its picture; None where there is none."""
     found = worst(picture.judgement for picture in pictures)
     if found is None or found.verdict is Verdict.SAME:
-        return found
+        hiding = any(p.judgement is not None and p.judgement.may_hide for p in pictures)
+        return found if found is None else replace(found, may_hide=hiding)
     return replace(found, picture=next(picture.label for picture in pictures if picture.judgement is found))
 
 
@@ -84,6 +89,11 @@ def is_worse(reference: Image, start: Pixels, result: Pixels, mask: Mask, view: 
         beyond_noise(*_light_means(reference, picture, view, mask, side), inside) for picture in (start, result)
     )
     return before is not None and after is not None and after.visible > before.visible + WORSE
+
+
+def _mean_flip(first: NDArray[np.float64], second: NDArray[np.float64], mask: Mask) -> float:
+    """FLIP pixel by pixel, noise included: no difference of the pictures is larger."""
+    return float(flip_map(_display(first), _display(second))[mask].mean(dtype=np.float64))
 
 
 def _verdict(difference: Difference) -> Verdict:

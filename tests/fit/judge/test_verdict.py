@@ -96,6 +96,17 @@ def test_few_pixels_hide_no_difference_in_the_tails_of_noise(radius):
     assert 0.4 * apart < np.mean(visible[0.55]) < apart
 
 
+@pytest.mark.parametrize(("radius", "share", "hides"), [(9, 0.15, True), (9, 0.01, False), (26, 0.15, False)])
+def test_few_noisy_pixels_are_said_to_hide_fine_differences(radius, share, hides):
+    mask = np.hypot(ROWS - 48, COLUMNS - 48) < radius
+    reference, result = noisy(scene(), share, 1), noisy(scene(), share / 2.0, 2)
+    found = judge(Image(reference, Encoding.LINEAR), result, mask, VIEW)
+    assert found is not None
+    assert found.verdict is Verdict.SAME
+    assert found.may_hide is hides
+    assert found.sentence.endswith("a larger or cleaner picture tells more.") is hides
+
+
 def test_few_pixels_have_no_verdict():
     mask = np.zeros_like(MASK)
     mask[10:14, 10:14] = True
