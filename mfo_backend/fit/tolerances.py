@@ -82,8 +82,8 @@ OFF = 0.002
 # ---- several pictures
 
 # Mean square of all pictures' residuals over that of the others where one is left out: from it on this one does not go
-# with them. Five scenes of Cycles with a moved lamp and fifteen fits without are on the right sides of it
-# (docs/notebook/several_pictures.md), which does not calibrate it. Larger: a wrong picture is averaged in silence.
+# with them. Seven scenes of Cycles with a moved lamp and 21 fits without are on the right sides of it
+# (docs/notebook/several_pictures.md); how near to it was not read. Larger: a wrong picture is averaged in silence.
 AGAINST_REST = 2.0
 # Of two pictures whose ratios differ by less both are named. Larger: the right one is accused, too. No measurement.
 TOLD_APART = 2.0
