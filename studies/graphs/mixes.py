@@ -93,7 +93,7 @@ MIXES: dict[str, tuple[Build, tuple[str, ...]]] = {
     ),
     "worn": (
         _mix(_noise, _colored(_PLASTIC, "TexVoronoi", "ValToRGB"), _METAL),
-        ("Color Ramp/Position 0", "Color Ramp.001/Stop 0", "Color Ramp.001/Stop 1", "Principled BSDF/Roughness",
+        ("Color Ramp/Stop 0", "Color Ramp.001/Stop 0", "Color Ramp.001/Stop 1", "Principled BSDF/Roughness",
          "Principled BSDF.001/Roughness"),
     ),
     "faded": (
