@@ -54,6 +54,7 @@ def _glowing_mesh(size: float, *, inwards: bool) -> Any:
         bpy.ops.mesh.primitive_cube_add(size=size, location=(0.0, 0.0, 0.0 if size > 1.0 else 3.5))
         item = bpy.context.object
         item.data.materials.append(rig.box.data.materials[0].copy())
+        principled(item).inputs["Alpha"].default_value = 1.0  # a note says that Alpha does not dim a glow
         principled(item).inputs["Emission Strength"].default_value = float(draw.uniform(0.2, 1.0)) / min(size, 1.0) ** 2
         if inwards:
             item.data.flip_normals()
