@@ -312,12 +312,12 @@ def _all() -> Iterator[Setting]:
         "color attribute": _color_attribute, "lamp nodes": _lamp_nodes,
         "two-sided target": _two_sided_target, "stack": _stack, "background set": _background_set, "delta": _delta,
         "mirror modifier": _modifier("MIRROR", use_axis=(False, False, True), use_bisect_axis=(False, False, True)),
-        "depth of field": _depth_of_field,
         "array modifier": _modifier("ARRAY", count=2, relative_offset_displace=(1.2, 0.3, 0.0)),
         "bevel modifier": _modifier("BEVEL", width=0.2, segments=3),
         "solidify modifier": _modifier("SOLIDIFY", thickness=0.1),
     }  # fmt: skip
     yield from (Setting(name, put) for name, put in exported.items())
+    yield Setting("depth of field", _depth_of_field, ("depth of field is left out",))
     yield Setting("custom normals", _custom_normals, ("has custom normals",))
     yield Setting("faces twice", _modifier("MIRROR", use_axis=(True, True, False)), ("twice in the same place",))
     yield Setting("bumped box", _bumped_box, ("is baked",))
