@@ -9,17 +9,7 @@ from typing import Any
 from ..fit.settings import PAPER_LOSSES
 from ..types.errors import BadInputError
 
-_OPTIONS = (
-    "preset",
-    "model",
-    "range",
-    "seed",
-    "max_iterations",
-    "spp",
-    "learning_rate",
-    "keep_optimizer_state",
-    "queue",
-)
+_OPTIONS = ("preset", "model", "range", "seed", "max_iterations", "spp", "learning_rate", "keep_optimizer_state")
 
 
 def add_fit_options(parser: argparse.ArgumentParser) -> None:

@@ -55,8 +55,7 @@ def add_parser(subparsers) -> None:  # type: ignore[no-untyped-def]  # argparse 
     parser.add_argument("--object", required=True, action="append", metavar="NAME[@KEY=VALUE]", help=TARGET_HELP)
     parser.add_argument(
         "--queue",
-        action="store_const",
-        const=True,
+        action="store_true",
         help="fit each of many materials once and quickly, in the light that the others' base colours give",
     )
     parser.add_argument("--reference", required=True, action="append", metavar="PATH[@KEY=VALUE,...]", help=HELP)
@@ -114,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise BadInputError("--make-local and --animated need --apply: without it no .blend file is written.")
     if arguments.save_as and not arguments.apply:
         raise BadInputError("--save-as needs --apply: without it no .blend file is written.")
-    options = fit_from_options(arguments)
+    options = fit_from_options(arguments) | ({"queue": True} if arguments.queue else {})
     given = picture_options(arguments.reference, arguments.leave_out)
     pictures = with_part(given, part_from_options(arguments))
     targets = [target_option(text) for text in arguments.object]

@@ -122,7 +122,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
     lobe_roughness = roughness
     if lobes.anisotropic:
         most = GLOSSY_ANISOTROPY if model.shader == "glossy" else 1.0
-        stretch = dr.sqrt(1 - 0.9 * dr.clip(p["anisotropic"], 0, most))
+        stretch = dr.sqrt(1 - 0.9 * most * saturate(p["anisotropic"] / most))
         ax, ay = dr.minimum(ax / stretch, 1), ay * stretch
         lobe_roughness = dr.sqrt(dr.sqrt(ax * ay))
     stack |= {"ax": ax, "ay": ay}

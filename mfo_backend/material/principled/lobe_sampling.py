@@ -81,12 +81,11 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = F
     density: Any = 0
     if choice["base"] is not None:
         density += choice["base"] * visible_pdf(wi, h, layers.ax, layers.ay) / (4 * c)
-    if choice["coat"] is not None:
-        normals, alpha = layers.normals, layers.coat_alpha
-        about_own = (
-            visible_pdf(wi, h, alpha, alpha) / (4 * c) if normals is None else _coat_pdf(layers, normals.coat, wo)
-        )
-        density += choice["coat"] * about_own
+    normals = layers.normals
+    if choice["coat"] is not None and normals is None:
+        density += choice["coat"] * visible_pdf(wi, h, layers.coat_alpha, layers.coat_alpha) / (4 * c)
+    elif choice["coat"] is not None and normals is not None:
+        density += choice["coat"] * _coat_pdf(layers, normals.coat, wo)
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
         density += choice["glass"] * visible_pdf(wi, h, alpha, alpha) / (4 * c) * reflect_probability(layers, c)
