@@ -62,7 +62,7 @@ def results(threads: int, folder: Path) -> dict[str, Any]:
 @pytest.mark.slow
 def test_threads_change_no_bit(tmp_path: Path) -> None:
     found = []
-    for number, threads in enumerate((1, 4, 4)):
+    for number, threads in enumerate((1, 4)):
         folder = tmp_path / str(number)
         folder.mkdir()
         words = [sys.executable, "-m", "tests.stability.test_same_bits", str(threads), str(folder)]
@@ -74,7 +74,7 @@ def test_threads_change_no_bit(tmp_path: Path) -> None:
     for name, (result, _) in found[0].items():
         assert "seconds" not in str(result)
         assert result["errors"]["flip"][0] > 0
-        assert [other[name] for other in found] == [found[0][name]] * 3
+        assert [other[name] for other in found] == [found[0][name]] * 2
 
 
 if __name__ == "__main__":

@@ -77,20 +77,15 @@ def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
     assert result.recovered["sheen_weight"] == 0.0  # the picture does not ask for it by three deviations
 
 
-@pytest.mark.parametrize("coat_roughness", [0.03, 0.3])  # the scene's, which has no coat, and another
-def test_a_coat_is_found_with_all_values_free(tmp_path, coat_roughness):
+def test_a_coat_is_found_with_all_values_free(tmp_path):
     renderer = load(tmp_path, "all", size=64)
-    truth = {**renderer.table.unpack(renderer.start), **TRUTH, "coat_weight": 0.5, "coat_roughness": coat_roughness}
+    truth = {**renderer.table.unpack(renderer.start), **TRUTH, "coat_weight": 0.5, "coat_roughness": 0.03}
     result, _ = fit(renderer, renderer.image(renderer.table.pack(truth), seed=5, spp=64))
-    # how much there is of a rough coat trades with the index in so small a picture: under three references, and with
-    # other rounding, it came out as 0.31 to 0.44
-    amount = 0.1 if coat_roughness < 0.1 else 0.2
-    for name, atol in {"base_color": 0.02, "roughness": 0.03, "ior": 0.02, "coat_weight": amount}.items():
+    for name, atol in {"base_color": 0.02, "roughness": 0.03, "ior": 0.02, "coat_weight": 0.1}.items():
         np.testing.assert_allclose(result.recovered[name], truth[name], atol=atol, err_msg=name)
     # its roughness free from the start, it came out as 1 with a roughness of 0.98; other lobes are not asked for
     assert [result.recovered[name] for name in ("metallic", "sheen_weight")] == [0.0, 0.0]
-    if coat_roughness < 0.1:
-        assert result.certainty["coat_weight"].level is not Level.NOT_VISIBLE
+    assert result.certainty["coat_weight"].level is not Level.NOT_VISIBLE
     for name, certainty in result.certainty.items():
         wrong = np.abs(np.subtract(result.recovered[name], truth[name])) > np.maximum(3 * np.array(certainty.sd), 0.02)
         assert not (certainty.level is Level.DETERMINED and wrong.any()), name
