@@ -15,7 +15,7 @@ from ..camera.camera_model import TURN, Camera
 from ..lights.light_model import irradiance_at
 from .scene_data import SceneData
 
-MOST_CAMERAS, MOST_LIGHTS = 12, 3  # as the backend's `fit.pictures.next_picture` looks at
+MOST_CAMERAS, MOST_LIGHTS = 12, 3  # the most that the backend's `fit.candidates` takes
 
 
 def candidates(scene: bpy.types.Scene, data: SceneData) -> dict[str, Any]:

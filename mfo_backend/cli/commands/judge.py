@@ -13,8 +13,8 @@ from pathlib import Path
 from ...fit.judge.region import fill_outside
 from ...job.folder.atomic_file import write_atomically
 from ...job.folder.job_folder import JobFolder
-from ...job.folder.job_view import view_of
 from ...job.folder.request import read_request
+from ...job.folder.view_request import view_of
 from ...job.run.run_job import read_reference
 from ...metrics.compare import compare_images
 from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = JobFolder.open(arguments.job)
     request = read_request(folder, trusted=True)  # the scene is not loaded
     reference, _notes = read_reference(folder, request)
-    view = view_of(folder, request, reference)
+    view = view_of(folder, request.view, request.view_table, reference)
     picture = read_image(arguments.picture)
     # at the size and over the pixels of `fit.picture_errors`; the whole picture if there is no result
     check_pair(reference.pixels, picture.pixels)

@@ -42,11 +42,12 @@ Vector = NDArray[np.float64]
 
 TURNS = tuple(range(0, 360, 30))  # degrees; the first is the present camera
 LAMP_TURNS = (90, 180, 270)  # degrees
-MOST_CAMERAS, MOST_LAMPS = 12, 3  # that are looked at: each lamp's recordings take 0.3 s of processor time
-SIDE = 80  # pixels along the longer side of a candidate, at most: some thousand see the target
-GRID = 1  # squared: camera rays of a pixel
-STRONG = 1e-3  # of the largest: information of a direction that the unit is taken from
-_SAME_PLACE = 1e-3  # of matrices of cameras, metres and sines
+SIDE = 80  # pixels along the longer side of a candidate, at most: some thousand see the target. No measurement
+GRID = 1  # squared: camera rays of a pixel. No measurement
+# Information of a direction, of the largest, from which on the unit is taken from it. Smaller: noise of few lanes sets
+# the unit. No measurement.
+STRONG = 1e-3
+_SAME_PLACE = 1e-3  # of matrices of cameras, metres and sines: far above float32, far below a turn of 30 degrees
 
 
 @dataclass(frozen=True)
@@ -125,27 +126,27 @@ class _Told:
 class Known:
     """What the present pictures tell: the solution, its covariance in widths of the box, and what that is taken from.
 
-    `user` are the scene's own values; `views` are where the pictures' cameras stand, as far as that is known; `doubts`
-    are what else it may be.
+    `wanted` are the values that a further picture is for; `views` are where the pictures' cameras stand, as far as that
+    is known; `doubts` are what else it may be.
     """
 
     x: Vector
     spread: Vector
-    certainty: Mapping[str, Certainty]
-    user: Vector
+    wanted: tuple[str, ...]
     evidence: Evidence
     views: tuple[View, ...] = ()
     doubts: tuple[Doubt, ...] = ()
 
-    def open(self, table: ParameterTable) -> tuple[str, ...]:
-        """Values that a further picture is for; none where all that is not determined is the user's own again."""
-        names = tuple(name for name, c in self.certainty.items() if c.level is not Level.DETERMINED)
-        moved = (np.abs(self.x - self.user)[table.slice_of(name)].max() > 0.0 for name in names)
-        return names if any(moved) else ()
-
     def has(self, view: View) -> bool:
         """Whether a picture has been made from there."""
         return any(np.allclose(view.to_world, there.to_world, atol=_SAME_PLACE) for there in self.views)
+
+
+def open_values(x: Vector, certainty: Mapping[str, Certainty], user: Vector, table: ParameterTable) -> tuple[str, ...]:
+    """Values that a further picture is for; none where all that is not determined is the user's own again."""
+    names = tuple(name for name, c in certainty.items() if c.level is not Level.DETERMINED)
+    moved = (np.abs(x - user)[table.slice_of(name)].max() > 0.0 for name in names)
+    return names if any(moved) else ()
 
 
 @dataclass(frozen=True)
@@ -174,10 +175,7 @@ PRESENT = Choice()
 
 def next_picture(scene: RecordedScene, known: Known, candidates: Candidates, seed: int) -> NextPicture | None:
     """The best of the scene's candidates and the present camera's turns; None where none is worth a picture."""
-    table = scene.renderer.table
-    wanted = known.open(table)
-    if not wanted or scene.varies:
-        return None
+    table, wanted = scene.renderer.table, known.wanted
     center = target_center(scene.renderer.shape)
     with scene.renderer.counter.uncounted():  # the result is known without it
         predicted = predictions(scene, known, candidates, center, seed)
@@ -226,7 +224,7 @@ def _told(
         return
     turns = {turn: View(turn_about(center, turn) @ own.to_world, own.fov) for turn in TURNS}
     views = {Choice(turn=float(turn)): view for turn, view in turns.items()}
-    for camera in candidates.cameras[:MOST_CAMERAS]:
+    for camera in candidates.cameras:
         views[Choice(camera=camera.name)] = View(np.reshape(camera.to_world, (4, 4)), camera.fov)
     views = {one: view for one, view in views.items() if one == PRESENT or not known.has(view)}
     cameras = side_by_side(list(views.values()), size)
@@ -266,7 +264,7 @@ def _other_light(
     from ...render.lamps.changed_light import alone, has_other_light, lamp_named, turned  # which need a variant
 
     whole: Any = scene.renderer.scene
-    for each in candidates.lights[:MOST_LAMPS]:
+    for each in candidates.lights:
         lamp = lamp_named(whole, each.emitter)
         if lamp is None:
             continue

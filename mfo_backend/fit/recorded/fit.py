@@ -27,7 +27,7 @@ from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from ..pictures.contradiction import contradiction
-from ..pictures.next_picture import Doubt, Evidence, Known, next_picture
+from ..pictures.next_picture import Doubt, Evidence, Known, next_picture, open_values
 from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..result.course import Course
@@ -176,6 +176,9 @@ class RecordedRoute:
         if task.settings.preset == "fast" or not self._alone or task.should_stop():
             return None
         scene = self._scene if isinstance(self._scene, RecordedScene) else self._scene.first
+        wanted = open_values(kept.x, kept.certainty, self._renderer.start, self._renderer.table)
+        if not wanted or scene.varies:
+            return None
         pictures = 1 if task.sheet is None else len(task.sheet)
         setting = end.recording.setting
         width = setting.table.upper - setting.table.lower
@@ -185,8 +188,7 @@ class RecordedRoute:
         )
         judged = Judged(setting, end.refined, setting.sampled)
         evidence = Evidence(*judged.rows(kept.x), judged.model_error, pictures)
-        user = self._renderer.start
-        known = Known(kept.x, kept.spread, kept.certainty, user, evidence, self._views(), doubts)
+        known = Known(kept.x, kept.spread, wanted, evidence, self._views(), doubts)
         return next_picture(scene, known, task.candidates, Stream.NEXT_PICTURE.seed(task.settings.seed))
 
     def _views(self) -> tuple[View, ...]:

@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...fit.candidates import Candidates, OtherCamera, SceneLight
+from ...fit.candidates import MOST_CAMERAS, MOST_LIGHTS, Candidates, OtherCamera, SceneLight
 from ...types.errors import BadInputError
 from .checked_object import CheckedObject, is_number, shown
-
-MOST_CANDIDATES = 64  # cameras, and lights; the add-on names fewer
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,14 @@ def picture_from_json(data: Any, where: str) -> Picture:
 def candidates_from_json(cameras: Any, lights: Any, where: str) -> Candidates:
     """The lists `cameras` and `lights`."""
     return Candidates(
-        tuple(_camera(each, f"{where}: cameras[{n}]") for n, each in enumerate(_listed(cameras, "cameras", where))),
-        tuple(_light(each, f"{where}: lights[{n}]") for n, each in enumerate(_listed(lights, "lights", where))),
+        tuple(
+            _camera(each, f"{where}: cameras[{n}]")
+            for n, each in enumerate(_listed(cameras, "cameras", MOST_CAMERAS, where))
+        ),
+        tuple(
+            _light(each, f"{where}: lights[{n}]")
+            for n, each in enumerate(_listed(lights, "lights", MOST_LIGHTS, where))
+        ),
     )
 
 
@@ -56,9 +60,9 @@ def candidates_to_json(candidates: Candidates) -> dict[str, Any]:
     return {name: [asdict(each) for each in found] for name, found in vars(candidates).items() if found}
 
 
-def _listed(data: Any, key: str, where: str) -> Sequence[Any]:
-    if not isinstance(data, (list, tuple)) or len(data) > MOST_CANDIDATES:
-        raise BadInputError(f"{where}: {key} is {shown(data)}: it must be a list of at most {MOST_CANDIDATES}.")
+def _listed(data: Any, key: str, most: int, where: str) -> Sequence[Any]:
+    if not isinstance(data, (list, tuple)) or len(data) > most:
+        raise BadInputError(f"{where}: {key} is {shown(data)}: it must be a list of at most {most}.")
     return data
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The objects `view` and `light_paths` of request.json: what a display picture was seen through, and indirect light."""
+"""The objects `view` and `light_paths` of request.json: what pictures are seen through, and indirect light."""
 
 from __future__ import annotations
 
@@ -7,9 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ...metrics.display.tone_mapping import DisplayView
+from ...metrics.display.baked_view import BakedView
+from ...metrics.display.tone_mapping import DisplayView, View
+from ...scene.image_file import read_image
+from ...types.errors import BadInputError
+from ...types.image import Encoding, Image
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from .checked_object import CheckedObject
+from .job_folder import JobFolder
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,32 @@ def table_from_json(data: Any, where: str) -> ViewTable | None:
         log2_min=table.number("log2_min", -64.0, 64.0),
         log2_max=table.number("log2_max", -64.0, 64.0),
     )
+
+
+def view_of(folder: JobFolder, view: DisplayView | None, table: ViewTable | None, reference: Image) -> View:
+    """A request's table or view, else Standard as it is, for a linear reference with an exposure that suits it.
+
+    Raises
+    ------
+    BadInputError
+        If the table cannot be read or is not what the request says.
+    """
+    if table is not None:
+        return _baked(folder, table)
+    if view is not None:
+        return view
+    return DisplayView() if reference.encoding is Encoding.SRGB else DisplayView.for_scene(reference.pixels)
+
+
+def _baked(folder: JobFolder, table: ViewTable) -> BakedView:
+    pixels = read_image(folder.file(table.path, what="request.json: view.lut.path")).pixels
+    size = table.size
+    if pixels.shape != (size, size * size, 3):
+        raise BadInputError(
+            f"The view's table {table.path} is {pixels.shape[1]}x{pixels.shape[0]}, but request.json says {size} "
+            f"nodes, which is {size * size}x{size}: export the job again."
+        )
+    return BakedView(pixels.reshape(size, size, size, 3), table.log2_min, table.log2_max)
 
 
 def light_paths_from_json(data: Any, where: str) -> LightPaths | None:

@@ -18,9 +18,9 @@ from ...types.image import Image
 from ...types.status import Status
 from ..folder.graph_request import COPY
 from ..folder.job_folder import JobFolder, unwritable
-from ..folder.job_view import view_of
 from ..folder.picture_part import with_part
 from ..folder.request import Request, read_request
+from ..folder.view_request import view_of
 from ..output.progress import EventWriter
 from ..output.result import write_partial
 from .fit_scene import Fitter, fit_scene
@@ -85,7 +85,7 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
         cure="lower the resolution, or free some memory or raise its limit",
     )
     reference, notes = read_reference(folder, request)
-    view = view_of(folder, request, reference)
+    view = view_of(folder, request.view, request.view_table, reference)
     more, said_of_more = _read_more(JobPicture(folder, request, reference, view))
     folder.require_space(bytes_needed(request))
     small = LivePictures(reference, view)
@@ -116,7 +116,7 @@ def _read_more(first: JobPicture) -> tuple[list[JobPicture], list[str]]:
     for inner, more in list(in_order(first.folder, first.request))[1:]:
         try:
             reference, notes = read_reference(inner, more)
-            pictures.append(JobPicture(inner, more, reference, view_of(inner, more, reference)))
+            pictures.append(JobPicture(inner, more, reference, view_of(inner, more.view, more.view_table, reference)))
         except BadInputError as error:
             raise BadInputError(f"Picture {label(more)}: {error}") from error
         fresh = [note for note in (*more.notes, *notes) if note not in first.request.notes]

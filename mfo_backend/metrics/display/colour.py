@@ -88,9 +88,3 @@ def lab_from_relative_xyz(relative_xyz: Array) -> Array:
     """CIELAB planes (3, ...) of XYZ planes relative to white."""
     f = lab_response(relative_xyz)
     return np.stack([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
-
-
-def ycxcz_from_relative_xyz(relative_xyz: Array) -> Array:
-    """YCxCz planes (3, ...), the linearised CIELAB of Zhang and Wandell, of XYZ planes relative to white."""
-    x, y, z = relative_xyz
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)])

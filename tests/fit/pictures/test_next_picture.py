@@ -46,7 +46,7 @@ def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over(monkeypatch
     choices = (PRESENT, Choice(turn=60.0), Choice(turn=90.0))
     told = [(choice, _Told(each, None, np.empty(0))) for choice, each in zip(choices, rows[1:], strict=True)]
     monkeypatch.setattr(next_picture, "_told", lambda *given: iter(told))
-    known = Known(np.full(2, 0.5), np.eye(2), {}, np.full(2, 0.5), Evidence(rows[0], None, 0.002, 1))
+    known = Known(np.full(2, 0.5), np.eye(2), TABLE.names, Evidence(rows[0], None, 0.002, 1))
     scene = SimpleNamespace(renderer=SimpleNamespace(table=TABLE))
     found = predictions(scene, known, SimpleNamespace(), np.zeros(3), 0)
     assert Choice(turn=60.0) not in found

@@ -310,7 +310,7 @@ def test_cameras_and_lights_of_the_scene_come_back(request_data: dict) -> None:
     ("key", "value", "words"),
     [
         ("cameras", "Side", "cameras is 'Side'"),
-        ("cameras", [SIDE] * 65, "at most 64"),
+        ("cameras", [SIDE] * 13, "at most 12"),
         ("cameras", [SIDE | {"to_world": PLACE[:9]}], r"cameras\[0\].to_world is .*16 finite numbers"),
         ("cameras", [SIDE | {"to_world": [3, *PLACE[1:]]}], "without a scale"),
         ("cameras", [SIDE | {"fov": 200.0}], "fov is 200"),
