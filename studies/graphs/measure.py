@@ -21,12 +21,13 @@ from mfo_backend.scene.image_file import write_exr
 from mfo_backend.types.image import Encoding, Image, Pixels
 
 from ..verdicts.summary import DEVIATIONS, OFF
+from .bumps import BUMPS
 from .head import head_scene
 from .materials import GRAPHS
 from .mixes import MIXES, DrawnMix, put_mix
 from .values import FITTED, SOCKETS, Drawn
 
-SERIES = ("sockets", "values", "mixes")
+SERIES = ("sockets", "values", "mixes", "bumps")
 NODE_SERVER = (sys.executable, "-m", "blender_addon.probe.server")
 SAMPLES = {"lamp": 128, "probe": 256}
 
@@ -37,7 +38,7 @@ def build_scene(graph: str, light: str, size: int) -> Any:
     if graph in MIXES:
         put_mix(graph, target)
     else:
-        GRAPHS[graph](target.active_material.node_tree, node)
+        (GRAPHS | BUMPS)[graph](target.active_material.node_tree, node)
     return target, node
 
 

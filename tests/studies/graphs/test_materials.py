@@ -10,12 +10,13 @@ bpy = pytest.importorskip("bpy")
 from blender_addon.export.findings import Findings  # noqa: E402
 from blender_addon.export.materials.node_graph import names_by_graph  # noqa: E402
 from blender_addon.export.materials.read_material import read_target  # noqa: E402
+from studies.graphs.bumps import BUMPS  # noqa: E402
 from studies.graphs.materials import GRAPHS  # noqa: E402
 from studies.graphs.measure import build_scene  # noqa: E402
 from studies.graphs.values import FITTED, SOCKETS, Drawn  # noqa: E402
 
 
-@pytest.mark.parametrize("graph", GRAPHS)
+@pytest.mark.parametrize("graph", [*GRAPHS, *BUMPS])
 def test_a_graph_holds_some_sockets_and_leaves_others(graph: str) -> None:
     target, node = build_scene(graph, "lamp", 16)
     findings = Findings()
