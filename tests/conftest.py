@@ -13,6 +13,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
+os.environ.setdefault("MFO_BAKES", "")  # tests leave nothing in the user's folders
+
 # a machine under load is slow, so no example has a deadline; the database would write into the working folder
 _ALWAYS = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("same", derandomize=True, max_examples=60, **_ALWAYS)

@@ -11,13 +11,18 @@ import bpy
 import numpy as np
 
 from ..export.render_state import render_state
+from .bake_cache import cached
+from .bake_key import surface_key, world_key
 from .panorama import world_panoramas
 from .surface import baked_surface
 
 
 def world(request: Mapping[str, Any]) -> Mapping[str, Any]:
     """Render the world of `scene` into `folder`, `width` pixels around; see `world_panoramas`."""
-    return world_panoramas(bpy.data.scenes[request["scene"]], Path(request["folder"]), request["width"])
+    scene, place, width = bpy.data.scenes[request["scene"]], Path(request["folder"]), request["width"]
+    cache = _cache(request)
+    key = world_key(scene, width) if cache is not None else None
+    return cached(cache, key, place, lambda: world_panoramas(scene, place, width))
 
 
 def surfaces(request: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -32,7 +37,7 @@ def surfaces(request: Mapping[str, Any]) -> Mapping[str, Any]:
             place = Path(request["folder"]) / str(number)
             place.mkdir()
             try:
-                found.append({"status": "ok", **_surface(scene, asked, place)})
+                found.append({"status": "ok", **_surface(scene, asked, place, _cache(request))})
             except Exception as error:  # one surface is not worth the others
                 words = " ".join(str(error).split())
                 found.append({"status": "failed", "sentence": f"{type(error).__name__}: {words}"})
@@ -51,11 +56,22 @@ def paint(request: Mapping[str, Any]) -> Mapping[str, Any]:
     return {}
 
 
-def _surface(scene: bpy.types.Scene, asked: Mapping[str, Any], place: Path) -> dict[str, Any]:
+def _cache(request: Mapping[str, Any]) -> Path | None:
+    return Path(request["cache"]) if request.get("cache") else None
+
+
+def _surface(scene: bpy.types.Scene, asked: Mapping[str, Any], place: Path, cache: Path | None) -> dict[str, Any]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         if name_of(instance) == asked["instance"]:
-            return baked_surface(scene, instance, depsgraph, asked["slot"], place, asked["size"])
+            slot, size = asked["slot"], asked["size"]
+            key = surface_key(scene, instance, depsgraph, slot, size) if cache is not None else None
+            return cached(
+                cache,
+                key,
+                place,
+                lambda: baked_surface(scene, instance, depsgraph, slot, place, size),  # noqa: B023
+            )
     raise LookupError(f"{asked['instance']['object']!r} is not there")
 
 

@@ -16,6 +16,7 @@ import pytest
 from mfo_backend.job.folder.request import request_from_json
 
 from ..addon import fake_backend
+from ..faults.killed_blender import kill_blender_of_a_graph_fit
 from .conftest import ADDON_ID, RealBlender
 
 pytestmark = pytest.mark.blender
@@ -120,6 +121,16 @@ def test_the_backend_ends_with_blender(blender: RealBlender, tmp_path: Path, var
     while Path(f"/proc/{pids['backend']}").exists() if Path("/proc").exists() else _alive(pids["backend"]):
         assert time.monotonic() < end, "the backend outlived Blender by five seconds"
         time.sleep(0.05)
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
+def test_nothing_lives_on_after_a_graph_fit(
+    blender: RealBlender, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the real backend, and the Blender that evaluates nodes for it."""
+    monkeypatch.setenv("BLENDER_USER_RESOURCES", str(blender.profile))
+    command = [blender.program, "--background", "--factory-startup", "--addons", ADDON_ID, "--python"]
+    kill_blender_of_a_graph_fit(command, tmp_path, ADDON_ID)
 
 
 def _alive(pid: int) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
+from ...bake.bake_cache import cache_folder
 from ...bake.baker import BakeError, Baker
 from ...bake.panorama import LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
@@ -107,7 +108,7 @@ class SceneBakes:
         """Have the world rendered; `finish` puts it into the scene."""
         note_missing_pictures(f"World '{world.name}'", node_tree_of(world), findings)
         try:
-            self._world = self._baker.ask("world", width=_panorama_width(world)), world
+            self._world = self._baker.ask("world", cache=cache_folder(), width=_panorama_width(world)), world
         except BakeError as problem:
             self._failed.append(_of_world(world, problem))
 
@@ -145,7 +146,7 @@ class SceneBakes:
         if self._number is None and self._surfaces:
             try:
                 requests = [asked.request for asked in self._surfaces.values()]
-                self._number = self._baker.ask("surfaces", surfaces=requests)
+                self._number = self._baker.ask("surfaces", cache=cache_folder(), surfaces=requests)
             except BakeError as problem:
                 self._number = problem
 

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a bake hangs on as one hash, made by the Blender that bakes from the very data that it bakes.
+
+Whatever cannot be told surely has no key, and is baked again: animation, other objects, the view, image sequences.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..export.meshes.read_mesh import material_of_slot, slot_count
+from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for
+from ..versions import node_tree_of
+
+SHOWN_ONLY = {  # of a node or a socket: how it looks in the editor
+    "bl_description", "bl_height_default", "bl_height_max", "bl_height_min", "bl_icon", "bl_label",
+    "bl_static_type", "bl_subtype_label", "bl_width_default", "bl_width_max", "bl_width_min", "color", "color_tag",
+    "description", "dimensions", "display_shape", "height", "hide", "hide_value", "internal_links", "is_inactive",
+    "is_icon_visible", "label", "link_limit", "links", "location", "location_absolute", "name", "node", "parent",
+    "pin_gizmo", "rna_type", "select", "show_expanded", "show_options", "show_preview", "show_texture",
+    "use_custom_color", "warning_propagation", "width",
+}  # fmt: skip
+# read files of their own, ask for more of an object than its mesh and place, or are as wide as a pixel of the picture
+NO_KEY = (
+    *("ShaderNodeScript", "ShaderNodeTexIES", "ShaderNodeTexPointDensity", "ShaderNodeWireframe"),
+    *("ShaderNodeObjectInfo", "ShaderNodeParticleInfo", "ShaderNodeHairInfo", "ShaderNodePointInfo"),
+)
+OF_IMAGE = ("alpha_mode", "use_view_as_render", "use_half_precision", "generated_type", "generated_color", "size",
+            "generated_width", "generated_height", "use_generated_float", "channels", "is_float")  # fmt: skip
+ATTRIBUTE_VALUES = ("value", "vector", "color")  # names of what an attribute's items hold, by type
+
+
+class _NoKeyError(Exception):
+    """Something that a bake may hang on cannot be hashed."""
+
+
+def world_key(scene: bpy.types.Scene, width: int) -> str | None:
+    """The key of a panorama of the world of `scene`, so many pixels around."""
+    world = scene.world
+    key = _Key("world", scene, width)
+    return key.of(lambda: key.owner(world, node_tree_of(world)))
+
+
+def surface_key(
+    scene: bpy.types.Scene, instance: Any, depsgraph: bpy.types.Depsgraph, slot: int, size: int
+) -> str | None:
+    """The key of a bake of the material in `slot` of a depsgraph's instance, `size` texels along each side."""
+    shown = material_of_slot(instance.object, slot)
+    assert shown is not None
+    material, item = shown.original, instance.object
+    key = _Key("surface", scene, (size, slot, slot_count(item)))
+
+    def put() -> None:
+        tree = node_tree_of(material)
+        key.owner(material, tree)
+        if item.original.vertex_groups and _has(tree, "ShaderNodeAttribute"):
+            raise _NoKeyError("vertex groups")
+        key.put(material.displacement_method, [list(row) for row in instance.matrix_world])
+        data = item.original.data
+        if hasattr(data, "texspace_location"):
+            key.put(list(data.texspace_location), list(data.texspace_size))
+        layers = item.original.type == "MESH"
+        mesh = bpy.data.meshes.new_from_object(item, preserve_all_data_layers=layers, depsgraph=depsgraph)
+        try:
+            key.mesh(mesh)
+        finally:
+            bpy.data.meshes.remove(mesh)
+
+    return key.of(put)
+
+
+class _Key:
+    """A hash that is fed."""
+
+    def __init__(self, kind: str, scene: bpy.types.Scene, asked: Any) -> None:
+        self._digest, self._trees = hashlib.sha256(), list[int]()
+        space = getattr(getattr(bpy.data, "colorspace", None), "working_space", "")
+        self.put(kind, asked, bpy.app.version_string, bpy.app.build_hash, _code(), space, os.environ.get("OCIO", ""))
+        self.put(scene.cycles.shading_system)
+
+    def of(self, put: Any) -> str | None:
+        """The key once `put` has fed it, None where that is not possible."""
+        try:
+            put()
+        except (_NoKeyError, OSError):
+            return None
+        return self._digest.hexdigest()
+
+    def put(self, *values: Any) -> None:
+        for value in values:
+            self._digest.update(value if isinstance(value, bytes) else repr(value).encode() + b"\0")
+
+    def owner(self, owner: Any, tree: bpy.types.NodeTree) -> None:
+        """A material or a world with its nodes."""
+        if owner.animation_data is not None:
+            raise _NoKeyError("animation")
+        if asked_for(tree, OF_VIEW) or asked_for(tree, OF_SURROUNDINGS):
+            raise _NoKeyError("asks for the view or what is around")
+        self.struct(owner.cycles)
+        self.tree(tree)
+
+    def tree(self, tree: bpy.types.NodeTree) -> None:
+        if tree.animation_data is not None:
+            raise _NoKeyError("animation")
+        pointer = tree.as_pointer()
+        if pointer in self._trees:
+            self.put("tree", self._trees.index(pointer))
+            return
+        self._trees.append(pointer)
+        numbers = {node.name: number for number, node in enumerate(tree.nodes)}
+        for node in tree.nodes:
+            if node.bl_idname in NO_KEY or getattr(node, "attribute_type", "GEOMETRY") != "GEOMETRY":
+                raise _NoKeyError(node.bl_idname)
+            if "CAMERA" in (getattr(node, "convert_from", ""), getattr(node, "convert_to", "")):
+                raise _NoKeyError("asks for the camera's space")
+            self.put("node", node.bl_idname, node.mute)
+            self.struct(node, numbers)
+        for link in tree.links:
+            self.put(numbers[link.from_node.name], link.from_socket.identifier)
+            self.put(numbers[link.to_node.name], link.to_socket.identifier, link.is_muted, link.is_valid)
+
+    def struct(self, struct: Any, numbers: dict[str, int] | None = None) -> None:
+        """All properties of a piece of data and of what belongs to it."""
+        is_shown = isinstance(struct, bpy.types.Node | bpy.types.NodeSocket)
+        for prop in struct.bl_rna.properties:
+            name = prop.identifier
+            if name == "rna_type" or (is_shown and name in SHOWN_ONLY):
+                continue
+            value = getattr(struct, name)
+            self.put(name)
+            if prop.type == "COLLECTION":
+                self.put(len(value))
+                for item in value:
+                    self.struct(item, numbers)
+            elif prop.type != "POINTER":
+                self.put(list(value) if getattr(prop, "is_array", False) else value)
+            else:
+                self._pointer(value, numbers)
+
+    def _pointer(self, value: Any, numbers: dict[str, int] | None) -> None:
+        if isinstance(value, bpy.types.Image):
+            self._image(value)
+        elif isinstance(value, bpy.types.NodeTree):
+            self.tree(value)
+        elif isinstance(value, bpy.types.ID):
+            raise _NoKeyError(f"{value.name_full} of another kind")
+        elif isinstance(value, bpy.types.Node):
+            self.put((numbers or {}).get(value.name))
+        elif value is None:
+            self.put(None)
+        else:
+            self.struct(value, numbers)
+
+    def _image(self, image: bpy.types.Image) -> None:
+        if image.source not in ("FILE", "GENERATED") or image.type not in ("IMAGE", "UV_TEST"):
+            raise _NoKeyError("an image of several files")
+        self.put("image", image.source, image.colorspace_settings.name, image.colorspace_settings.is_data)
+        self.put(*(list(v) if hasattr(v, "__len__") and not isinstance(v, str) else v
+                   for v in (getattr(image, name, None) for name in OF_IMAGE)))  # fmt: skip
+        if image.is_dirty or image.source == "GENERATED":
+            pixels = np.empty(len(image.pixels), dtype=np.float32)
+            image.pixels.foreach_get(pixels)
+            self.put(pixels.tobytes())
+        elif image.packed_file is not None:
+            self.put(bytes(image.packed_file.data))
+        else:
+            path = Path(bpy.path.abspath(image.filepath_raw, library=image.library))
+            self.put(path.read_bytes() if path.is_file() else "missing")
+
+    def mesh(self, mesh: bpy.types.Mesh) -> None:
+        """All attributes of a mesh, UV maps and colours among them, and its normals."""
+        for attribute in mesh.attributes:
+            items = attribute.data
+            self.put(attribute.name, attribute.domain, attribute.data_type, len(items))
+            if not len(items):
+                continue
+            name = next((each for each in ATTRIBUTE_VALUES if hasattr(items[0], each)), None)
+            first = getattr(items[0], name) if name is not None else ""
+            if name is None or isinstance(first, str | bytes):
+                raise _NoKeyError(attribute.data_type)
+            width = int(np.size(np.array(first)))
+            whole = isinstance(first, int) or attribute.data_type.startswith("INT")
+            values = np.empty(len(items) * width, dtype=np.int32 if whole else np.float32)
+            items.foreach_get(name, values)
+            self.put(values.tobytes())
+        for items, name, kind, width in (
+            (mesh.polygons, "loop_total", np.int32, 1),
+            (mesh.polygons, "material_index", np.int32, 1),
+            (mesh.loops, "vertex_index", np.int32, 1),
+            (mesh.corner_normals, "vector", np.float32, 3),
+        ):
+            values = np.empty(len(items) * width, dtype=kind)
+            items.foreach_get(name, values)
+            self.put(values.tobytes())
+        self.put([(layer.name, layer.active_render, layer.active) for layer in mesh.uv_layers])
+        self.put(mesh.color_attributes.render_color_index, mesh.attributes.default_color_name)
+
+
+def _has(tree: bpy.types.NodeTree, kind: str) -> bool:
+    groups = [node.node_tree for node in tree.nodes if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
+    return any(node.bl_idname == kind for node in tree.nodes) or any(_has(group, kind) for group in groups)
+
+
+@cache
+def _code() -> str:
+    """A hash of this add-on's own code: another version may bake otherwise."""
+    found = hashlib.sha256()
+    for path in sorted(Path(__file__).resolve().parent.parent.rglob("*.py")):
+        if "sentences" not in path.parts:
+            found.update(path.read_bytes())
+    return found.hexdigest()
