@@ -16,8 +16,8 @@ import pytest
 from mfo_backend.job.folder.request import request_from_json
 
 from ..addon import fake_backend
-from ..faults.killed_blender import kill_blender_of_a_graph_fit
 from .conftest import ADDON_ID, RealBlender
+from .killed_blender import kill_blender_of_a_graph_fit
 
 pytestmark = pytest.mark.blender
 SCRIPTS = Path(__file__).resolve().parent / "scripts"

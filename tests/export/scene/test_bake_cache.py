@@ -121,6 +121,9 @@ CHANGES: dict[str, Callable[[Any], Any]] = {
     "a curve": curve,
     "a muted node": lambda i: setattr(node(i, "RGBCurve"), "mute", True),
     "a link": unlink,
+    "its other end": lambda i: tree_of(i).links.new(
+        node(i, "Attribute").outputs["Alpha"], node(i, "BsdfPrincipled").inputs["Metallic"]
+    ),
     "painted pixels": repaint,
     "a file": other_file,
     "a colour space": color_space,
@@ -168,8 +171,26 @@ def linked(kind: str, output: str) -> Callable[[Any], None]:
     return put
 
 
+def test_what_is_painted_next_is_another_key_again(ball: Any) -> None:
+    repaint(ball)
+    before = key_of(ball)
+    node(ball, "TexImage").image.pixels[1] = 0.75
+    assert key_of(ball) not in (before, None)
+
+
+def test_a_link_to_another_socket_is_another_key(ball: Any) -> None:
+    tree, shader = tree_of(ball), node(ball, "BsdfPrincipled")
+    keys = set()
+    for name in ("Coat Weight", "Sheen Weight"):
+        link = tree.links.new(node(ball, "Attribute").outputs["Fac"], shader.inputs[name])
+        keys.add(key_of(ball))
+        tree.links.remove(link)
+    assert len(keys) == 2
+
+
 UNSURE: dict[str, Callable[[Any], Any]] = {
     "animation": animate,
+    "animation of the material": lambda i: i.data.materials[0].keyframe_insert("pass_index"),
     "another object": other_object,
     "the view": linked("LayerWeight", "Facing"),
     "its place": linked("ObjectInfo", "Random"),

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from .killed_blender import kill_blender_of_a_graph_fit
+from ...blender.killed_blender import kill_blender_of_a_graph_fit
 
 pytest.importorskip("bpy")
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
 def test_the_module_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[3]))
     kill_blender_of_a_graph_fit([sys.executable], tmp_path)
