@@ -40,7 +40,7 @@ def _default_folder() -> Path:
     if os.environ.get("MFO_CACHE_DIR"):
         return Path(os.environ["MFO_CACHE_DIR"]) / "bakes"
     try:
-        return Path(bpy.utils.extension_path_user(__package__.rpartition(".blender_addon.")[0], path="bakes"))
+        return Path(bpy.utils.extension_path_user((__package__ or "").rpartition(".blender_addon.")[0], path="bakes"))
     except ValueError:  # not installed as an extension
         return Path(bpy.utils.user_resource("DATAFILES", path="material_fit")) / "bakes"
 

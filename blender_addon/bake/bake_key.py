@@ -162,8 +162,9 @@ class _Key:
         if image.source not in ("FILE", "GENERATED") or image.type not in ("IMAGE", "UV_TEST"):
             raise _NoKeyError("an image of several files")
         self.put("image", image.source, image.colorspace_settings.name, image.colorspace_settings.is_data)
-        self.put(*(list(v) if hasattr(v, "__len__") and not isinstance(v, str) else v
-                   for v in (getattr(image, name, None) for name in OF_IMAGE)))  # fmt: skip
+        for name in OF_IMAGE:
+            value: Any = getattr(image, name, None)
+            self.put(name, value if value is None or isinstance(value, str | float | int) else list(value))
         if image.is_dirty or image.source == "GENERATED":
             pixels = np.empty(len(image.pixels), dtype=np.float32)
             image.pixels.foreach_get(pixels)

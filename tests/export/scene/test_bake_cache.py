@@ -178,13 +178,19 @@ def test_what_is_painted_next_is_another_key_again(ball: Any) -> None:
     assert key_of(ball) not in (before, None)
 
 
-def test_a_link_to_another_socket_is_another_key(ball: Any) -> None:
-    tree, shader = tree_of(ball), node(ball, "BsdfPrincipled")
+@pytest.mark.parametrize("swapped", ["outputs", "inputs"])
+def test_two_links_that_change_places_are_another_key(ball: Any, swapped: str) -> None:
+    """The same sockets are linked, each to the other's end."""
+    tree, shader, attribute = tree_of(ball), node(ball, "BsdfPrincipled"), node(ball, "Attribute")
+    outputs = [attribute.outputs[name] for name in ("Fac", "Alpha")]
+    inputs = [shader.inputs[name] for name in ("Coat Weight", "Sheen Weight")]
     keys = set()
-    for name in ("Coat Weight", "Sheen Weight"):
-        link = tree.links.new(node(ball, "Attribute").outputs["Fac"], shader.inputs[name])
+    for _ in range(2):
+        links = [tree.links.new(*ends) for ends in zip(outputs, inputs, strict=True)]
         keys.add(key_of(ball))
-        tree.links.remove(link)
+        for link in links:
+            tree.links.remove(link)
+        {"outputs": outputs, "inputs": inputs}[swapped].reverse()
     assert len(keys) == 2
 
 
