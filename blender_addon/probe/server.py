@@ -103,7 +103,9 @@ def _watch_parent(pid: int, folder: Path) -> None:
     def watch() -> None:
         while os.getppid() == pid:
             time.sleep(LOOK_SECONDS)
-        shutil.rmtree(folder, ignore_errors=True)
+        end = time.monotonic() + LOOK_SECONDS
+        while folder.exists() and time.monotonic() < end:  # a render may write meanwhile
+            shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     if pid and os.name != "nt":  # Windows keeps the id of a parent that is gone

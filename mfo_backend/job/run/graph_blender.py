@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import queue
+import re
 import shutil
 import signal
 import subprocess
@@ -42,6 +43,7 @@ _NO_COPY = (
     "once a job has a result. Export the job anew."
 )
 _PREFIX = "mfo_nodes_"
+_FOLDER = re.compile(_PREFIX + r"(\d+)_.+")  # the backend's process, mkdtemp's letters
 
 
 class GraphBlender:
@@ -60,6 +62,7 @@ class GraphBlender:
         """
         assert graph.evaluate is not None
         self._graph, self._evaluate, self._ready = graph, graph.evaluate, False
+        _remove_abandoned()
         self._folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}_"))
         self._log = self._folder / "blender.log"
         own = [str(copy), "--folder", str(self._folder), "--parent", str(os.getpid())]
@@ -175,6 +178,21 @@ class GraphBlender:
                 os.killpg(self._process.pid, signal.SIGKILL)
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(END_SECONDS)
+
+
+def _remove_abandoned() -> None:
+    """Remove what a Blender has still written while it ended with a backend that was killed."""
+    if os.name == "nt":  # where asking for a process ends it
+        return
+    for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        found = _FOLDER.fullmatch(path.name)
+        try:
+            if found is not None:
+                os.kill(int(found[1]), 0)
+        except (ProcessLookupError, OverflowError):
+            shutil.rmtree(path, ignore_errors=True)
+        except OSError:  # somebody else's that lives
+            continue
 
 
 @contextmanager
