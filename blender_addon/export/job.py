@@ -40,11 +40,6 @@ from .scene.scene_file import scene_files
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
-SEVERAL_OF_BOTH = (
-    "Several pictures and several materials are not fitted together: leave all pictures but one out, or all materials "
-    "but one."
-)
-
 _LOOK_SECONDS = 0.01  # between two looks at a second Blender that is waited for
 
 Found = TypeVar("Found")
@@ -89,8 +84,6 @@ def export_job(
     if not isinstance(reference, Sequence):
         return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
     check_setups(reference)
-    if targets and len(reference) > 1:
-        raise ExportError(SEVERAL_OF_BOTH)
     first: PartialExport | None = None
     notes: list[str] = []
     with new_job_folder(Path(folder)) as partial:
@@ -176,10 +169,11 @@ class PartialExport:
     more: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
     @property
-    def values(self) -> dict[str, Any]:
-        """The target's values by socket, without what is linked."""
-        sockets = self.request["materials"].get(TARGET_BSDF, {"sockets": {}})["sockets"]
-        return {name: socket["value"] for name, socket in sockets.items() if not socket["linked"]}
+    def values(self) -> dict[tuple[str, str], Any]:
+        """The values of what is fitted by material and socket, without what is linked."""
+        fitted = [one["target"]["bsdf_id"] for one in self.more.values()] or [TARGET_BSDF]
+        found = {bsdf: self.request["materials"].get(bsdf, {"sockets": {}})["sockets"] for bsdf in fitted}
+        return {(b, n): s["value"] for b, sockets in found.items() for n, s in sockets.items() if not s["linked"]}
 
     def write_request(self, folder: Path) -> None:
         """Write request.json, and those of further materials into their folders."""
@@ -209,6 +203,7 @@ def partial_export(
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
     of_mix, wanted = ([], fit) if targets else named_mix_values(obj, fit)
+    may_miss = bool(targets) and together == "pictures"  # one of the materials, in this picture
     together = "materials" if targets else together
     values, fit = chosen_graph_values(obj, wanted, findings, together=together)
     with probe_for(fitted, always=bool(values)) as probe:
@@ -218,8 +213,9 @@ def partial_export(
         if leaves and leaves[0] is not None:  # whose numbers and values are others
             values, fit = chosen_graph_values(obj, wanted, Findings(), together=together, leaf=leaves[0])
         with SceneBakes(context, probe) as bakes:
-            fitted = [replace(each, leaf=leaf) for each, leaf in zip(fitted, leaves, strict=True)]
-            data = read_scene(context, obj, findings, bakes, leaves[0] if leaves else None, fitted if targets else ())
+            fitted = [replace(each, leaf=own) for each, own in zip(fitted, leaves, strict=True)]
+            leaf = leaves[0] if leaves else None
+            data = read_scene(context, obj, findings, bakes, leaf, fitted if targets else (), may_miss=may_miss)
             findings.raise_first()
             assert data is not None
             assert obj is not None

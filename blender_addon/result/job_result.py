@@ -199,7 +199,7 @@ def _picture(folder: Path, data: dict[str, Any]) -> PastPicture:
     before, after = data["errors"]["flip"]
     name = f"{int(data['number'])} {data.get('name', '')}".strip()
     inner = (folder / str(data.get("folder", "."))).resolve()
-    if not inner.is_relative_to(folder.resolve()):
+    if not inner.is_relative_to(whole_job(folder).resolve()):
         raise ValueError(f"picture {name} is outside of the job")
     return PastPicture(name, str(data.get("verdict") or ""), (float(before), float(after)), inner)
 

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from blender_addon.result.job_result import read_job_result
+
 from .conftest import run_bpy, run_mfo
 
 SIZE = 48
@@ -38,6 +40,9 @@ camera.location, camera.rotation_euler = (0.0, -5.5, 2.6), (math.radians(76), 0.
 for item in (lamp, camera):
     scene.collection.objects.link(item)
 scene.camera = camera
+side = bpy.data.objects.new("Side", bpy.data.cameras.new("Side"))
+side.location = (0.0, 0.0, 5.0)  # above the floor: the wall is seen edge on, beyond its frame
+scene.collection.objects.link(side)
 bpy.ops.wm.save_as_mainfile(filepath=argv[0], copy=True)
 for inputs, color, rough in zip(nodes, ((0.75, 0.2, 0.1, 1.0), (0.25, 0.6, 0.8, 1.0)), (0.35, 0.6)):
     inputs["Base Color"].default_value, inputs["Roughness"].default_value = color, rough
@@ -45,6 +50,8 @@ settings = scene.render.image_settings
 if hasattr(settings, "media_type"):
     settings.media_type = "IMAGE"
 settings.file_format, settings.color_depth, scene.render.filepath = "OPEN_EXR", "32", argv[1]
+bpy.ops.render.render(write_still=True)
+scene.camera, scene.render.filepath = side, argv[2]
 bpy.ops.render.render(write_still=True)
 """
 TRUTH = {"Floor": (0.75, 0.2, 0.1), "Wall": (0.25, 0.6, 0.8)}
@@ -63,7 +70,7 @@ open(argv[1], "w").write(json.dumps(found))
 @pytest.fixture(scope="module")
 def corner(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("corner")
-    run_bpy(BUILD, folder / "start.blend", folder / "reference.exr")
+    run_bpy(BUILD, folder / "start.blend", folder / "reference.exr", folder / "side.exr")
     return folder
 
 
@@ -104,3 +111,32 @@ def test_what_cannot_be_is_said_before_the_fit(corner: Path, tmp_path: Path) -> 
     assert paper.code == 2
     assert "The preset 'paper' fits one material alone" in paper.sentence
     assert not (tmp_path / "job").exists()
+
+
+def test_two_pictures_show_both_and_one_of_them_only_the_floor(corner: Path, tmp_path: Path) -> None:
+    job = tmp_path / "job"
+    done = run_mfo(
+        "blend", corner / "start.blend", "--object", "Floor", "--object", "Wall", "--preset", "fast", "--out", job,
+        "--reference", f"{corner / 'reference.exr'}@camera=Camera", "--reference", f"{corner / 'side.exr'}@camera=Side",
+        "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    answer = done.answer
+    assert answer["sentence"] == "2 materials: 2 look the same as the reference."
+    assert [(p["number"], p["verdict"], p["folder"]) for p in answer["pictures"]] == [
+        (1, "same", "."),
+        (2, "same", "more_pictures/2"),
+    ]
+    floor, wall = answer["materials"]
+    assert [(p["number"], p["folder"]) for p in floor["pictures"]] == [(1, "targets/1"), (2, "more_pictures/2")]
+    assert [p["number"] for p in wall["pictures"]] == [1]  # the other one shows nothing of it
+    for name, found in (("Floor", floor), ("Wall", wall)):
+        np.testing.assert_allclose(found["recovered"]["base_color"], TRUTH[name], atol=0.03)
+    for picture in floor["pictures"]:
+        assert (job / picture["folder"] / "pictures" / "result.png").is_file()
+    own = json.loads((job / "targets" / "1" / "result.json").read_text("utf-8"))
+    assert [p["folder"] for p in own["pictures"]] == [".", "../../more_pictures/2"]
+    assert [p.folder for p in read_job_result(job / "targets" / "1").pictures] == [
+        (job / "targets" / "1").resolve(),
+        (job / "more_pictures" / "2").resolve(),
+    ]

@@ -29,12 +29,12 @@ OWN_NAMES = {
 
 
 def share_files(job: Path, inner: Path) -> None:
-    """Let the meshes and textures of a further picture be the first's files where they hold the same.
+    """Let the meshes and textures of a further picture, and of materials in it, be the first's where they are the same.
 
     Where a file system has no hard links they stay copies.
     """
-    for path in [*inner.glob("meshes/*"), *inner.glob("textures/*")]:
-        twin = job / path.relative_to(inner)
+    for path in [*inner.rglob("meshes/*"), *inner.rglob("textures/*")]:
+        twin = job / path.parent.name / path.name
         if twin.is_file() and filecmp.cmp(twin, path, shallow=False):
             spare = path.with_suffix(".link")
             with suppress(OSError):

@@ -60,17 +60,20 @@ def read_scene(
     bakes: SceneBakes | None = None,
     leaf: str | None = None,
     targets: Sequence[FittedSlot] = (),
+    *,
+    may_miss: bool = False,
 ) -> SceneData | None:
     """Return the scene as the render would see it, or None with errors in `findings`.
 
     What only Cycles can tell is asked of `bakes`; `finish_scene` puts it in. `leaf` names the shader of the target's
-    mix that is fitted, and `targets` are the slots whose materials are fitted together, where these are several.
+    mix that is fitted, and `targets` are the slots whose materials are fitted together, where these are several. With
+    `may_miss` the camera need not see all of these: other pictures may.
     """
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
         findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
         with context.temp_override(view_layer=layer):
-            return read_scene(bpy.context, target, findings, bakes, leaf, targets)
+            return read_scene(bpy.context, target, findings, bakes, leaf, targets, may_miss=may_miss)
     scene, view_layer = context.scene, context.view_layer
     others = [each.name for each in scene.view_layers if each.use and each != view_layer]
     if others and view_layer.use:
@@ -113,8 +116,14 @@ def read_scene(
             return None
         walk.note_coincident_faces()
         walk.note_bent_normals(seen)
+        unseen = []
         for each, shape in seen:
-            check_visible(data, shape, each.object, each.slot, scene, depsgraph, findings)
+            of_one = Findings()
+            check_visible(data, shape, each.object, each.slot, scene, depsgraph, of_one)
+            unseen += of_one.errors
+        if not may_miss or len(unseen) == len(seen):
+            for sentence in unseen:
+                findings.error(sentence)
     return data
 
 

@@ -85,6 +85,7 @@ FIT = {
     "The {} materials have {} free values, and at most {} are fitted together: leave out {}, or choose fewer parameters, or a queue.": "Les {} matériaux ont {} valeurs libres, et {} au plus sont ajustées ensemble : laisser {} de côté, choisir moins de paramètres ou une file.",
     "Each material of the queue was fitted once, beside the others' base colours: fit together what does not match or gives much light to others.": "Chaque matériau de la file a été ajusté une fois, à côté des couleurs de base des autres : ajuster ensemble ce qui ne correspond pas ou éclaire beaucoup les autres.",
     "The preset 'paper' fits one material alone: choose 'fast', 'balanced' or 'best' for several.": "Le préréglage 'paper' n'ajuste qu'un matériau seul : choisir 'fast', 'balanced' ou 'best' pour plusieurs.",
+    "Material '{}' cannot be fitted to several pictures: {} Leave it out, or all pictures but one.": "Le matériau {} ne peut pas être ajusté à plusieurs images : {} L'omettre, ou toutes les images sauf une.",
     "Material '{}' cannot be fitted with others: {}": "Le matériau '{}' ne peut pas être ajusté avec d'autres : {}",
     "Material '{}' has no value that can be fitted: leave it out.": "Le matériau '{}' n'a aucune valeur qui puisse être ajustée : l'omettre.",
     "Several materials are fitted with the model {} alone: choose that.": "Plusieurs matériaux ne sont ajustés qu'avec le modèle {} : le choisir.",

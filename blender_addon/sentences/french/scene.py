@@ -180,7 +180,6 @@ SCENE = {
     "Picture {}: {}": "Image {} : {}",
     "Scene '{}' has no camera '{}': its cameras are: {}.": "La scène '{}' n'a pas de caméra '{}' : ses caméras sont : {}.",
     "Scene '{}' has no view layer '{}': it has: {}.": "La scène '{}' n'a pas de calque de vue '{}' : elle a : {}.",
-    "Several pictures and several materials are not fitted together: leave all pictures but one out, or all materials but one.": "Plusieurs images et plusieurs matériaux ne sont pas ajustés ensemble : omettre toutes les images sauf une, ou tous les matériaux sauf un.",
     "The disk is full: free some space or choose another folder than {}.": "Le disque est plein : libérer de la place ou choisir un autre dossier que {}.",
     "The exposure is {} stops: give -{} to {}.": "L'exposition est de {} diaphragmes : donner -{} à {}.",
     "The file has no scene '{}': its scenes are: {}.": "Le fichier n'a pas de scène '{}' : ses scènes sont : {}.",

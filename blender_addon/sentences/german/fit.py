@@ -85,6 +85,7 @@ FIT = {
     "The {} materials have {} free values, and at most {} are fitted together: leave out {}, or choose fewer parameters, or a queue.": "Die {} Materialien haben {} freie Werte, und höchstens {} werden zusammen angepasst: {} weglassen, weniger Werte auswählen oder eine Warteschlange.",
     "Each material of the queue was fitted once, beside the others' base colours: fit together what does not match or gives much light to others.": "Jedes Material der Warteschlange wurde einmal angepasst, neben den Grundfarben der anderen: zusammen anpassen, was nicht passt oder anderen viel Licht gibt.",
     "The preset 'paper' fits one material alone: choose 'fast', 'balanced' or 'best' for several.": "Die Voreinstellung 'paper' passt nur ein Material an: für mehrere 'fast', 'balanced' oder 'best' wählen.",
+    "Material '{}' cannot be fitted to several pictures: {} Leave it out, or all pictures but one.": "Material {} kann nicht auf mehrere Bilder angepasst werden: {} Es weglassen, oder alle Bilder bis auf eines.",
     "Material '{}' cannot be fitted with others: {}": "Material '{}' kann nicht mit anderen angepasst werden: {}",
     "Material '{}' has no value that can be fitted: leave it out.": "Material '{}' hat keinen Wert, der angepasst werden kann: es weglassen.",
     "Several materials are fitted with the model {} alone: choose that.": "Mehrere Materialien werden nur mit dem Modell {} angepasst: dieses wählen.",

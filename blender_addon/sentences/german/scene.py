@@ -181,7 +181,6 @@ SCENE = {
     "Picture {}: {}": "Bild {}: {}",
     "Scene '{}' has no camera '{}': its cameras are: {}.": "Szene '{}' hat keine Kamera '{}': ihre Kameras sind: {}.",
     "Scene '{}' has no view layer '{}': it has: {}.": "Szene '{}' hat keinen View-Layer '{}': sie hat: {}.",
-    "Several pictures and several materials are not fitted together: leave all pictures but one out, or all materials but one.": "Mehrere Bilder und mehrere Materialien werden nicht zusammen angepasst: alle Bilder bis auf eines weglassen, oder alle Materialien bis auf eines.",
     "The disk is full: free some space or choose another folder than {}.": "Die Festplatte ist voll: Platz schaffen oder einen anderen Ordner als {} wählen.",
     "The exposure is {} stops: give -{} to {}.": "Die Belichtung ist {} Blendenstufen: -{} bis {} angeben.",
     "The file has no scene '{}': its scenes are: {}.": "Die Datei hat keine Szene '{}': ihre Szenen sind: {}.",

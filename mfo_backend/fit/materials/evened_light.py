@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.image import Pixels
 
 COLOR = "base_color"
@@ -22,7 +23,7 @@ DIM = 1e-4  # of the brightest target: below, a ratio is noise. No measurement.
 
 
 def evened_light(
-    renderers: Sequence[MitsubaRenderer], masks: Sequence[NDArray[np.bool_]], light: Pixels, seed: int
+    renderers: Sequence[MitsubaRenderer | SheetRenderer], masks: Sequence[NDArray[np.bool_]], light: Pixels, seed: int
 ) -> list[NDArray[np.float64]]:
     """Vectors whose targets have the mean radiance of the picture `light` (height, width, 3); the scene shows them.
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One verdict for each of several materials, on one picture that shows all of them as they ended."""
+"""One verdict for each of several materials, on pictures that show all of them as they ended."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..judge.fit_task import FitTask, check_task
 from ..judge.judged_result import judged_result
 from ..judge.model_gap import model_gap
 from ..judge.picture_errors import picture_errors
+from ..pictures.each_picture import SheetJudge
 from ..random_streams import Stream
 from ..result.outcome import FitOutcome
 from .rounds import MOST_ROUNDS, Member, Turns, check_members, show_all, take_turns
@@ -56,7 +58,9 @@ def fit_together(
     noted: bool = False,
     begin: Callable[[], object] = lambda: None,
 ) -> Together:
-    """Recover several materials of one loaded scene from a picture; `noted` and `display` are as of `recover_material`.
+    """Recover several materials from a picture, or a sheet of several, that each scene is loaded for once.
+
+    `noted` and `display` are as of `recover_material`.
 
     Each result has a verdict on its own pixels of a picture with all materials as found, beside one with all as they
     were. A material that looks worse there than before goes back to what it was. `begin` is called when nothing speaks
@@ -120,11 +124,16 @@ def _judged_all(
     fitted = np.any([task.mask for task in tasks], axis=0)
     judged = []
     for task, outcome in zip(tasks, turns.outcomes, strict=True):
-        errors = picture_errors(task.reference, start, end, task.mask, task.counted, task.display)
-        result = replace(outcome.result, errors=errors)
-        judged.append(
-            judged_result(result, task.reference, start, end, task.mask, task.view, noted=noted, others=fitted)[0]
-        )
+        each = None if task.sheet is None else SheetJudge(task, task.sheet, start, end)
+        if each is None:
+            errors = picture_errors(task.reference, start, end, task.mask, task.counted, task.display)
+        else:
+            errors = each.mean_errors
+        result, _ = judged_result(
+            replace(outcome.result, errors=errors), task.reference, start, end, task.mask, task.view, noted=noted,
+            others=fitted, judge_all=None if each is None else partial(each.results, noted=noted, others=fitted),
+        )  # fmt: skip
+        judged.append(result)
     return judged, halves
 
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ...metrics.display.tone_mapping import View
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Interrupted
+from ...render.sheet.recorded_sheet import RecordedSheet
+from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.errors import BadInputError, UnrecordableError
 from ...types.event import Listener
 from ...types.image import Image, Pixels
@@ -43,7 +45,7 @@ class Member:
     """One of the materials: what a user calls it, its renderer and the settings of its fit."""
 
     name: str
-    renderer: MitsubaRenderer
+    renderer: MitsubaRenderer | SheetRenderer
     settings: FitSettings
 
 
@@ -63,7 +65,8 @@ def check_members(members: Sequence[Member], reference: Image) -> None:
     Raises
     ------
     BadInputError
-        If there are too many values, the preset fits one material alone, or the camera does not see one of them.
+        If there are too many values, the preset fits one material alone, the camera does not see one of them, or there
+        are several pictures and one of them lets light through.
     """
     counts = {member.name: member.renderer.table.length for member in members}
     total = sum(counts.values())
@@ -88,6 +91,14 @@ def check_members(members: Sequence[Member], reference: Image) -> None:
             check_reference(reference, member.renderer.target_mask())
         except BadInputError as error:
             raise BadInputError(f"Material '{member.name}': {error}") from error
+        if isinstance(member.renderer, SheetRenderer):
+            try:
+                RecordedSheet(member.renderer, reference.counts)
+            except UnrecordableError as error:
+                raise BadInputError(
+                    f"Material '{member.name}' cannot be fitted to several pictures: {error} Leave it out, or all "
+                    "pictures but one."
+                ) from error
 
 
 def take_turns(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several references of one material as the reference of one contact sheet."""
+"""Several references as the reference of one contact sheet, and the materials' renderers on it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ...metrics.display.colour import luminance
 from ...metrics.display.tone_mapping import DisplayView, View
 from ...metrics.pixels.pixel_check import check_finite
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.sheet.contact_sheet import ContactSheet
 from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.errors import BadInputError
 from ...types.image import Encoding, Image
@@ -27,18 +28,28 @@ _WHITE_LOST = (
 
 @dataclass(frozen=True)
 class SheetTask:
-    """The renderer of a sheet, its reference, the view of its radiance, and sentences on what was done to pictures."""
+    """A sheet's renderer for each material, its reference, the view of its radiance, and what was done to pictures."""
 
-    renderer: SheetRenderer
+    renderers: tuple[SheetRenderer, ...]
     reference: Image
     display: View | None
     notes: tuple[str, ...] = ()
 
+    @property
+    def renderer(self) -> SheetRenderer:
+        """That of the first material, or the only one."""
+        return self.renderers[0]
+
 
 def one_sheet(
-    renderers: Sequence[MitsubaRenderer], references: Sequence[Image], views: Sequence[View], labels: Sequence[str]
+    renderers: Sequence[Sequence[MitsubaRenderer]],
+    references: Sequence[Image],
+    views: Sequence[View],
+    labels: Sequence[str],
 ) -> SheetTask:
     """The task of fitting all pictures together; `labels` are what sentences call them.
+
+    Each picture has a renderer for each of the materials, in one order; some of these it may not show.
 
     Scene-linear pictures count alike, however bright their light is. Display pictures are seen through one view; their
     exposures may differ.
@@ -49,19 +60,20 @@ def one_sheet(
         With the picture's number: if it does not fit to its scene or is seen through another view than the others.
     """
     masks = []
-    for label, reference, renderer in zip(labels, references, renderers, strict=True):
+    for label, reference, here in zip(labels, references, renderers, strict=True):
         try:
-            masks.append(check_reference(reference, renderer.target_mask()))
+            masks.append(check_reference(reference, np.any([r.target_mask() for r in here], axis=0)))
             check_finite(reference.pixels, "The reference")
         except BadInputError as error:
             raise BadInputError(f"Picture {label}: {error}") from error
     if all(reference.encoding is Encoding.LINEAR for reference in references):
         light = [float(luminance(np.maximum(r.pixels, 0.0))[m].mean()) for r, m in zip(references, masks, strict=True)]
         gains = [light[0] / level if level > 0.0 else 1.0 for level in light]
-        renderer = SheetRenderer(renderers, gains, labels)
-        pixels = renderer.sheet.radiance([reference.pixels for reference in references])
-        counts = _counts(renderer, references)
-        return SheetTask(renderer, Image(pixels.astype(np.float32), Encoding.LINEAR, counts=counts), None)
+        of_materials = _of_materials(renderers, gains, labels)
+        sheet = of_materials[0].sheet
+        pixels = sheet.radiance([reference.pixels for reference in references])
+        counts = _counts(sheet, references)
+        return SheetTask(of_materials, Image(pixels.astype(np.float32), Encoding.LINEAR, counts=counts), None)
     of_display = [n for n, reference in enumerate(references) if reference.encoding is Encoding.SRGB]
     display, notes = views[of_display[0]], []
     gains = [_gain(views[n] if n in of_display else display, display, labels[n]) for n in range(len(references))]
@@ -71,17 +83,25 @@ def one_sheet(
             notes.append(_WHITE_LOST.format(label=label))
             reference = replace(reference, pixels=display.display(np.maximum(reference.pixels, 0.0)).astype(np.float32))
         shown.append(reference.pixels)
-    renderer = SheetRenderer(renderers, gains, labels)
-    sheet = Image(renderer.sheet.put(shown), Encoding.SRGB, counts=_counts(renderer, references))
-    return SheetTask(renderer, sheet, display, tuple(notes))
+    of_materials = _of_materials(renderers, gains, labels)
+    sheet = of_materials[0].sheet
+    whole = Image(sheet.put(shown), Encoding.SRGB, counts=_counts(sheet, references))
+    return SheetTask(of_materials, whole, display, tuple(notes))
 
 
-def _counts(renderer: SheetRenderer, references: Sequence[Image]) -> NDArray[np.bool_] | None:
+def _of_materials(
+    renderers: Sequence[Sequence[MitsubaRenderer]], gains: Sequence[float], labels: Sequence[str]
+) -> tuple[SheetRenderer, ...]:
+    """A sheet's renderer for each material, from those of each picture."""
+    return tuple(SheetRenderer(of_one, gains, labels) for of_one in zip(*renderers, strict=True))
+
+
+def _counts(sheet: ContactSheet, references: Sequence[Image]) -> NDArray[np.bool_] | None:
     """What counts on the sheet; None where all of every picture does."""
     if all(reference.counts is None for reference in references):
         return None
     whole = [np.ones((r.height, r.width), np.bool_) if r.counts is None else r.counts for r in references]
-    return renderer.sheet.put(whole)
+    return sheet.put(whole)
 
 
 def _gain(view: View, common: View, label: str) -> float:

@@ -61,7 +61,7 @@ class Request:
     `more_pictures` are further pictures of the same material: the path of each one's own folder, and its request. What
     is fitted and how is said by the first picture's alone. `targets` are the materials that are fitted together, where
     these are several, in the same way: each one's `target`, `graph`, own entry of `materials` and `fit.parameters`
-    count, and the rest is said by the job's own request.
+    count, and the rest is said by the job's own request. Of several pictures each names the same ones, in its folder.
     """
 
     scene: str
@@ -88,9 +88,10 @@ class Request:
     targets: tuple[tuple[str, Request], ...] = ()
 
 
-def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = False) -> Request:
-    """The checked request of a job folder, or of the `inner` one of a further picture; `trusted` is that of
-    `check_scene_files`.
+def read_request(folder: JobFolder, *, trusted: bool = False, inner: str = "") -> Request:
+    """The checked request of a job folder, or of one inside of it, which a list of the key `inner` names.
+
+    `trusted` is that of `check_scene_files`.
 
     Raises
     ------
@@ -107,7 +108,7 @@ def read_request(folder: JobFolder, *, trusted: bool = False, inner: bool = Fals
     request = request_from_json(data)
     more = {
         key: tuple(
-            (path, read_request(_folder_of(folder, path, key), trusted=trusted, inner=True))
+            (path, read_request(_folder_of(folder, path, key), trusted=trusted, inner=key))
             for path in _paths_of_more(data, key, inner=inner)
         )
         for key in _MOST_OF
@@ -177,10 +178,10 @@ def request_from_json(data: Any) -> Request:
     )
 
 
-def _paths_of_more(data: Mapping[str, Any], key: str, *, inner: bool) -> tuple[str, ...]:
-    """The folders of further pictures or materials, relative to the job's."""
+def _paths_of_more(data: Mapping[str, Any], key: str, *, inner: str) -> tuple[str, ...]:
+    """The folders of further pictures or materials, relative to the job's; of a further picture its own materials."""
     paths, (most, what) = CheckedObject(data, WHERE, _KEYS).texts(key, ()), _MOST_OF[key]
-    if inner and paths:
+    if paths and inner and (inner, key) != ("more_pictures", "targets"):
         raise BadInputError(f"{WHERE} of a further {what[:-1]} names {key}: name all in the first one's.")
     count = len(paths) + (key == "more_pictures")  # the first of which is the job's own
     if count > most:
@@ -194,13 +195,8 @@ def _check_targets(request: Request) -> None:
     Raises
     ------
     BadInputError
-        If there are several pictures, too, one is named twice, or their scenes differ.
+        If one is named twice, their scenes differ, or a further picture has other ones.
     """
-    if request.targets and request.more_pictures:
-        raise BadInputError(
-            "Several pictures and several materials are not fitted together: leave all pictures but one out, or all "
-            "materials but one."
-        )
     known: set[str] = set()
     for _, each in request.targets:
         if not {each.target.shape_id, each.target.bsdf_id}.isdisjoint(known):
@@ -209,6 +205,14 @@ def _check_targets(request: Request) -> None:
         known |= {each.target.shape_id, each.target.bsdf_id}
         if (each.width, each.height) != (request.width, request.height):
             raise BadInputError(f"{WHERE}: targets has a picture of another size: all materials share one.")
+    asked = [_ids(each) for _, each in request.targets]
+    for path, more in request.more_pictures:
+        if [_ids(each) for _, each in more.targets] != asked:
+            raise BadInputError(f"{WHERE}: targets of {path} are other materials than the first picture's.")
+
+
+def _ids(request: Request) -> tuple[str, str]:
+    return request.target.shape_id, request.target.bsdf_id
 
 
 def _folder_of(folder: JobFolder, path: str, key: str) -> JobFolder:

@@ -5,21 +5,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...metrics.display.tone_mapping import View
+from ...render.sheet.contact_sheet import ContactSheet
 from ...types.errors import BadInputError
 from ...types.event import Listener
-from ...types.image import Encoding, Image
+from ...types.image import Encoding
 from ...types.parameter_bounds import narrowed
-from ...types.result import FitResult
+from ...types.result import Contradiction, FitResult, PictureResult
 from ...types.status import Status
 from ...types.verdict import Verdict, worst
 from ..folder.job_folder import JobFolder, clear_outputs
 from ..folder.request import Request
 from .job_outcome import JobOutcome
-from .job_scene import graph_notes, load_native_code, named, request_materials
+from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
+from .more_pictures import JobPicture, told_of_first
+
+if TYPE_CHECKING:
+    from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+    from ...render.sheet.sheet_renderer import SheetRenderer
 
 _MODEL = "blender_principled"
 _SAID = {  # of one, of several
@@ -34,16 +41,8 @@ ONE_CLASS = (
 )
 
 
-def fit_materials(
-    folder: JobFolder,
-    request: Request,
-    reference: Image,
-    view: View,
-    *,
-    listener: Listener,
-    should_stop: Callable[[], bool],
-) -> JobOutcome:
-    """Fit the materials of the request's `targets` together; the outcome has one for each of them.
+def fit_materials(pictures: Sequence[JobPicture], *, listener: Listener, should_stop: Callable[[], bool]) -> JobOutcome:
+    """Fit the materials of the first request's `targets` together, to all pictures; the outcome has one for each.
 
     Raises
     ------
@@ -54,45 +53,107 @@ def fit_materials(
     Interrupted
         If it was asked to stop before there was anything to keep.
     """
+    request = pictures[0].request
     if request.fit.model not in ("auto", _MODEL):
         raise BadInputError(f"Several materials are fitted with the model {_MODEL!r} alone: choose that.")
     variant = load_native_code()
     from ...fit.materials.judged_materials import fit_together
     from ...fit.materials.rounds import Member
-    from ...render.pictures.mitsuba_renderer import load_renderers_together
+    from ...fit.pictures.one_sheet import one_sheet
 
-    inner = [(JobFolder.open(folder.root / path), each) for path, each in request.targets]
-    materials = request_materials(folder, request)
-    for place, each in inner:  # what nodes give a material is in its own folder
-        own = request_materials(place, each)
-        if each.target.bsdf_id in own:
-            materials[each.target.bsdf_id] = own[each.target.bsdf_id]
-    renderers = load_renderers_together(
-        folder.root / request.scene,
-        [(each.target.shape_id, each.fit.parameters) for _, each in inner],
-        materials=materials,
-        light_paths=request.light_paths,
-    )
-    members = []
-    for renderer, (_, each) in zip(renderers, inner, strict=True):
-        renderer.table = narrowed(renderer.table, request.fit.bounds)
-        renderer.start = renderer.table.clip(renderer.start)
-        members.append(Member(each.target.material, renderer, replace(request.fit, parameters=each.fit.parameters)))
-    display = view if reference.encoding is Encoding.SRGB else None
+    inner = [(JobFolder.open(pictures[0].folder.root / path), each) for path, each in request.targets]
+    renderers = _load(pictures)
+    shown, display, notes = pictures[0].reference, pictures[0].view, ()
+    of_materials: Sequence[MitsubaRenderer | SheetRenderer] = renderers[0]
+    sheet = None
+    if len(pictures) > 1:
+        task = one_sheet(renderers, *zip(*((p.reference, p.view, p.label) for p in pictures), strict=True))
+        shown, display, notes, of_materials = task.reference, task.display or display, task.notes, task.renderers
+        sheet = of_materials[0].sheet
+        listener = partial(told_of_first, listener, sheet)
+    members = [
+        Member(each.target.material, renderer, replace(request.fit, parameters=each.fit.parameters))
+        for renderer, (_, each) in zip(of_materials, inner, strict=True)
+    ]
     together = fit_together(
-        members, reference, display=display, listener=listener, should_stop=should_stop, noted=bool(request.left_out),
+        members, shown, display=display if shown.encoding is Encoding.SRGB else None, listener=listener,
+        should_stop=should_stop, noted=any(p.request.left_out for p in pictures),
         begin=lambda: [clear_outputs(place) for place, _ in inner],
     )  # fmt: skip
     found = []
     for (_, each), outcome in zip(inner, together.outcomes, strict=True):
         result = outcome.result
         alone = () if result.judgement is None or result.judgement.verdict is Verdict.SAME else (ONE_CLASS,)
-        result = replace(result, notes=(*result.notes, *graph_notes(each, result), *alone), **named(each))
-        found.append(JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant))
+        result = replace(result, notes=(*notes, *result.notes, *graph_notes(each, result), *alone), **named(each))
+        found.append(JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant, sheet))
     whole = _whole([(each.target.material, one.result) for (_, each), one in zip(inner, found, strict=True)],
                    [int(one.counted.sum()) for one in found])  # fmt: skip
+    whole = replace(whole, pictures=_each_picture(found, sheet), contradiction=_contradiction(request, found))
+    if whole.contradiction is not None:
+        whole = replace(whole, message=f"{whole.message} {whole.contradiction.sentence}")
     counted = np.any([one.counted for one in found], axis=0)
-    return JobOutcome(whole, found[0].start_image, found[0].result_image, counted, variant, materials=tuple(found))
+    return JobOutcome(whole, found[0].start_image, found[0].result_image, counted, variant, sheet, tuple(found))
+
+
+def _load(pictures: Sequence[JobPicture]) -> list[list[MitsubaRenderer]]:
+    """Each picture's renderers of all materials; values are those of the first, nodes as each camera sees them."""
+    from ...render.pictures.mitsuba_renderer import load_renderers_together
+
+    firsts: dict[str, Any] = {}
+    found = []
+    for picture in pictures:
+        request = picture.request
+        materials = request_materials(picture.folder, request)
+        for path, each in request.targets:  # what nodes give a material is in its own folder
+            bsdf = each.target.bsdf_id
+            own = request_materials(JobFolder.open(picture.folder.root / path), each)
+            if bsdf in own:
+                materials[bsdf] = of_one_material(firsts.get(bsdf), own[bsdf])
+                firsts.setdefault(bsdf, own[bsdf])
+        parameters = [each.fit.parameters for _, each in pictures[0].request.targets]
+        renderers = load_renderers_together(
+            picture.folder.root / request.scene,
+            [(each.target.shape_id, free) for (_, each), free in zip(request.targets, parameters, strict=True)],
+            materials=materials,
+            light_paths=request.light_paths,
+        )
+        for renderer in renderers:
+            renderer.table = narrowed(renderer.table, pictures[0].request.fit.bounds)
+            renderer.start = renderer.table.clip(renderer.start)
+        found.append(renderers)
+    return found
+
+
+def _each_picture(found: Sequence[JobOutcome], sheet: ContactSheet | None) -> tuple[PictureResult, ...]:
+    """What all materials are in each picture: mean errors over their pixels there, and the worst verdict."""
+    results = []
+    for number, label in enumerate(() if sheet is None else sheet.labels):
+        own = [(one, each) for one in found for each in one.result.pictures if each.label == label]
+        if not own:  # the fit was stopped before there was one
+            return ()
+        assert sheet is not None
+        pixels = [int(sheet.cut(one.counted, number).sum()) for one, _ in own]
+        errors = {
+            name: tuple(float(np.average([each.errors[name][k] for _, each in own], weights=pixels)) for k in (0, 1))
+            for name in own[0][1].errors
+        }
+        results.append(PictureResult(label, errors, worst(each.judgement for _, each in own)))  # type: ignore[arg-type]
+    return tuple(results)
+
+
+def _contradiction(request: Request, found: Sequence[JobOutcome]) -> Contradiction | None:
+    """The pictures that do not go with the others as most of the pixels say whose materials name some."""
+    named: dict[tuple[str, ...], list[int]] = {}
+    for number, one in enumerate(found):
+        if one.result.contradiction is not None:
+            named.setdefault(one.result.contradiction.pictures, []).append(number)
+    if not named:
+        return None
+    of = max(named.values(), key=lambda numbers: sum(int(found[n].counted.sum()) for n in numbers))
+    said = found[of[0]].result.contradiction
+    assert said is not None
+    names = ", ".join(request.targets[number][1].target.material for number in of)
+    return replace(said, sentence=f"{names}: {said.sentence}")
 
 
 def _whole(results: Sequence[tuple[str, FitResult]], pixels: Sequence[int]) -> FitResult:

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...metrics.display.tone_mapping import View
 from ...render.models.graph_pictures import GraphPictures
-from ...render.sheet.contact_sheet import ContactSheet
 from ...types.errors import BadInputError
-from ...types.event import Event, Listener, Preview
+from ...types.event import Listener
 from ...types.image import Image
 from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
@@ -25,7 +24,7 @@ from .class_trials import Fitted, with_other_classes, with_plainer_glow
 from .fit_materials import fit_materials
 from .graph_blender import evaluated_graph
 from .job_outcome import JobOutcome
-from .job_scene import graph_notes, load_native_code, named, request_materials
+from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
 from .material_classes import (
     MaterialClass,
     brightest_glow,
@@ -35,7 +34,7 @@ from .material_classes import (
     other_classes,
     parameters_of,
 )
-from .more_pictures import JobPicture
+from .more_pictures import JobPicture, told_of_first
 
 if TYPE_CHECKING:
     from ...fit.pictures.one_sheet import SheetTask
@@ -97,9 +96,9 @@ def fit_scene(
     Interrupted
         If it was asked to stop before there was anything to keep.
     """
-    if request.targets:
-        return fit_materials(folder, request, reference, view, listener=listener, should_stop=should_stop)
     pictures = (JobPicture(folder, request, reference, view), *more)
+    if request.targets:
+        return fit_materials(pictures, listener=listener, should_stop=should_stop)
     with evaluated_graph(folder, request, () if more else blender) as (graph, notes):
         variant = load_native_code()
         job = _OneMaterial(pictures, _materials_of(pictures), graph, listener, should_stop)
@@ -181,7 +180,8 @@ class _OneMaterial:
         if len(renderers) == 1:
             return None
         of = self.pictures
-        return one_sheet(renderers, [p.reference for p in of], [p.view for p in of], [p.label for p in of])
+        each = [[renderer] for renderer in renderers]
+        return one_sheet(each, [p.reference for p in of], [p.view for p in of], [p.label for p in of])
 
     def fit(self, renderers: Sequence[MitsubaRenderer], *, nearer_than: float | None = None) -> Fitted:
         """The fit from the renderers' material; one that has to come `nearer_than` another is no hand-over to `paper`.
@@ -210,7 +210,7 @@ class _OneMaterial:
         heard, shown, display = self.listener, self.pictures[0].reference, self.pictures[0].view
         if together is not None:
             shown, display = together.reference, together.display or display
-            heard = partial(_of_first, heard, together.renderer.sheet)
+            heard = partial(told_of_first, heard, together.renderer.sheet)
         outcome = recover_material(
             renderer, shown, self.request.fit, display=display, listener=heard, should_stop=self.should_stop,
             hand_over=nearer_than is None, noted=any(p.request.left_out for p in self.pictures),
@@ -268,19 +268,6 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
 def with_notes(result: FitResult, notes: Sequence[str]) -> FitResult:
     """The result with further sentences."""
     return replace(result, notes=(*result.notes, *notes)) if notes else result
-
-
-def _of_first(listener: Listener, sheet: ContactSheet, event: Event) -> None:
-    """Tell an event; of a sheet's picture the first of its pictures."""
-    listener(Preview(sheet.picture(event.image, 0)) if isinstance(event, Preview) else event)
-
-
-def of_one_material(first: dict[str, Any] | None, here: dict[str, Any]) -> dict[str, Any]:
-    """The target's material of the first picture, with what nodes give it as this one's camera sees it."""
-    if first is None:
-        return here
-    own = {name: socket for name, socket in here["sockets"].items() if socket.get("graph") or socket.get("texture")}
-    return first | {"sockets": first["sockets"] | own, "weight": here["weight"], "leaves": here["leaves"]}
 
 
 def load_everything() -> None:

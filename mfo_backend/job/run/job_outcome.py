@@ -27,7 +27,8 @@ class JobOutcome:
     """The result of a fit, its pictures at start and end (scene-linear) and the Mitsuba variant that made them.
 
     Errors are those of the `counted` pixels, True (height, width). With a `sheet` all of them are over that. Of several
-    `materials` each has an outcome of its own, and this one says what holds of all.
+    `materials` each has an outcome of its own, and this one says what holds of all. `only` are the pictures that show a
+    material, where not all of a sheet do.
     """
 
     result: FitResult
@@ -37,10 +38,13 @@ class JobOutcome:
     variant: str = ""
     sheet: ContactSheet | None = None
     materials: tuple[JobOutcome, ...] = ()
+    only: tuple[SeenPicture, ...] = ()
 
     @property
     def seen(self) -> tuple[SeenPicture, ...]:
         """What the fit has made of each of its pictures."""
+        if self.only:
+            return self.only
         sheet = self.sheet
         if sheet is None:
             return (SeenPicture(self.start_image, self.result_image, self.counted),)

@@ -73,3 +73,11 @@ def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str
             for name, socket in (*leaf["sockets"].items(), ("weight", leaf["weight"])):
                 locate_files(folder, request.graph, name, socket)
     return materials
+
+
+def of_one_material(first: dict[str, Any] | None, here: dict[str, Any]) -> dict[str, Any]:
+    """The target's material of the first picture, with what nodes give it as this one's camera sees it."""
+    if first is None:
+        return here
+    own = {name: socket for name, socket in here["sockets"].items() if socket.get("graph") or socket.get("texture")}
+    return first | {"sockets": first["sockets"] | own, "weight": here["weight"], "leaves": here["leaves"]}

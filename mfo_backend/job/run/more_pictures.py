@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...metrics.display.tone_mapping import View
+from ...render.sheet.contact_sheet import ContactSheet
 from ...types.errors import BadInputError
+from ...types.event import Event, Listener, Preview
 from ...types.image import Image
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request
@@ -67,6 +69,11 @@ def without_repeats(pictures: Sequence[JobPicture]) -> tuple[list[JobPicture], l
     if len(kept) == 1 and len(pictures) > 1:
         raise BadInputError("All pictures are the same one in the same scene: give one, or pictures that differ.")
     return kept, notes
+
+
+def told_of_first(listener: Listener, sheet: ContactSheet, event: Event) -> None:
+    """Tell an event; of a sheet's picture the first of its pictures."""
+    listener(Preview(sheet.picture(event.image, 0)) if isinstance(event, Preview) else event)
 
 
 def _scene(picture: JobPicture) -> bytes:

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
 
 from ...fit.judge.region import fill_outside
 from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside
@@ -25,8 +28,8 @@ from .job_outcome import JobOutcome, SeenPicture
 from .more_pictures import JobPicture
 
 
-def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes: Sequence[str]) -> None:
-    """Write pictures, report and result.json; the last appears by rename when the others are complete.
+def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes: Sequence[str]) -> dict[str, Any]:
+    """Write pictures, report and result.json, whose content is returned; it appears when the others are complete.
 
     `pictures` are those of the job, the first with the folder of the report and the result; each one's own are written
     into its folder.
@@ -40,9 +43,10 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
     """
     first = pictures[0]
     folder, request = first.folder, first.request
-    places = [(JobFolder.open(folder.root / path), each) for path, each in request.targets]
-    for (place, each), own in zip(places, outcome.materials, strict=True):
-        write_outputs([JobPicture(place, each, first.reference, first.view)], own, notes=notes)
+    inner = [
+        write_outputs(*_of_material(pictures, JobFolder.open(folder.root / path), each, own), notes=notes)
+        for (path, each), own in zip(request.targets, outcome.materials, strict=True)
+    ]
     shown = [_write_pictures(picture, seen) for picture, seen in zip(pictures, outcome.seen, strict=False)]
     curve = curve_png(outcome.result.stages)
     if curve is not None:
@@ -66,19 +70,46 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
     content = result_to_json(outcome.result, notes=notes, variant=outcome.variant)
     if outcome.result.pictures:
         content["pictures"] = [
-            {**asdict(p.request.picture), "folder": p.folder.root.relative_to(folder.root).as_posix(), **found}
+            {**asdict(p.request.picture), "folder": _path(p.folder, folder), **found}
             for p, found in zip(pictures, content["pictures"], strict=True)
         ]
     if outcome.materials:
         content["verdict_sentence"] = outcome.result.message
         content["materials"] = [
             {"object": each.target.object, "material": each.target.material, "slot": each.target.slot, "folder": path,
-             **result_to_json(own.result, variant=outcome.variant)}
-            for (path, each), own in zip(request.targets, outcome.materials, strict=True)
+             **result_to_json(own.result, variant=outcome.variant), **_pictures_from(path, found)}
+            for (path, each), own, found in zip(request.targets, outcome.materials, inner, strict=True)
         ]  # fmt: skip
     write_result(folder, content)
     for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
         (folder.root / path).unlink(missing_ok=True)
+    return content
+
+
+def _pictures_from(path: str, content: dict[str, Any]) -> dict[str, Any]:
+    """The list of pictures of a material's result, with folders as they are seen from the job's own."""
+    listed = content.get("pictures", ())
+    found = [{**one, "folder": os.path.normpath(f"{path}/{one['folder']}").replace(os.sep, "/")} for one in listed]
+    return {"pictures": found} if found else {}
+
+
+def _path(inner: JobFolder, outer: JobFolder) -> str:
+    return Path(os.path.relpath(inner.root, outer.root)).as_posix()
+
+
+def _of_material(
+    pictures: Sequence[JobPicture], place: JobFolder, request: Request, outcome: JobOutcome
+) -> tuple[list[JobPicture], JobOutcome]:
+    """The pictures that show one of several materials, the first of them in its own folder, and its outcome there."""
+    sheet = outcome.sheet
+    if sheet is None:
+        return [JobPicture(place, request, pictures[0].reference, pictures[0].view)], outcome
+    judged = [picture.label for picture in outcome.result.pictures]
+    showing = [number for number, label in enumerate(sheet.labels) if label in judged] or [0]
+    first, *others = (pictures[number] for number in showing)
+    own = replace(request, picture=first.request.picture, width=first.request.width, height=first.request.height)
+    seen = tuple(outcome.seen[number] for number in showing)
+    return [JobPicture(place, own, first.reference, first.view), *others], replace(outcome, only=seen)
 
 
 def _write_pictures(picture: JobPicture, seen: SeenPicture) -> dict[str, bytes]:

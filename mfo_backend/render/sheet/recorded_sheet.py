@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types.errors import BadInputError, UnrecordableError
+from ...types.image import Pixels
 from ..models.prepared_material import EMISSION
 from ..paths.recorded_image import RecordedImage
 from ..paths.recorded_paths import LaneGroups, RecordedPaths
@@ -31,7 +32,8 @@ _SCENES_APART = 0x9E3779B1  # between the seeds of two pictures' recordings
 class RecordedSheet:
     """What `RecordedScene` is for one picture, for all pictures of a sheet; `counts` is over its pixels.
 
-    All of them together have the lanes and the rays of one, so they take about the time and the memory of one.
+    Pictures that do not show the target say nothing of it, and are left out. All of them together have the lanes and
+    the rays of one, so they take about the time and the memory of one.
 
     Raises
     ------
@@ -47,9 +49,11 @@ class RecordedSheet:
         parts = [None if counts is None else renderer.sheet.cut(counts, number) for number in range(count)]
         masks = [r.target_mask() for r in renderer.renderers]
         covered = [int((m if of is None else m & of).sum()) for m, of in zip(masks, parts, strict=True)]
-        self._parts = [count / sum(covered) for count in covered]
+        self._numbers = [number for number, pixels in enumerate(covered) if pixels]  # of the pictures that show it
+        self._parts = [covered[number] / sum(covered) for number in self._numbers]
         self._scenes = [
-            RecordedScene(*each) for each in zip(renderer.renderers, covered, self._parts, parts, strict=True)
+            RecordedScene(renderer.renderers[number], covered[number], part, parts[number])
+            for number, part in zip(self._numbers, self._parts, strict=True)
         ]
         if any(scene.varies for scene in self._scenes):
             raise UnrecordableError("Values inside of a node graph are fitted to one picture.")
@@ -57,7 +61,7 @@ class RecordedSheet:
 
     @property
     def first(self) -> RecordedScene:
-        """That of the first picture."""
+        """That of the first picture that shows the target."""
         return self._scenes[0]
 
     @property
@@ -84,8 +88,8 @@ class RecordedSheet:
         enough: float = MOST_LANES,
     ) -> RecordedPaths:
         """See `RecordedScene.record`; `grid` is over the sheet, `enough` lanes are those of all pictures."""
-        parts = []
-        for number, (scene, part) in enumerate(zip(self._scenes, self._parts, strict=True)):
+        parts = {}
+        for number, scene, part in zip(self._numbers, self._scenes, self._parts, strict=True):
             own = grid if isinstance(grid, int) else self.renderer.sheet.cut(grid, number)
             try:
                 recorded = scene.record(
@@ -94,14 +98,14 @@ class RecordedSheet:
                 )  # fmt: skip
             except BadInputError as error:
                 raise BadInputError(f"Picture {self.renderer.sheet.labels[number]}: {error}") from error
-            parts.append(self._of_first(recorded, number))
+            parts[number] = self._of_first(recorded, number)
         return joined(parts, self.renderer.sheet)
 
     def _of_first(self, paths: RecordedPaths, number: int) -> RecordedPaths:
         """A recording whose free emission is that of the first picture, as the exposure of films may differ."""
         if paths.own_emission is None:
             return paths
-        own, first = (r.factors[EMISSION] for r in (self.renderer.renderers[number], self.renderer.renderers[0]))
+        own, first = (r.factors[EMISSION] for r in (self.renderer.renderers[number], self.first.renderer))
         return replace(paths, own_emission=paths.own_emission * np.float32(own / first))
 
     def finest_grid(self, samples: int, lanes: float) -> int:
@@ -119,11 +123,12 @@ class RecordedSheet:
         return self._scenes[0].evaluator(paths, groups, recalled)
 
 
-def joined(parts: Sequence[RecordedPaths], sheet: ContactSheet) -> RecordedPaths:
-    """The recording of a sheet from those of its pictures.
+def joined(recorded: Mapping[int, RecordedPaths], sheet: ContactSheet) -> RecordedPaths:
+    """The recording of a sheet from those of its pictures by number, some of which may have none.
 
     A sample's lanes follow each other, picture by picture, as those of one picture do.
     """
+    parts = list(recorded.values())
     begins, ranges, total = [], [], 0
     for sample in range(len(parts[0].first)):
         at, row = [], []
@@ -134,22 +139,28 @@ def joined(parts: Sequence[RecordedPaths], sheet: ContactSheet) -> RecordedPaths
             ranges.append((number, int(first[0]), int(first[-1]) - int(first[0]), total))
             total += int(first[-1]) - int(first[0])
         begins.append(np.concatenate([*row, [total]]))
-    weights = (paths.weight * dr.opaque(mi.Float, gain) for paths, gain in zip(parts, sheet.gains, strict=True))
-    glows = [paths.own_emission for paths in parts if paths.own_emission is not None]
+    weights = (paths.weight * dr.opaque(mi.Float, sheet.gains[number]) for number, paths in recorded.items())
+    glows = {n: paths.own_emission for n, paths in recorded.items() if paths.own_emission is not None}
     merge = partial(_merged, ranges=ranges, total=total)
     tiles = np.cumsum([0, *(int(paths.tile.max(initial=-1)) + 1 for paths in parts)])
     return RecordedPaths(
         wi=merge([paths.wi for paths in parts]),
         wo=merge([paths.wo for paths in parts]),
         weight=merge(list(weights)),
-        pixel=np.concatenate([sheet.on_sheet(paths.pixel, number) for number, paths in enumerate(parts)]),
+        pixel=np.concatenate([sheet.on_sheet(paths.pixel, number) for number, paths in recorded.items()]),
         tile=np.concatenate([paths.tile + begin for paths, begin in zip(parts, tiles[:-1], strict=True)]),
         first=np.stack(begins),
         coverage=np.concatenate([paths.coverage for paths in parts]),
-        constant=sheet.radiance([paths.constant for paths in parts]),
-        own_emission=sheet.radiance(glows) if glows else None,
+        constant=_on_sheet({number: paths.constant for number, paths in recorded.items()}, sheet),
+        own_emission=_on_sheet(glows, sheet) if glows else None,
         held={name: merge([paths.held[name] for paths in parts]) for name in parts[0].held},
     )
+
+
+def _on_sheet(pictures: Mapping[int, Pixels], sheet: ContactSheet) -> Pixels:
+    """Pictures of radiance by number, black where there is none."""
+    black = (np.zeros((*size, 3), np.float32) for size in sheet.sizes)
+    return sheet.radiance([pictures.get(number, nothing) for number, nothing in enumerate(black)])
 
 
 def _merged(arrays: Sequence[Any], ranges: Sequence[tuple[int, int, int, int]], total: int) -> Any:

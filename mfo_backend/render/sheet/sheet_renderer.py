@@ -48,6 +48,11 @@ class SheetRenderer:
         """See `Renderer.passes`."""
         return self.counter.count
 
+    def show(self, vector: Vector) -> None:
+        """See `MitsubaRenderer.show`; in every picture."""
+        for renderer in self.renderers:
+            renderer.show(vector)
+
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`."""
         return self.sheet.radiance(

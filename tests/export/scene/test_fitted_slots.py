@@ -13,7 +13,10 @@ import pytest
 
 from blender_addon.export.findings import ExportError
 from blender_addon.export.fitted_slot import FittedSlot
+from blender_addon.export.reference.picture_setup import PictureSetup
 from blender_addon.export.scene.seen_slots import seen_slots
+from mfo_backend.job.folder.job_folder import JobFolder
+from mfo_backend.job.folder.request import read_request
 from tests.export.scenes import add_camera, add_light, add_quad, new_material
 
 
@@ -83,10 +86,22 @@ def test_what_is_wrong_is_said_before_anything_is_written(room: dict[str, Any], 
     assert not (tmp_path / "job").exists()
 
 
-def test_several_pictures_and_several_materials_are_not_fitted_together(room: dict[str, Any], export: Any) -> None:
-    from blender_addon.export.reference.picture_setup import PictureSetup
-
-    pictures = [PictureSetup(bpy.data.images.new(str(n), 32, 32), n) for n in (1, 2)]
+def test_each_picture_has_all_materials(room: dict[str, Any], export: Any) -> None:
+    for number, level in ((1, 0.5), (2, 0.4)):
+        image = bpy.data.images.new(str(number), 32, 32, float_buffer=True)
+        image.pixels[:] = [level, level, level, 1.0] * 32**2
+    side = add_camera(ortho_scale=3.0)
+    side.name = "Side"
+    pictures = [PictureSetup(bpy.data.images["1"], 1), PictureSetup(bpy.data.images["2"], 2, camera="Side")]
     slots = [FittedSlot(room["Floor"], 0), FittedSlot(room["Table"], 0)]
-    with pytest.raises(ExportError, match="Several pictures and several materials are not fitted together"):
-        export(room["Floor"], targets=slots, reference=pictures)
+    report = export(room["Floor"], targets=slots, reference=pictures)
+    assert (report.request["more_pictures"], report.request["targets"]) == (
+        ["more_pictures/2"],
+        ["targets/1", "targets/2"],
+    )
+    request = read_request(JobFolder.open(report.folder))
+    ((path, more),) = request.more_pictures
+    assert [each.target for _, each in more.targets] == [each.target for _, each in request.targets]
+    assert more.picture.camera == "Side"
+    mesh = report.folder / "meshes" / "target_2.ply"
+    assert mesh.samefile(report.folder / path / "targets" / "2" / "meshes" / "target_2.ply")

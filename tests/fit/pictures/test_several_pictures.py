@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.materials.rounds import Member, check_members
 from mfo_backend.fit.pictures.one_sheet import one_sheet
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
@@ -23,6 +24,11 @@ LABELS = ["1 (a.exr)", "2 (b.exr)", "3 (c.exr)", "4 (d.exr)"]
 FAST = FitSettings(preset="fast", verify_spp=16)
 
 
+def one_sheet_of(renderers, references, views, labels):
+    """The sheet of one material."""
+    return one_sheet([[renderer] for renderer in renderers], references, views, labels)
+
+
 def fitted(renderer, reference, display=None, settings=FAST):
     return recover_material(
         renderer, reference, settings, display=display, listener=lambda event: None, should_stop=lambda: False
@@ -33,7 +39,7 @@ def test_dim_pictures_count_as_much_as_bright_ones(tmp_path):
     dim = POINT.replace("40, 36, 30", "4, 3.6, 3")
     renderers = views(tmp_path, [POINT, dim], [24, 24])
     references = pictures_of(renderers, VALUES)
-    task = one_sheet(renderers, references, [DisplayView()] * 2, LABELS[:2])
+    task = one_sheet_of(renderers, references, [DisplayView()] * 2, LABELS[:2])
     sheet, mask = task.renderer.sheet, task.renderer.target_mask()
     levels = [
         mean_light(
@@ -53,7 +59,7 @@ def test_four_pictures_cost_less_than_twice_one_and_make_values_surer(tmp_path):
     alone = fitted(renderers[0], references[0]).result
     for renderer in renderers:
         renderer.counter.count = 0.0
-    task = one_sheet(renderers, references, [DisplayView()] * 4, LABELS)
+    task = one_sheet_of(renderers, references, [DisplayView()] * 4, LABELS)
     together = fitted(task.renderer, task.reference)
     found = together.result
     # a pass is one picture's render, whatever the machine: 149 and 251 when this was written
@@ -74,7 +80,7 @@ def test_display_pictures_of_other_exposures_are_fitted_together(tmp_path):
         Image(view.display(picture.pixels), Encoding.SRGB)
         for view, picture in zip(shown, pictures_of(renderers, VALUES), strict=True)
     ]
-    task = one_sheet(renderers, references, shown, LABELS[:2])
+    task = one_sheet_of(renderers, references, shown, LABELS[:2])
     assert task.renderer.sheet.gains == pytest.approx((1.0, 2.0**1.5))
     found = fitted(task.renderer, task.reference, task.display).result
     assert found.recovered["roughness"] == pytest.approx(VALUES["roughness"], abs=0.02)
@@ -85,7 +91,7 @@ def test_one_linear_picture_among_display_pictures_is_shown_through_their_view_a
     renderers = views(tmp_path, [POINT, POINT], [16, 16])
     view, (first, second) = DisplayView(-1.0), pictures_of(renderers, VALUES)
     of_display = Image(view.display(second.pixels), Encoding.SRGB)
-    task = one_sheet(renderers, [first, of_display], [DisplayView(3.0), view], LABELS[:2])
+    task = one_sheet_of(renderers, [first, of_display], [DisplayView(3.0), view], LABELS[:2])
     assert task.display == view
     assert len(task.notes) == 1
     assert LABELS[0] in task.notes[0]
@@ -97,20 +103,29 @@ def test_what_cannot_be_fitted_together_is_refused_with_the_pictures_name(tmp_pa
     first, second = pictures_of(renderers, VALUES, spp=4)
     wrong_size = Image(second.pixels[:8], Encoding.LINEAR)
     with pytest.raises(BadInputError, match=r"^Picture 2 \(b.exr\): Reference is 16x8 but the scene renders 16x16"):
-        one_sheet(renderers, [first, wrong_size], [DisplayView()] * 2, LABELS[:2])
+        one_sheet_of(renderers, [first, wrong_size], [DisplayView()] * 2, LABELS[:2])
     shown = [Image(DisplayView().display(p.pixels), Encoding.SRGB) for p in (first, second)]
     with pytest.raises(BadInputError, match=r"^Picture 2 \(b.exr\) was made under another view transform"):
-        one_sheet(renderers, shown, [DisplayView(), DisplayView(gamma=2.0)], LABELS[:2])
+        one_sheet_of(renderers, shown, [DisplayView(), DisplayView(gamma=2.0)], LABELS[:2])
 
 
 def test_glass_is_not_fitted_to_several_pictures_and_it_says_what_to_do(tmp_path):
     names = ["roughness", "spec_trans"]
     renderers = views(tmp_path, [POINT, POINT], [12, 12], names)
     references = pictures_of(renderers, {"roughness": 0.3, "spec_trans": 0.9}, spp=4)
-    task = one_sheet(renderers, references, [DisplayView()] * 2, LABELS[:2])
+    task = one_sheet_of(renderers, references, [DisplayView()] * 2, LABELS[:2])
     with pytest.raises(UnrecordableError, match="leave out all pictures but one, or choose the preset 'paper'"):
         fitted(task.renderer, task.reference)
     assert fitted(task.renderer, task.reference, settings=replace(FAST, preset="paper", max_iterations=1, spp=1))
+
+
+def test_glass_among_several_materials_is_refused_before_the_fit_of_several_pictures(tmp_path):
+    names = ["roughness", "spec_trans"]
+    renderers = views(tmp_path, [POINT, POINT], [12, 12], names)
+    references = pictures_of(renderers, {"roughness": 0.3, "spec_trans": 0.9}, spp=4)
+    task = one_sheet_of(renderers, references, [DisplayView()] * 2, LABELS[:2])
+    with pytest.raises(BadInputError, match=r"^Material 'Pane' cannot be fitted to several pictures: .* Leave it out"):
+        check_members([Member("Pane", task.renderer, FAST)], task.reference)
 
 
 def test_a_picture_whose_lamp_had_moved_is_named_and_no_other(tmp_path):
@@ -119,13 +134,13 @@ def test_a_picture_whose_lamp_had_moved_is_named_and_no_other(tmp_path):
     moved = POINT.replace('x="2" y="-3" z="3"', 'x="-2.5" y="-2" z="3"')
     others = views(tmp_path / "moved", [POINT + FLOOR, moved + FLOOR, POINT + FLOOR], [32, 32, 32])
     references = pictures_of(others, VALUES)
-    task = one_sheet(renderers, references, [DisplayView()] * 3, LABELS[:3])
+    task = one_sheet_of(renderers, references, [DisplayView()] * 3, LABELS[:3])
     found = fitted(task.renderer, task.reference).result
     assert found.contradiction is not None
     assert found.contradiction.pictures == (LABELS[1],)
     assert "Picture 2 (b.exr) does not go with the rest: its light or camera differs" in found.message
     assert found.status.exit_code != 0
-    task = one_sheet(renderers, pictures_of(renderers, VALUES), [DisplayView()] * 3, LABELS[:3])
+    task = one_sheet_of(renderers, pictures_of(renderers, VALUES), [DisplayView()] * 3, LABELS[:3])
     assert fitted(task.renderer, task.reference).result.contradiction is None
 
 
@@ -143,7 +158,7 @@ def test_the_proposed_picture_is_as_good_as_it_was_said(tmp_path):
     turn = np.radians(proposal.turn)
     place = f"{4.0 * np.sin(turn):.5f}, {-4.0 * np.cos(turn):.5f}, 1"
     both = views(tmp_path / "two", [AREA, AREA], [40, 40], names, places=(FROM[0], place))
-    task = one_sheet(both, pictures_of(both, values, spp=256), [DisplayView()] * 2, LABELS[:2])
+    task = one_sheet_of(both, pictures_of(both, values, spp=256), [DisplayView()] * 2, LABELS[:2])
     together = fitted(task.renderer, task.reference, settings=settings).result
     assert proposal.predicted
     for name, deviation in proposal.predicted.items():

@@ -63,7 +63,7 @@ def test_each_material_is_a_whole_job_of_its_own(two: Path) -> None:
         ({"targets": ["../elsewhere"]}, "leaves the job folder"),
         ({"targets": ["targets/1", "targets/1"]}, "targets name the material 'Glaze' twice: name it once"),
         ({"targets": ["targets/1"] * (MOST_TARGETS + 1)}, f"names {MOST_TARGETS + 1} materials: at most"),
-        ({"more_pictures": ["targets/2"]}, "Several pictures and several materials are not fitted together"),
+        ({"more_pictures": ["targets/2"]}, "targets of targets/2 are other materials than the first picture's"),
     ],
 )
 def test_wrong_lists_are_refused(two: Path, keys: dict[str, object], sentence: str) -> None:
