@@ -52,7 +52,7 @@ def contradiction(
 
     shown = np.unique(numbers)
     if len(shown) < len(labels):  # the others show nothing of the material
-        labels, numbers = [labels[number] for number in shown], np.searchsorted(shown, numbers)
+        labels, numbers = [labels[int(number)] for number in shown], np.searchsorted(shown, numbers)
     if len(labels) < 2:
         return None
     together = squares(x)
