@@ -15,6 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..export.audit.scene_table import BY_SIMPLIFY
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for
 from ..versions import node_tree_of
@@ -38,7 +39,7 @@ ATTRIBUTE_VALUES = ("value", "vector", "color")  # names of what an attribute's 
 
 
 class _NoKeyError(Exception):
-    """Something that a bake may hang on cannot be hashed."""
+    """Something that a bake may hang on cannot be hashed; nobody is told, as the bake is only made again."""
 
 
 def world_key(scene: bpy.types.Scene, width: int) -> str | None:
@@ -61,7 +62,7 @@ def surface_key(
         tree = node_tree_of(material)
         key.owner(material, tree)
         if item.original.vertex_groups and _has(tree, "ShaderNodeAttribute"):
-            raise _NoKeyError("vertex groups")
+            raise _NoKeyError
         key.put(material.displacement_method, [list(row) for row in instance.matrix_world])
         data = item.original.data
         if hasattr(data, "texspace_location"):
@@ -84,6 +85,8 @@ class _Key:
         space = getattr(getattr(bpy.data, "colorspace", None), "working_space", "")
         self.put(kind, asked, bpy.app.version_string, bpy.app.build_hash, _code(), space, os.environ.get("OCIO", ""))
         self.put(scene.cycles.shading_system)
+        if scene.render.use_simplify:  # Cycles then reads textures smaller
+            self.put([getattr(scene.cycles, name, None) for name in sorted(BY_SIMPLIFY)])
 
     def of(self, put: Any) -> str | None:
         """The key once `put` has fed it, None where that is not possible."""
@@ -100,15 +103,15 @@ class _Key:
     def owner(self, owner: Any, tree: bpy.types.NodeTree) -> None:
         """A material or a world with its nodes."""
         if owner.animation_data is not None:
-            raise _NoKeyError("animation")
+            raise _NoKeyError
         if asked_for(tree, OF_VIEW) or asked_for(tree, OF_SURROUNDINGS):
-            raise _NoKeyError("asks for the view or what is around")
+            raise _NoKeyError
         self.struct(owner.cycles)
         self.tree(tree)
 
     def tree(self, tree: bpy.types.NodeTree) -> None:
         if tree.animation_data is not None:
-            raise _NoKeyError("animation")
+            raise _NoKeyError
         pointer = tree.as_pointer()
         if pointer in self._trees:
             self.put("tree", self._trees.index(pointer))
@@ -117,9 +120,9 @@ class _Key:
         numbers = {node.name: number for number, node in enumerate(tree.nodes)}
         for node in tree.nodes:
             if node.bl_idname in NO_KEY or getattr(node, "attribute_type", "GEOMETRY") != "GEOMETRY":
-                raise _NoKeyError(node.bl_idname)
+                raise _NoKeyError
             if "CAMERA" in (getattr(node, "convert_from", ""), getattr(node, "convert_to", "")):
-                raise _NoKeyError("asks for the camera's space")
+                raise _NoKeyError
             self.put("node", node.bl_idname, node.mute)
             self.struct(node, numbers)
         for link in tree.links:
@@ -150,7 +153,7 @@ class _Key:
         elif isinstance(value, bpy.types.NodeTree):
             self.tree(value)
         elif isinstance(value, bpy.types.ID):
-            raise _NoKeyError(f"{value.name_full} of another kind")
+            raise _NoKeyError
         elif isinstance(value, bpy.types.Node):
             self.put((numbers or {}).get(value.name))
         elif value is None:
@@ -160,7 +163,7 @@ class _Key:
 
     def _image(self, image: bpy.types.Image) -> None:
         if image.source not in ("FILE", "GENERATED") or image.type not in ("IMAGE", "UV_TEST"):
-            raise _NoKeyError("an image of several files")
+            raise _NoKeyError
         self.put("image", image.source, image.colorspace_settings.name, image.colorspace_settings.is_data)
         for name in OF_IMAGE:
             value: Any = getattr(image, name, None)
@@ -185,7 +188,7 @@ class _Key:
             name = next((each for each in ATTRIBUTE_VALUES if hasattr(items[0], each)), None)
             first = getattr(items[0], name) if name is not None else ""
             if name is None or isinstance(first, str | bytes):
-                raise _NoKeyError(attribute.data_type)
+                raise _NoKeyError
             width = int(np.size(np.array(first)))
             whole = isinstance(first, int) or attribute.data_type.startswith("INT")
             values = np.empty(len(items) * width, dtype=np.int32 if whole else np.float32)

@@ -14,6 +14,7 @@ import bpy
 
 STEP = 14  # pixels between two looks of the mouse, less than the height of a button at scale 1
 SCREEN_HEIGHT = 1000  # pixels
+SETTLED = 0.3  # seconds after which Blender knows what is under a mouse that rests, on busy cores
 _screen: Any = None
 _last = None  # height at which a button was found
 _window = None  # that the hand is over; the first where none is named
@@ -183,10 +184,15 @@ def look_for(words, place, where, region, part=0.3, begin=None):
     x, top = region.x + part * (region.width - 24 * scale()), region.y + region.height - 8 * scale()
     for y in range(int(top if begin is None else min(top, begin)), region.y + 4, -int(STEP * scale())):
         move(x, y)
-        yield 0.03 if real() else 0.01  # the server has to send it first
-        if words in under_mouse(where, region):
-            place.extend((x, y))
-            return
+        yield 0.06 if real() else 0.01  # the server has to send it first
+        if words not in under_mouse(where, region):
+            continue
+        for at in (y, y + STEP * scale()):  # Blender may still have spoken of the place before
+            move(x, at)
+            yield SETTLED
+            if words in under_mouse(where, region):
+                place.extend((x, at))
+                return
 
 
 def widen(width):

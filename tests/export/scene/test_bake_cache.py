@@ -113,6 +113,11 @@ def color_space(item: Any) -> None:
     node(item, "TexImage").image.colorspace_settings.name = "Non-Color"
 
 
+def shrink_textures(_item: Any) -> None:
+    scene = bpy.context.scene
+    scene.render.use_simplify, scene.cycles.texture_limit_render = True, "128"
+
+
 CHANGES: dict[str, Callable[[Any], Any]] = {
     "a stop": lambda i: setattr(node(i, "ValToRGB").color_ramp.elements[0], "position", 0.1),
     "its colour": lambda i: setattr(node(i, "ValToRGB").color_ramp.elements[1], "color", (1.0, 0.0, 0.0, 1.0)),
@@ -132,6 +137,7 @@ CHANGES: dict[str, Callable[[Any], Any]] = {
     "an attribute": lambda i: setattr(i.data.attributes["Wear"].data[2], "value", 0.5),
     "normals": smooth,
     "a modifier": lambda i: setattr(i.modifiers.new("Wave", "SOLIDIFY"), "thickness", 0.1),
+    "textures read smaller": shrink_textures,
     "its place": lambda i: setattr(i, "location", (0.0, 0.0, 0.1)),
     "a number of the shader": lambda i: setattr(node(i, "BsdfPrincipled").inputs["IOR"], "default_value", 1.4),
 }
