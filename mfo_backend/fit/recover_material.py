@@ -23,7 +23,6 @@ from .judge.fit_task import FitTask, check_task
 from .judge.judged_result import judged_result
 from .judge.model_gap import model_gap
 from .judge.picture_errors import picture_errors
-from .judge.region import fill_outside
 from .judge.verification import VerifiedEnd, Verifier
 from .paper.fit import PaperRoute
 from .pictures.each_picture import SheetJudge
@@ -175,7 +174,7 @@ def _fit_along(
         pictures = [*pictures[:best], route.verification.finished(pictures[best]), *pictures[best + 1 :]]
         task.listener(Preview(pictures[best].image))
     first, end = pictures[0], pictures[best]
-    task = _only_counted(task, end.image)
+    task = task.only_counted(end.image)
     each = None if task.sheet is None else SheetJudge(task, task.sheet, first.image, end.image)
     result = final_result(
         renderer,
@@ -201,17 +200,6 @@ def _verified(verification: Verifier, start: Callable[[], Any], found: RouteEnds
         return found.status, verification.pictures(start, [end.x for end in found.ends])
     except Interrupted:
         return Status.CANCELLED, found.unverified
-
-
-def _only_counted(task: FitTask, result: Pixels) -> FitTask:
-    """The task with a reference that shows the result itself where it does not count.
-
-    What looks at neighbours, as FLIP does, finds no difference there.
-    """
-    counts = task.reference.counts
-    if counts is None:
-        return task
-    return replace(task, reference=fill_outside(task.reference, result, counts, task.view.display))
 
 
 def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:

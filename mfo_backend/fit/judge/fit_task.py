@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from ...types.image import Encoding, Image, Pixels
 from ..candidates import Candidates
 from ..settings import FitSettings
 from .checked_reference import check_reference, counted_pixels
+from .region import fill_outside
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,16 @@ class FitTask:
     def measure(self) -> str:
         """The loss by which a result is chosen where the settings name none: FLIP in the reference's range."""
         return "flip-hdr" if self.linear and self.settings.range != "ldr" else "flip-ldr"
+
+    def only_counted(self, result: Pixels) -> FitTask:
+        """The task with a reference that shows the `result` itself where it does not count.
+
+        What looks at neighbours, as FLIP does, finds no difference there. `result` is radiance (height, width, 3).
+        """
+        counts = self.reference.counts
+        if counts is None:
+            return self
+        return replace(self, reference=fill_outside(self.reference, result, counts, self.view.display))
 
 
 def check_task(

@@ -37,9 +37,8 @@ def judged_result(
     """The result with its verdict, and its picture: of the start where the end is farther from the reference.
 
     Pictures are scene-linear, `mask` sees the target, `others` what is fitted with it, and `noted` says that the export
-    has left something out. Where the
-    picture is a sheet of several, `judge_all` says what the result is in each of them. Under a verdict of `different`
-    the status says so too, and no value is called determined.
+    has left something out. Where the picture is a sheet of several, `judge_all` says what the result is in each of
+    them. Under a verdict of `different` the status says so too, and no value is called determined.
     """
     may_be_worse = judge_all is None or result.errors["flip"][1] > result.errors["flip"][0]
     if may_be_worse and _has_moved(result) and is_worse(reference, start, end, mask, view):

@@ -98,7 +98,7 @@ def fit_together(
         said = (*said, ONCE)
     outcomes = []
     for result, task in zip(judged, tasks, strict=True):
-        gap = None if stopped else model_gap(reference, halves, task.mask, task.view)
+        gap = None if stopped else model_gap(task.only_counted(end).reference, halves, task.mask, task.view)
         of_gap = (gap.sentence,) if gap is not None and gap.sentence else ()
         notes = (*result.notes, OTHERS_HELD, *said, *of_gap)
         result = replace(result, model_gap=gap, notes=notes)
@@ -123,7 +123,8 @@ def _judged_all(
     end = np.mean(halves, axis=0, dtype=np.float32)
     fitted = np.any([task.mask for task in tasks], axis=0)
     judged = []
-    for task, outcome in zip(tasks, turns.outcomes, strict=True):
+    for whole, outcome in zip(tasks, turns.outcomes, strict=True):
+        task = whole.only_counted(end)
         each = None if task.sheet is None else SheetJudge(task, task.sheet, start, end)
         if each is None:
             errors = picture_errors(task.reference, start, end, task.mask, task.counted, task.display)
