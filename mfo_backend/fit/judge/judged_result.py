@@ -54,6 +54,9 @@ def judged_result(
     else:
         result = replace(result, pictures=judge_all(end))
         judgement = worst_judgement(result.pictures)
+        said = result.contradiction
+        if judgement is not None and said is not None and judgement.picture in said.pictures:
+            judgement = replace(judgement, cause=None)  # the contradiction is it
     if judgement is None:
         return replace(result, certainty=_said(result, doubted=False)), end
     different = judgement.verdict is Verdict.DIFFERENT

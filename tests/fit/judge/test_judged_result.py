@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mfo_backend.fit.judge.judged_result import judged_result
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.certainty import Certainty, Level
 from mfo_backend.types.image import Encoding, Image
-from mfo_backend.types.result import FitResult
+from mfo_backend.types.result import Contradiction, FitResult, PictureResult
 from mfo_backend.types.status import Status
-from mfo_backend.types.verdict import Verdict
+from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict
 
 MASK = np.ones((48, 48), bool)
 VIEW = DisplayView()
@@ -85,3 +87,21 @@ def test_what_is_worse_than_the_start_is_not_the_result():
     assert found.certainty == {}
     assert found.message.endswith("Nothing was better than the start, so the start was kept.")
     assert np.array_equal(picture, flat(0.29))
+
+
+def test_the_cause_of_a_picture_that_contradicts_the_others_is_that_alone():
+    far = Judgement(Verdict.DIFFERENT, Cause.MATERIAL, Difference(0.5, 0.0, 0.4, 0.4, 0.0))
+    near = Judgement(Verdict.SAME, None, Difference(0.0, 0.0, 0.0, 0.0, 0.0))
+    errors = {"flip": (0.3, 0.1)}
+    named = Contradiction(("2 (b.exr)",), "Picture 2 does not go with the rest.")
+
+    def message(of_first, of_second):
+        pictures = (PictureResult("1 (a.exr)", errors, of_first), PictureResult("2 (b.exr)", errors, of_second))
+        given = replace(result(), contradiction=named, message=named.sentence)
+        found, _ = judged_result(
+            given, Image(flat(0.3), Encoding.LINEAR), flat(0.1), flat(0.3), MASK, VIEW, judge_all=lambda _: pictures
+        )
+        return found.message
+
+    assert Cause.MATERIAL.sentence not in message(near, far)
+    assert Cause.MATERIAL.sentence in message(far, near)
