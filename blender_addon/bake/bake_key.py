@@ -17,7 +17,8 @@ import numpy as np
 
 from ..export.audit.scene_table import BY_SIMPLIFY
 from ..export.meshes.read_mesh import material_of_slot, slot_count
-from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for
+from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for, turns_with_camera
+from ..probe.graph_copy import nodes_of
 from ..versions import node_tree_of
 
 SHOWN_ONLY = {  # of a node or a socket: how it looks in the editor
@@ -61,7 +62,7 @@ def surface_key(
     def put() -> None:
         tree = node_tree_of(material)
         key.owner(material, tree)
-        if item.original.vertex_groups and _has(tree, "ShaderNodeAttribute"):
+        if item.original.vertex_groups and any(node.bl_idname == "ShaderNodeAttribute" for node in nodes_of(tree)):
             raise _NoKeyError
         key.put(material.displacement_method, [list(row) for row in instance.matrix_world])
         data = item.original.data
@@ -104,7 +105,7 @@ class _Key:
         """A material or a world with its nodes."""
         if owner.animation_data is not None:
             raise _NoKeyError
-        if asked_for(tree, OF_VIEW) or asked_for(tree, OF_SURROUNDINGS):
+        if asked_for(tree, OF_VIEW) or asked_for(tree, OF_SURROUNDINGS) or turns_with_camera(tree):
             raise _NoKeyError
         self.struct(owner.cycles)
         self.tree(tree)
@@ -120,8 +121,6 @@ class _Key:
         numbers = {node.name: number for number, node in enumerate(tree.nodes)}
         for node in tree.nodes:
             if node.bl_idname in NO_KEY or getattr(node, "attribute_type", "GEOMETRY") != "GEOMETRY":
-                raise _NoKeyError
-            if "CAMERA" in (getattr(node, "convert_from", ""), getattr(node, "convert_to", "")):
                 raise _NoKeyError
             self.put("node", node.bl_idname, node.mute)
             self.struct(node, numbers)
@@ -205,11 +204,6 @@ class _Key:
             self.put(values.tobytes())
         self.put([(layer.name, layer.active_render, layer.active) for layer in mesh.uv_layers])
         self.put(mesh.color_attributes.render_color_index, mesh.attributes.default_color_name)
-
-
-def _has(tree: bpy.types.NodeTree, kind: str) -> bool:
-    groups = [node.node_tree for node in tree.nodes if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
-    return any(node.bl_idname == kind for node in tree.nodes) or any(_has(group, kind) for group in groups)
 
 
 @cache

@@ -29,6 +29,7 @@ from ...types.errors import BadInputError, MfoError
 from ..folder.graph_request import COPY, NodeGraph
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request
+from .parent_process import liveness_of
 
 # one render of many variants takes a second; a big file opens in a minute, and a loaded machine is ten times slower
 ANSWER_SECONDS = 300.0
@@ -43,7 +44,7 @@ _NO_COPY = (
     "once a job has a result. Export the job anew."
 )
 _PREFIX = "mfo_nodes_"
-_FOLDER = re.compile(_PREFIX + r"(\d+)_.+")  # the backend's process, mkdtemp's letters
+_FOLDER = re.compile(_PREFIX + r"(\d{1,9})_.+")  # the backend's process, mkdtemp's letters
 
 
 class GraphBlender:
@@ -182,17 +183,10 @@ class GraphBlender:
 
 def _remove_abandoned() -> None:
     """Remove what a Blender has still written while it ended with a backend that was killed."""
-    if os.name == "nt":  # where asking for a process ends it
-        return
     for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
         found = _FOLDER.fullmatch(path.name)
-        try:
-            if found is not None:
-                os.kill(int(found[1]), 0)
-        except (ProcessLookupError, OverflowError):
+        if found is not None and not liveness_of(int(found[1]))():
             shutil.rmtree(path, ignore_errors=True)
-        except OSError:  # somebody else's that lives
-            continue
 
 
 @contextmanager
