@@ -103,10 +103,10 @@ def run_there(
     """Run jobs on Dask workers, which must see the folders under the same names."""
     futures = {job: client.submit(run_one, job, trusted=trusted, pure=False, retries=RETRIES) for job in jobs}
     left = dict(futures)
-    for job, future in as_they_come(client, futures, should_stop):
+    for job, outcome in as_they_come(client, futures, should_stop):
         del left[job]
-        if future.status == "finished":
-            yield future.result()
+        if outcome.error is None:
+            yield outcome.result
         else:
-            yield JobEnd(job, Status.FAILED.value, f"Dask gave this job up: {future.exception()}", 0.0)
+            yield JobEnd(job, Status.FAILED.value, f"Dask gave this job up: {outcome.error}", 0.0)
     client.cancel([*left.values()])

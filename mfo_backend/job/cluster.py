@@ -10,7 +10,9 @@ import logging
 import queue
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from ..types.errors import BadInputError, SetupError
@@ -67,8 +69,18 @@ def open_client(scheduler: str | None, workers: int) -> Iterator[Any]:
         yield client
 
 
-def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[[], bool]) -> Iterator[tuple[Any, Any]]:
-    """(key, future) of every future that has ended, in the order of their ends; stops early when asked to.
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a piece of work: its result, or the exception that it ended with."""
+
+    result: Any = None
+    error: BaseException | None = None
+
+
+def as_they_come(
+    client: Any, futures: Mapping[Any, Any], should_stop: Callable[[], bool]
+) -> Iterator[tuple[Any, Outcome]]:
+    """(key, outcome) of every future that has ended, in the order of their ends; stops early when asked to.
 
     Raises
     ------
@@ -95,10 +107,30 @@ def as_they_come(client: Any, futures: Mapping[Any, Any], should_stop: Callable[
             for future in again:
                 ended.put(future)
             continue
-        if future.status in ("lost", "pending"):
+        outcome = _outcome(future)
+        if outcome is None:
             lost.append(future)
             continue
-        if future.status == "cancelled":  # nothing came of it, and it is nobody's error
-            raise SetupError("The Dask scheduler is gone: start it, then the same command goes on where it was.")
         left -= 1
-        yield keys[future.key], future
+        yield keys[future.key], outcome
+
+
+def _outcome(future: Any) -> Outcome | None:
+    """The outcome of a future that ended once, or None while it is computed again.
+
+    A worker may die between any two looks at a future, so its status decides nothing: only what it hands over does.
+
+    Raises
+    ------
+    SetupError
+        If the scheduler is gone.
+    """
+    try:
+        error = future.exception(timeout=POLL_SECONDS)
+        return Outcome(error=error) if error is not None else Outcome(future.result(timeout=_CONNECT_SECONDS))
+    except TimeoutError:
+        return None
+    except CancelledError:  # nothing came of it, and it is nobody's error
+        raise SetupError("The Dask scheduler is gone: start it, then the same command goes on where it was.") from None
+    except Exception as error:  # computed again, it ended otherwise; or its result cannot be read
+        return Outcome(error=error)

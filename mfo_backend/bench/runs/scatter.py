@@ -135,12 +135,12 @@ def _measured(
             pictures[at] = client.submit(true_pictures, recipe, task, **common)
         rows[task] = client.submit(measure, recipe, task, pictures[at], **common)
     waiting = {at: sum((t.scenario, t.scene) == at for t in tasks) for at in pictures}
-    for task, future in as_they_come(client, rows, should_stop):
+    for task, outcome in as_they_come(client, rows, should_stop):
         at = (task.scenario, task.scene)
         waiting[at] -= 1
         if not waiting[at]:
             del pictures[at]  # lets the workers forget them
-        row = future.result() if future.status == "finished" else failed_row(task, recipe.size, _reason(future))
+        row = outcome.result if outcome.error is None else failed_row(task, recipe.size, _reason(outcome.error))
         del rows[task]
         add(task, row)
     finished = not rows
@@ -148,8 +148,7 @@ def _measured(
     return finished
 
 
-def _reason(future: Any) -> BaseException:
-    error = future.exception()
+def _reason(error: BaseException) -> BaseException:
     if type(error).__name__ == "KilledWorker":
         return RuntimeError(_ALL_DIED)
     return error

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from concurrent.futures import CancelledError
 from dataclasses import replace
 
 import pytest
@@ -17,7 +18,7 @@ from mfo_backend.bench.rows.row_file import RowFile
 from mfo_backend.bench.runs.run_bench import all_tasks, run_bench
 from mfo_backend.bench.runs.scatter import run_scattered
 from mfo_backend.job.batch import run_there
-from mfo_backend.job.cluster import as_they_come, open_client
+from mfo_backend.job.cluster import Outcome, as_they_come, open_client
 from mfo_backend.types.errors import BadInputError, SetupError
 from tests.bench.made_up_rows import FakeRecipe, NotingRunner
 
@@ -97,41 +98,53 @@ def test_no_scheduler_is_said_in_one_sentence(monkeypatch):
         pass
 
 
-class Dropped:
-    """A future whose scheduler has gone."""
+class Ended:
+    """A future that ended in a result; each try to fetch it meets the next of its ends, and the last one stays."""
 
-    key, status = "row", "cancelled"
+    key = "row"
+
+    def __init__(self, *ends):
+        self.ends = list(ends)
 
     def add_done_callback(self, call):
         call(self)
 
+    def exception(self, timeout):
+        return None
+
+    def result(self, timeout):
+        end = self.ends.pop(0) if len(self.ends) > 1 else self.ends[0]
+        if isinstance(end, BaseException):
+            raise end
+        return end
+
+
+class Scheduler:
+    """A client whose scheduler knows these workers."""
+
+    def __init__(self, **workers):
+        self.workers = workers
+
+    def scheduler_info(self):
+        return {"workers": self.workers}
+
 
 def test_a_scheduler_that_is_lost_makes_no_row():
     with pytest.raises(SetupError, match="the same command goes on where it was"):
-        next(as_they_come(None, {TASKS[0]: Dropped()}, lambda: False))
+        next(as_they_come(None, {TASKS[0]: Ended(CancelledError())}, lambda: False))
 
 
 def test_a_result_that_is_lost_is_waited_for():
-    class Populated:
-        def scheduler_info(self):
-            waited.status = "finished"
-            return {"workers": {"one": {}}}
-
-    waited = Dropped()
-    waited.status = "lost"
-    assert list(as_they_come(Populated(), {TASKS[0]: waited}, lambda: False)) == [(TASKS[0], waited)]
+    lost = Ended(TimeoutError(), "its row")
+    assert list(as_they_come(Scheduler(one={}), {TASKS[0]: lost}, lambda: False)) == [(TASKS[0], Outcome("its row"))]
 
 
 def test_without_workers_it_ends(monkeypatch):
-    class Empty:
-        def scheduler_info(self):
-            return {"workers": {}}
-
     monkeypatch.setattr("mfo_backend.job.cluster.NO_WORKER_SECONDS", 0.1)
-    waiting = Dropped()
+    waiting = Ended("its row")
     waiting.add_done_callback = lambda call: None
     with pytest.raises(SetupError, match="No Dask worker is left"):
-        next(as_they_come(Empty(), {TASKS[0]: waiting}, lambda: False))
+        next(as_they_come(Scheduler(), {TASKS[0]: waiting}, lambda: False))
 
 
 def test_recipes_that_are_equal_share_a_runner(tmp_path):
