@@ -4,7 +4,6 @@
 Pictures of the screen go to the folder MFO_SCREENSHOTS, where ImageMagick's `import` can take them.
 """
 
-import functools
 import importlib
 import json
 import os
@@ -19,45 +18,21 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import steps
+import stopwatch
 from steps import material, plain_picture, roughness, runtime
 
 addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
-running_job, panel, preflight, fit_queue, handlers, cycles_check, shown_result, waiting_backend = (
+running_job, preflight, fit_queue, handlers, cycles_check, shown_result, waiting_backend = (
     importlib.import_module(f"{addon_id}.blender_addon.{name}")
     for name in (
-        *("running.running_job", "panel", "check.preflight", "running.fit_queue", "running.handlers"),
+        *("running.running_job", "check.preflight", "running.fit_queue", "running.handlers"),
         *("running.cycles_check", "result.shown_result", "process.waiting_backend"),
     )
 )
 LONGEST_STALL = 0.05  # seconds
-spent: list[tuple[float, float, str]] = []  # wall seconds, seconds of this thread's processor time, name
 bpy.context.preferences.view.show_splash = False
-
-
-def timed(name, function, *arguments):
-    began, worked = time.perf_counter(), time.thread_time()
-    try:
-        return function(*arguments)
-    finally:
-        spent.append((time.perf_counter() - began, time.thread_time() - worked, name))
-
-
-def timed_draw(cls):
-    draw = cls.draw
-    return lambda self, context: timed(cls.__name__, draw, self, context)  # Blender counts the arguments
-
-
-# everything of the add-on that Blender calls by itself: timers, panels, polls
-the_tick, the_check, the_cycles_tick = running_job._tick, preflight._run, cycles_check._tick
-running_job._tick = lambda: timed("tick", the_tick)
-preflight._run = lambda: timed("check", the_check)
-cycles_check._tick = lambda: timed("cycles", the_cycles_tick)
-for part in (running_job.step, running_job._record_as_undo_step, running_job._start_next):  # of the tick
-    setattr(running_job, part.__name__, functools.partial(timed, part.__name__, part))
-for cls in panel.CLASSES:
-    if issubclass(cls, bpy.types.Panel):
-        cls.draw = timed_draw(cls)
+stopwatch.time_the_addon(f"{addon_id}.blender_addon")
 
 
 def over():
@@ -337,11 +312,10 @@ def story():
     yield from waits()
     yield from queue()
     yield from survive()
-    slowest = [f"{name} {wall * 1e3:.1f} ({work * 1e3:.1f})" for wall, work, name in sorted(spent)[:-9:-1]]
-    print("ms of wall (processor) time:", ", ".join(slowest), flush=True)
-    stall = max(spent)[0]
+    print("ms of wall (processor) time:", stopwatch.slowest(), flush=True)
+    stall = max(stopwatch.spent)[0]
     assert stall < LONGEST_STALL, f"{stall * 1000:.1f} ms"
-    print(f"ALL GOOD, longest stall {stall * 1000:.1f} ms in {len(spent)} calls", flush=True)
+    print(f"ALL GOOD, longest stall {stall * 1000:.1f} ms in {len(stopwatch.spent)} calls", flush=True)
 
 
 steps.take(story())
