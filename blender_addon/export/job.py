@@ -93,7 +93,6 @@ def export_job(
             here.mkdir(parents=True, exist_ok=True)
             try:
                 with shown(context, setup, obj, own_size=len(reference) > 1) as there:
-                    together = "pictures" if len(reference) > 1 else ""
                     steps = partial_export(
                         there,
                         obj,
@@ -102,7 +101,8 @@ def export_job(
                         fit,
                         reference_view,
                         upright,
-                        together=together,
+                        several=len(reference) > 1,
+                        first=first,
                         targets=targets,
                     )
                     part = drained(steps)
@@ -167,13 +167,16 @@ class PartialExport:
     request: dict[str, Any]
     findings: Findings
     more: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    leaves: tuple[str | None, ...] = ()  # of a mix the one that each fitted material's plain names are of
 
     @property
     def values(self) -> dict[tuple[str, str], Any]:
-        """The values of what is fitted by material and socket, without what is linked."""
+        """The values of what is fitted by material and socket or name, without what is linked."""
         fitted = [one["target"]["bsdf_id"] for one in self.more.values()] or [TARGET_BSDF]
         found = {bsdf: self.request["materials"].get(bsdf, {"sockets": {}})["sockets"] for bsdf in fitted}
-        return {(b, n): s["value"] for b, sockets in found.items() for n, s in sockets.items() if not s["linked"]}
+        inside = {("graph", each["name"]): each["value"] for each in self.request.get("graph", {}).get("values", ())}
+        plain = {(b, n): s["value"] for b, sockets in found.items() for n, s in sockets.items() if not s["linked"]}
+        return inside | plain
 
     def write_request(self, folder: Path) -> None:
         """Write request.json, and those of further materials into their folders."""
@@ -192,26 +195,30 @@ def partial_export(
     upright: bool,
     tell: Callable[[float], None] = lambda _share: None,
     *,
-    together: str = "",
+    several: bool = False,
+    first: PartialExport | None = None,
     targets: Sequence[FittedSlot] = (),
 ) -> Steps[PartialExport]:
     """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
 
-    `together` says what the fit has several of besides; `targets` are slots whose materials are fitted together.
+    `several` says that it is one of several pictures, and `first` is the part of the first of them, where it is a
+    further one; `targets` are slots whose materials are fitted together.
     """
     findings = Findings()
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
     of_mix, wanted = ([], fit) if targets else named_mix_values(obj, fit)
-    may_miss = bool(targets) and together == "pictures"  # one of the materials, in this picture
-    together = "materials" if targets else together
-    values, fit = chosen_graph_values(obj, wanted, findings, together=together)
+    may_miss = bool(targets) and several  # one of the materials, in this picture
+    values, fit = chosen_graph_values(obj, wanted, findings, alone=not targets)
     with probe_for(fitted, always=bool(values)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
-        leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
+        if first is not None:
+            leaves = list(first.leaves)
+        else:
+            leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
         if leaves and leaves[0] is not None:  # whose numbers and values are others
-            values, fit = chosen_graph_values(obj, wanted, Findings(), together=together, leaf=leaves[0])
+            values, fit = chosen_graph_values(obj, wanted, Findings(), alone=not targets, leaf=leaves[0])
         with SceneBakes(context, probe) as bakes:
             fitted = [replace(each, leaf=own) for each, own in zip(fitted, leaves, strict=True)]
             leaf = leaves[0] if leaves else None
@@ -227,9 +234,10 @@ def partial_export(
             picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
-            first = target_shader(obj.active_material, leaves[0])
-            inside_request = request_of(context, obj, first, values) if values and first is not None else {}
-            if values:
+            target = target_shader(obj.active_material, leaves[0])
+            inside_request = request_of(context, obj, target, values) if values and target is not None else {}
+            with_copy = bool(values) and first is None  # which all pictures are evaluated in
+            if with_copy:
                 write_copy(folder)  # as it was read
             while not bakes.is_ready():
                 yield
@@ -264,9 +272,9 @@ def partial_export(
             if graph is not None:
                 requests[path]["graph"] = graph.request() | inside_request
                 graph.write(folder / path)
-        if values:
+        if with_copy:
             (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
-    return PartialExport(requests.pop(""), findings, requests)
+    return PartialExport(requests.pop(""), findings, requests, tuple(leaves))
 
 
 def _read_values(

@@ -11,16 +11,20 @@ GROUP = "ShaderNodeGroup"
 
 
 def own_copy(material: bpy.types.Material) -> bpy.types.Material:
-    """A copy of `material` whose node groups are copies too, so that a change in them is seen nowhere else."""
+    """A copy of `material` whose node groups are copies too, so that a change in them is seen nowhere else.
+
+    Nothing in it is animated: a render would put what a keyframe or a driver says over what is written into it.
+    """
     copy = material.copy()
-    own_groups(copy.node_tree)
+    copy.animation_data_clear()
+    _own(copy.node_tree)
     return copy
 
 
 def variant_of(tree: bpy.types.NodeTree) -> bpy.types.NodeTree:
     """A copy of a material's tree for a group node in another one, with which `remove_copy` takes it away."""
     variant = tree.copy()
-    own_groups(variant)
+    _own(variant)
     return variant
 
 
@@ -49,12 +53,13 @@ def nodes_of(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
             yield from nodes_of(node.node_tree)
 
 
-def own_groups(tree: bpy.types.NodeTree) -> None:
-    """Give a tree copies of the groups in it, to any depth."""
+def _own(tree: bpy.types.NodeTree) -> None:
+    """Give a tree copies of the groups in it, to any depth, and the values of this frame for ever."""
+    tree.animation_data_clear()
     for node in tree.nodes:
         if node.bl_idname == GROUP and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
-            own_groups(node.node_tree)
+            _own(node.node_tree)
 
 
 def _groups_in(tree: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTree]:

@@ -6,6 +6,7 @@ Cycles evaluates the nodes itself: a copy of the material writes each socket's v
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,11 +129,16 @@ class Target:
 
     @staticmethod
     def of(request: Mapping[str, Any]) -> Target:
-        """That of a request's `scene`, `layer`, `object` and `slot`, which are the window's from now on."""
+        """That of a request's `scene`, `layer`, `object` and `slot`, which are the window's from now on.
+
+        So are the camera, frame and size of its `view`, where it has one.
+        """
         scene = bpy.data.scenes[request["scene"]]
         layer = scene.view_layers[request["layer"]]
         if bpy.context.window is not None:
             bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
+        if request.get("view"):
+            _show(scene, request["view"])
         obj = scene.objects[request["object"]]
         return Target(scene, layer, obj, obj.material_slots[request["slot"]])
 
@@ -155,6 +161,18 @@ class Target:
         finally:
             self.slot.material = material
             self.slot.link = was_link
+
+
+def _show(scene: bpy.types.Scene, view: Mapping[str, Any]) -> None:
+    """Let the scene show what a picture does: `camera`, `frame`, and `width` and `height` in pixels."""
+    if scene.frame_current_final != view["frame"]:
+        whole = math.floor(view["frame"])
+        scene.frame_set(whole, subframe=view["frame"] - whole)
+    camera, render = scene.objects.get(view["camera"]), scene.render
+    if camera is None:
+        raise ProbeRequestError(f"The copy of the file has no camera '{view['camera']}' any more.")
+    scene.camera = camera
+    render.resolution_percentage, render.resolution_x, render.resolution_y = 100, view["width"], view["height"]
 
 
 def make_opaque(copy: bpy.types.Material, *, ours: bool = False) -> None:

@@ -45,7 +45,8 @@ _Found = tuple[dict[tuple[int, str], NDArray[np.float32]], NDArray[np.float32], 
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """Write one .npy file, float32 (height, width, 1 or 3), for each socket of each variant.
 
-    Requested are `scene`, `layer`, `object` and `slot` as of the command `sockets`, the `sockets` by name, each a
+    Requested are `scene`, `layer`, `object` and `slot` as of the command `sockets`, with the `view` of a picture, its
+    `camera`, `frame`, `width` and `height`, where it may be another one than the file's, the `sockets` by name, each a
     path of names to it, of which the last is empty for the weight of a shader in a mix, the `places` of the values
     (entries of request.json), `variants`, each with a number or colour for every place in `values` and with the
     names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder` for
@@ -62,8 +63,11 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     places = [Place.of_request(entry) for entry in request["places"]]
     variants: _Sets = [(variant["values"], variant["sockets"]) for variant in request["variants"]]
     most = max(min(len(variants), MOST_VARIANTS), 1)
-    frame = frame_of(target.scene, target.obj, request["scale"], sum(len(names) for _, names in variants[:most]) + 2)
     while True:
+        frame = frame_of(target.scene, target.obj, request["scale"], _outputs_of(variants[:most]))
+        if frame.scale < request["scale"] and most > 1:  # all answers of a fit have one size
+            most //= 2
+            continue
         try:
             files, mask, positions = _all(target, request, places, variants, frame, most)
             break
@@ -78,6 +82,10 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         elsewhere = _elsewhere(target, request, places, variants[:1])
     of_target = {"positions": "positions.npy", "camera": camera, "scale": frame.scale}
     return {"files": files, "elsewhere": elsewhere, **of_target}
+
+
+def _outputs_of(variants: _Sets) -> int:
+    return sum(len(names) for _, names in variants) + 2  # mask and position
 
 
 class _TooManyError(Exception):

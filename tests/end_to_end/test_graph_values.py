@@ -32,6 +32,30 @@ open(argv[1], "w").write(json.dumps([list(stop.color) for stop in stops]))
 """
 
 
+SIDE = """
+import mathutils
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+scene, head = bpy.context.scene, bpy.data.objects["Suzanne"]
+side = bpy.data.objects.new("Side", scene.camera.data)
+side.location = (4.6, -1.2, 1.0)
+side.rotation_euler = (-mathutils.Vector(side.location)).to_track_quat("-Z", "Y").to_euler()
+scene.collection.objects.link(side)
+head.keyframe_insert("rotation_euler", frame=1)
+head.rotation_euler[2] += 0.6
+head.keyframe_insert("rotation_euler", frame=9)
+scene.frame_end = 10
+bpy.ops.wm.save_as_mainfile(filepath=argv[0])
+low, high = head.active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
+low.color, high.color = (0.8, 0.1, 0.05, 1.0), (0.05, 0.2, 0.7, 1.0)
+scene.cycles.samples = 64
+settings = scene.render.image_settings
+settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+scene.camera, scene.render.resolution_x, scene.render.resolution_y, scene.render.filepath = side, 56, 40, argv[1]
+scene.frame_set(9)
+bpy.ops.render.render(write_still=True)
+"""
+
+
 def test_stops_of_a_ramp_are_found_and_applied(tmp_path: Path) -> None:
     start, picture, saved = tmp_path / "start.blend", tmp_path / "reference.exr", tmp_path / "saved.blend"
     run_bpy(BUILD, start, picture)
@@ -48,3 +72,19 @@ def test_stops_of_a_ramp_are_found_and_applied(tmp_path: Path) -> None:
     low, high = json.loads((tmp_path / "stops.json").read_text())
     assert low == pytest.approx([0.8, 0.1, 0.05, 1.0], abs=0.02)
     assert high == pytest.approx([0.05, 0.2, 0.7, 1.0], abs=0.02)
+
+
+def test_two_pictures_of_values_inside_nodes(tmp_path: Path) -> None:
+    """Another camera, frame and size: what nodes give is evaluated for each, and both say one set of values."""
+    start, front, side = tmp_path / "start.blend", tmp_path / "front.exr", tmp_path / "side.exr"
+    run_bpy(BUILD, start, front)
+    run_bpy(SIDE, start, side)
+    done = run_mfo(
+        "blend", start, "--object", "Suzanne", "--reference", front, "--reference", f"{side}@camera=Side,frame=9",
+        "--parameters", "Color Ramp/Stop 0, Color Ramp/Stop 1", "--preset", "fast", "--out", tmp_path / "job", "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    assert [picture["verdict"] for picture in done.answer["pictures"]] == ["same", "same"]
+    assert done.answer["recovered"]["Color Ramp/Stop 0"] == pytest.approx([0.8, 0.1, 0.05], abs=0.01)
+    assert done.answer["recovered"]["Color Ramp/Stop 1"] == pytest.approx([0.05, 0.2, 0.7], abs=0.01)
+    assert not list((tmp_path / "job").rglob("*.blend"))

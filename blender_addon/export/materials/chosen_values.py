@@ -15,6 +15,7 @@ from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
 from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, plain_name
 from ...probe.own_blender import save_copy
+from ..camera.read_camera import picture_size
 from ..findings import ExportError, Findings
 from ..material_model import Material
 from ..nodes.graph_findings import graph_problem
@@ -32,13 +33,12 @@ def chosen_graph_values(
     fit: dict[str, Any],
     findings: Findings,
     *,
-    together: str = "",
+    alone: bool = True,
     leaf: str | None = None,
 ) -> tuple[list[GraphValue], dict[str, Any]]:
     """The values inside the graph that `fit` asks for, and the fit of the sockets alone.
 
-    `together` says what there are several of in the fit, pictures or materials, and `leaf` names the fitted one of a
-    mix.
+    `alone` says that no other material is fitted with it, and `leaf` names the fitted one of a mix.
 
     Raises
     ------
@@ -58,8 +58,7 @@ def chosen_graph_values(
     except GraphValueError as error:
         raise ExportError(str(error)) from error
     _check_not_nodes(rest.get("parameters", "all"), target, values)
-    several = f"a fit of several {together} changes the values of sockets alone" if together else None
-    reason = several or _not_fitted(target, fit)
+    reason = _not_fitted(target, fit) if alone else "a fit of several materials changes the values of sockets alone"
     if reason is None:
         material = obj.active_material
         for name in shared_groups(material, [value.place for value in chosen]):
@@ -151,8 +150,16 @@ def request_of(
         "evaluate": {
             "scene": context.scene.name, "layer": context.view_layer.name, "object": obj.name,
             "slot": obj.active_material_index, "sockets": {name: path(name) for name in used},
+            "view": _view(context.scene),
         },
     }  # fmt: skip
+
+
+def _view(scene: bpy.types.Scene) -> dict[str, Any] | None:
+    """What the picture shows of the copy, which another picture's export may have made."""
+    width, height = picture_size(scene.render)
+    assert scene.camera is not None  # it was read
+    return {"camera": scene.camera.name, "frame": scene.frame_current_final, "width": width, "height": height}
 
 
 def write_copy(folder: Path) -> None:

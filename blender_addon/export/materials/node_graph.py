@@ -29,16 +29,20 @@ DEPTHS = 4
 
 @dataclass(frozen=True)
 class NodeGraph:
-    """What the graph gives: the files to go into the job, and the camera's matrix they were seen through."""
+    """What the graph gives: the files to go into the job, and the camera's matrix they were seen through.
+
+    `scale` is how many subpixels along a pixel they have.
+    """
 
     camera: list[list[float]]
     positions: Path
     files: tuple[Path, ...]
     depths: int = 1
+    scale: int = SCALE
 
     def request(self) -> dict[str, Any]:
         """The entry of request.json."""
-        entry = {"camera": self.camera, "positions": f"{FOLDER}/{self.positions.name}"}
+        entry = {"camera": self.camera, "positions": f"{FOLDER}/{self.positions.name}", "scale": self.scale}
         return entry | {"depths": self.depths} if self.depths > 1 else entry
 
     def write(self, folder: Path) -> None:
@@ -167,7 +171,8 @@ def evaluate_graph(
         return replace(leaf, sockets=sockets, weight=weight)
 
     first, *held = map(evaluated, leaves, answer["leaves"])
-    return replace(first, leaves=tuple(held)), NodeGraph(answer["camera"], files[0], tuple(files), depths)
+    seen_by = NodeGraph(answer["camera"], files[0], tuple(files), depths, answer["scale"])
+    return replace(first, leaves=tuple(held)), seen_by
 
 
 def _own_name(leaf: Material, name: str) -> str:

@@ -16,7 +16,10 @@ COPY = "graph/scene.blend"  # of the file, which a Blender evaluates while value
 LARGEST = 1e6  # of a bound
 MOST_VALUES = 256
 MOST_DEPTHS = 32
-_EVALUATE = ("scene", "layer", "object", "slot", "sockets")
+FINEST = 4  # subpixels along a pixel; fewer where the picture is large
+_EVALUATE = ("scene", "layer", "object", "slot", "sockets", "view")
+LARGEST_SIDE = 16384  # pixels
+LAST_FRAME = 1_048_574  # as Blender's
 
 
 @dataclass(frozen=True)
@@ -25,14 +28,16 @@ class NodeGraph:
     world positions.
 
     Files have so many `depths` one below the other: what the camera sees, what it would see were that away, and so on.
+    They have `scale` subpixels along a pixel.
     `values` are those of the nodes that are fitted, beside the sockets; `evaluate` says where the material is in the
     copy of the file, for the Blender that evaluates it, with the path of names to each socket, whose last word is empty
-    for the weight of a shader in a mix.
+    for the weight of a shader in a mix, and the camera, frame and size of the picture.
     """
 
     camera: tuple[tuple[float, ...], ...]
     positions: str
     depths: int = 1
+    scale: int = FINEST
     values: tuple[NodeValue, ...] = ()
     evaluate: Mapping[str, Any] | None = None
 
@@ -47,7 +52,7 @@ def graph_from_json(data: Any, where: str) -> NodeGraph | None:
     """
     if data is None:
         return None
-    graph = CheckedObject(data, f"{where}: graph", ("camera", "positions", "depths", "values", "evaluate"))
+    graph = CheckedObject(data, f"{where}: graph", ("camera", "positions", "depths", "scale", "values", "evaluate"))
     rows = graph.raw("camera")
     if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
         raise graph.wrong("camera", "three rows of four numbers")
@@ -66,7 +71,8 @@ def graph_from_json(data: Any, where: str) -> NodeGraph | None:
             raise BadInputError(f"{where}: graph.evaluate.sockets has no {sorted(unknown)[0]!r}: add it.")
     camera = tuple(tuple(float(number) for number in row) for row in rows)
     depths = graph.integer("depths", 1, MOST_DEPTHS, 1)
-    return NodeGraph(camera, graph.text("positions"), depths, values, evaluate)
+    scale = graph.integer("scale", 1, FINEST, FINEST)
+    return NodeGraph(camera, graph.text("positions"), depths, scale, values, evaluate)
 
 
 def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
@@ -74,7 +80,7 @@ def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
     if graph is None:
         return None
     data = asdict(graph)
-    return data if graph.values else {key: data[key] for key in ("camera", "positions", "depths")}
+    return data if graph.values else {key: data[key] for key in ("camera", "positions", "depths", "scale")}
 
 
 def _value(data: Any, where: str) -> NodeValue:
@@ -112,4 +118,18 @@ def _evaluate(data: Any, where: str) -> dict[str, Any]:
         **{key: entry.text(key) for key in ("scene", "layer", "object")},
         "slot": entry.integer("slot", 0, 32766),
         "sockets": {name: list(path) for name, path in sockets.items()},
+        "view": _view(entry.raw("view", None), f"{where}.view"),
+    }
+
+
+def _view(data: Any, where: str) -> dict[str, Any] | None:
+    """What the picture shows of the copy; None for what this shows as it is."""
+    if data is None:
+        return None
+    entry = CheckedObject(data, where, ("camera", "frame", "width", "height"))
+    return {
+        "camera": entry.text("camera"),
+        "frame": entry.number("frame", -LAST_FRAME, LAST_FRAME),
+        "width": entry.integer("width", 1, LARGEST_SIDE),
+        "height": entry.integer("height", 1, LARGEST_SIDE),
     }

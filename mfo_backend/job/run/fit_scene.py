@@ -22,7 +22,7 @@ from ..folder.job_folder import JobFolder
 from ..folder.request import Request
 from .class_trials import Fitted, with_other_classes, with_plainer_glow
 from .fit_materials import fit_materials
-from .graph_blender import evaluated_graph
+from .graph_blender import evaluated_graphs
 from .job_outcome import JobOutcome
 from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
 from .material_classes import (
@@ -99,9 +99,9 @@ def fit_scene(
     pictures = (JobPicture(folder, request, reference, view), *more)
     if request.targets:
         return fit_materials(pictures, listener=listener, should_stop=should_stop)
-    with evaluated_graph(folder, request, () if more else blender) as (graph, notes):
+    with evaluated_graphs(pictures, blender) as (graphs, notes):
         variant = load_native_code()
-        job = _OneMaterial(pictures, _materials_of(pictures), graph, listener, should_stop)
+        job = _OneMaterial(pictures, _materials_of(pictures), graphs, listener, should_stop)
         if request.fit.preset == "paper":
             fitted = job.fit_on_own_thread()
         else:
@@ -126,13 +126,14 @@ def _materials_of(pictures: Sequence[JobPicture]) -> tuple[dict[str, dict[str, A
 class _OneMaterial:
     """The fit of one material to all pictures of a job, which may begin from several starts.
 
-    `materials` are those of each picture's scene. The steps of presets other than `paper` are short, and need Mitsuba's
+    `materials` are those of each picture's scene, and `graphs` the values inside nodes as each picture shows them, none
+    where these are not fitted. The steps of presets other than `paper` are short, and need Mitsuba's
     scene on their own thread.
     """
 
     pictures: Sequence[JobPicture]
     materials: Sequence[dict[str, dict[str, Any]]]
-    graph: GraphPictures | None
+    graphs: tuple[GraphPictures, ...]
     listener: Listener
     should_stop: Callable[[], bool]
 
@@ -149,15 +150,16 @@ class _OneMaterial:
     def load(
         self,
         parameters: str | Sequence[str],
-        graph: GraphPictures | None,
+        graphs: Sequence[GraphPictures],
         change: Callable[[Any], Any] = lambda material: material,
     ) -> list[MitsubaRenderer]:
         """A renderer of each picture, with the target's material changed."""
         from ...render.pictures.mitsuba_renderer import load_mitsuba_renderer
 
-        inside = () if self.graph is None else self.graph.table.names
+        inside = self.graphs[0].table.names if self.graphs else ()
         target, renderers = self.request.target.bsdf_id, []
-        for picture, materials in zip(self.pictures, self.materials, strict=True):
+        of_each = graphs or [None] * len(self.pictures)
+        for picture, materials, graph in zip(self.pictures, self.materials, of_each, strict=True):
             asked = picture.request
             renderer = load_mitsuba_renderer(
                 picture.folder.root / asked.scene,
@@ -199,7 +201,7 @@ class _OneMaterial:
         from ...render.pictures.interruptible import InterruptibleRenderer, NativeThread
 
         thread = NativeThread(self.should_stop)
-        renderers = thread.call(lambda: self.load(self.request.fit.parameters, self.graph))
+        renderers = thread.call(lambda: self.load(self.request.fit.parameters, self.graphs))
         together = thread.call(lambda: self.together(renderers))
         renderer = renderers[0] if together is None else together.renderer
         return self._fit(InterruptibleRenderer(renderer, thread), together, None)
@@ -230,12 +232,12 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
         If values inside nodes are all that is to be fitted, and Blender refuses them.
     """
     request, notes = job.request, ()
-    renderers = job.load(request.fit.parameters, job.graph)
-    if job.graph is not None and (refused := job.graph.refusal()) is not None:
+    renderers = job.load(request.fit.parameters, job.graphs)
+    if (refused := next(filter(None, (graph.refusal() for graph in job.graphs)), None)) is not None:
         if not request.fit.parameters:
             raise BadInputError(refused)
         notes = (f"Values inside nodes stayed as they were. {refused}",)
-        renderers = job.load(request.fit.parameters, None)
+        renderers = job.load(request.fit.parameters, ())
     fitted, names = job.fit(renderers), renderers[0].table.names
     del renderers  # their scenes are large
     if job.start is None:
@@ -245,7 +247,7 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
 
     def fit_from(other: MaterialClass, nearer_than: float) -> Fitted:
         # values inside nodes are those of the material in the scene
-        again = job.load(parameters_of(other, names), None, lambda material: changed(material, other))
+        again = job.load(parameters_of(other, names), (), lambda material: changed(material, other))
         return job.fit(again, nearer_than=nearer_than)
 
     def is_wanted(found: Fitted) -> bool:

@@ -19,6 +19,8 @@ import tempfile
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +29,7 @@ import numpy as np
 from ...render.models.graph_pictures import Evaluated, GraphPictures, Picture, Variant
 from ...types.errors import BadInputError, MfoError
 from ..folder.graph_request import COPY, NodeGraph
-from ..folder.job_folder import JobFolder
-from ..folder.request import Request
+from .more_pictures import JobPicture
 from .parent_process import liveness_of
 
 # one render of many variants takes a second; a big file opens in a minute, and a loaded machine is ten times slower
@@ -43,6 +44,9 @@ _NO_COPY = (
     "Values inside nodes ({names}) stayed as they were: the copy of the file that they are evaluated in is gone, as "
     "once a job has a result. Export the job anew."
 )
+_NOT_THIS_PICTURE = (
+    "Picture {label} does not say how its camera sees the values inside nodes: export all pictures of the job anew."
+)
 _PREFIX = "mfo_nodes_"
 _FOLDER = re.compile(_PREFIX + r"(\d{1,9})_.+")  # the backend's process, mkdtemp's letters
 
@@ -53,7 +57,7 @@ class GraphBlender:
     Use it in a `with` block: at its end the process and its files are gone. It ends with this process, too.
     """
 
-    def __init__(self, words: Sequence[str], copy: Path, graph: NodeGraph) -> None:
+    def __init__(self, words: Sequence[str], copy: Path) -> None:
         """`words` is the command line of the add-on's `probe.server`, without its own arguments.
 
         Raises
@@ -61,8 +65,7 @@ class GraphBlender:
         MfoError
             If it cannot be started.
         """
-        assert graph.evaluate is not None
-        self._graph, self._evaluate, self._ready = graph, graph.evaluate, False
+        self._ready = False
         _remove_abandoned()
         self._folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}_"))
         self._log = self._folder / "blender.log"
@@ -83,12 +86,14 @@ class GraphBlender:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
-        """See `render.graph_pictures.Evaluate`."""
-        where = self._evaluate
+    def __call__(
+        self, graph: NodeGraph, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False
+    ) -> Evaluated:
+        """See `render.graph_pictures.Evaluate`; `graph` says what of the copy is looked at, and how it is shown."""
+        where = graph.evaluate
+        assert where is not None
         answer = self._ask({
-            "command": "values", **{key: where[key] for key in ("scene", "layer", "object", "slot", "sockets")},
-            "places": [dict(value.place) for value in self._graph.values],
+            "command": "values", **where, "places": [dict(value.place) for value in graph.values],
             "variants": [
                 {"values": [list(v) if isinstance(v, tuple) else v for v in values], "sockets": list(names)}
                 for values, names in variants
@@ -190,29 +195,53 @@ def _remove_abandoned() -> None:
 
 
 @contextmanager
-def evaluated_graph(
-    folder: JobFolder, request: Request, blender: Sequence[str]
-) -> Iterator[tuple[GraphPictures | None, tuple[str, ...]]]:
-    """The free values of the target's graph, whose Blender lives as long as the block, and what is said of them."""
-    asked = request.graph
+def evaluated_graphs(
+    pictures: Sequence[JobPicture], blender: Sequence[str]
+) -> Iterator[tuple[tuple[GraphPictures, ...], tuple[str, ...]]]:
+    """The free values of the target's graph as each picture shows them, and what is said of them.
+
+    One Blender evaluates them and lives as long as the block. There are none where these values stay as they are.
+
+    Raises
+    ------
+    BadInputError
+        If they are all that is to be fitted and cannot be, or a picture does not say how it shows them.
+    """
+    first = pictures[0].request
+    asked = first.graph
     if asked is None or not asked.values:
-        yield None, ()
+        yield (), ()
         return
-    if not blender or request.fit.preset == "paper":
-        names = ", ".join(value.name for value in asked.values)
-        if not request.fit.parameters:
+    names = ", ".join(value.name for value in asked.values)
+    if not blender or first.fit.preset == "paper":
+        if not first.fit.parameters:
             raise BadInputError(f"{names} are inside nodes, and need a Blender: run the fit there, or by `mfo blend`.")
-        yield None, (_NO_BLENDER.format(names=names),)
+        yield (), (_NO_BLENDER.format(names=names),)
         return
+    folder = pictures[0].folder
     if not (folder.root / COPY).exists():
-        if not request.fit.parameters:
-            raise BadInputError(_NO_COPY.format(names=", ".join(value.name for value in asked.values)))
-        yield None, (_NO_COPY.format(names=", ".join(value.name for value in asked.values)),)
+        if not first.fit.parameters:
+            raise BadInputError(_NO_COPY.format(names=names))
+        yield (), (_NO_COPY.format(names=names),)
         return
     copy = folder.file(COPY, what="request.json: graph.values, and the copy of the file")
-    linked = request.materials[request.target.bsdf_id].graph_names
-    with GraphBlender(blender, copy, asked) as evaluate:
-        yield GraphPictures(asked.values, evaluate, linked, request.width * request.height), ()
+    linked = first.materials[first.target.bsdf_id].graph_names
+    with GraphBlender(blender, copy) as evaluate:
+        yield (
+            tuple(
+                GraphPictures(asked.values, partial(evaluate, own), linked, size.width * size.height, own.scale)
+                for own, size in ((_as_shown(asked, picture), picture.request) for picture in pictures)
+            ),
+            (),
+        )
+
+
+def _as_shown(first: NodeGraph, picture: JobPicture) -> NodeGraph:
+    """The first picture's values as a picture shows them."""
+    own = picture.request.graph
+    if own is None or own.evaluate is None:
+        raise BadInputError(_NOT_THIS_PICTURE.format(label=picture.label))
+    return replace(own, values=first.values)
 
 
 def _root() -> Path:

@@ -29,7 +29,7 @@ SMALL, LARGE = (4, 1), (2, 4)
 MOST_SUBPIXELS = 400_000  # of a small picture at its scale
 # Where normals change two subpixels are too few, and certainty does not know: values were 2 to 3 % off. Up to 256 x 256
 MOST_SUBPIXELS_OF_NORMALS = 1_050_000
-FINE_SCALE, FINE_SAMPLES = 4, 4
+FINE_SCALE, FINE_SAMPLES = 4, 4  # of a scene's textures; the scale of the export's, where that is smaller
 RECALLED = 6  # answers that are kept
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
 # square: a tenth of what is seen, and a third of what a noisy reference hides
@@ -97,8 +97,17 @@ class GraphPictures:
         changes with.
     """
 
-    def __init__(self, values: Sequence[NodeValue], evaluate: Evaluate, linked: Sequence[str], pixels: int = 0) -> None:
-        """`linked` are all sockets that the graph gives, and `pixels` those of the whole picture."""
+    def __init__(
+        self,
+        values: Sequence[NodeValue],
+        evaluate: Evaluate,
+        linked: Sequence[str],
+        pixels: int = 0,
+        fine: int = FINE_SCALE,
+    ) -> None:
+        """`linked` are all sockets that the graph gives, `pixels` those of the whole picture, and `fine` the subpixels
+        along a pixel of the scene's textures."""
+        self._fine_scale = fine
         turns = any(name in DIRECTIONS for value in values for name in value.sockets)
         most = MOST_SUBPIXELS_OF_NORMALS if turns else MOST_SUBPIXELS
         self._scale, self._samples = SMALL if pixels * SMALL[0] ** 2 <= most else LARGE
@@ -196,7 +205,7 @@ class GraphPictures:
         if key not in self._fine:
             self.renders += 1
             variants = [(self._as_values(vector), self._sockets)]
-            found = self._evaluate(variants, scale=FINE_SCALE, samples=FINE_SAMPLES, elsewhere=True)
+            found = self._evaluate(variants, scale=self._fine_scale, samples=FINE_SAMPLES, elsewhere=True)
             self._fine[key] = {
                 name_of(socket): Shown(picture, found.elsewhere.get(socket))
                 for socket, picture in found.pictures[0].items()

@@ -26,6 +26,7 @@ from ..camera.primary_rays import tile_order
 from ..camera.widened_mask import widened
 from ..lamps.met_lamps import lights_have_no_extent
 from ..machine.memory import require_memory
+from ..models.joined_graph import Graph
 from ..models.prepared_material import EMISSION
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
@@ -66,7 +67,8 @@ class RecordedScene:
     """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target and count.
 
     Nothing is recorded of pixels where `counts` is False, (height, width); None counts everywhere. `part` is the part
-    of all lanes and rays that its recordings may have, where there are those of other pictures, too.
+    of all lanes and rays that its recordings may have, where there are those of other pictures, too. Lanes to evaluate
+    are then those of all of them, and `graph` is what nodes give all of them.
 
     Raises
     ------
@@ -80,6 +82,7 @@ class RecordedScene:
         covered: int,
         part: float = 1.0,
         counts: NDArray[np.bool_] | None = None,
+        graph: Graph | None = None,
     ) -> None:
         self._integrator = renderer.scene.integrator()
         if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
@@ -92,9 +95,12 @@ class RecordedScene:
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
-        graph = self.graph = renderer.graph
-        self._varying = None if graph is None else VaryingValues(graph, renderer.table, self.model.table)
-        self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._varying)
+        self.graph = graph or renderer.graph
+        self._varying, self._evaluated = (
+            None if each is None else VaryingValues(each, renderer.table, self.model.table)
+            for each in (renderer.graph, self.graph)
+        )
+        self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._evaluated)
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
         self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
         if self._mixed and not renderer.shape.bsdf().is_opaque:
@@ -299,7 +305,7 @@ class RecordedScene:
     @cached_property
     def _image(self) -> RecordedJacobian:
         table = self.renderer.table
-        return RecordedJacobian(self.model, table, self._fixed, varying=self._varying, derivatives=False)
+        return RecordedJacobian(self.model, table, self._fixed, varying=self._evaluated, derivatives=False)
 
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """The function from a vector to image and Jacobian of the groups, background included."""

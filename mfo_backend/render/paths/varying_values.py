@@ -22,6 +22,7 @@ from ...material.principled.bumped_normals import turned_to_normals
 from ...material.principled.principled_dict import DIRECTIONS
 from ...types.parameter import ParameterTable
 from ..models.graph_pictures import GraphPictures, GraphState
+from ..models.joined_graph import Graph
 
 SUBPIXEL = "subpixel"  # of each lane, in the pictures; the row behind the last where the camera does not see the hit
 FRAME = ("frame_s", "frame_t", "frame_n")  # the lane's frame in the world
@@ -34,7 +35,7 @@ class VaryingValues:
     `table` is that of the fit: its last entries are the graph's.
     """
 
-    def __init__(self, graph: GraphPictures, table: ParameterTable, sizes: ParameterTable) -> None:
+    def __init__(self, graph: Graph, table: ParameterTable, sizes: ParameterTable) -> None:
         self._graph = graph
         self.first = table.length - graph.table.length
         self.names = tuple(graph.varying)
@@ -50,6 +51,7 @@ class VaryingValues:
 
     def surface(self, vector: NDArray[np.float64]) -> SeenSurface:
         """Where the subpixels of the pictures are; those around this vector are exact from now on."""
+        assert isinstance(self._graph, GraphPictures)  # of one camera
         self._graph.settle(vector[self.first :])
         if self._surface is None:
             self._surface = SeenSurface(*self._graph.seen(vector[self.first :]))

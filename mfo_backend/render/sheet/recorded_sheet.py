@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -17,12 +17,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...types.errors import BadInputError, UnrecordableError
+from ...types.errors import BadInputError
 from ...types.image import Pixels
+from ..models.joined_graph import JoinedGraph
 from ..models.prepared_material import EMISSION
 from ..paths.recorded_image import RecordedImage
 from ..paths.recorded_paths import LaneGroups, RecordedPaths
 from ..paths.recorded_scene import MOST_LANES, RecordedScene, SceneNeeds
+from ..paths.varying_values import SUBPIXEL
 from .contact_sheet import ContactSheet
 from .sheet_renderer import SheetRenderer
 
@@ -38,10 +40,8 @@ class RecordedSheet:
     Raises
     ------
     UnrecordableError
-        If the material has a lobe that recorded paths cannot hold, or values inside of a node graph are free.
+        If the material has a lobe that recorded paths cannot hold.
     """
-
-    graph = None  # values inside nodes are fitted to one picture alone
 
     def __init__(self, renderer: SheetRenderer, counts: NDArray[np.bool_] | None = None) -> None:
         self.renderer = renderer
@@ -51,12 +51,12 @@ class RecordedSheet:
         covered = [int((m if of is None else m & of).sum()) for m, of in zip(masks, parts, strict=True)]
         self._numbers = [number for number, pixels in enumerate(covered) if pixels]  # of the pictures that show it
         self._parts = [covered[number] / sum(covered) for number in self._numbers]
+        graphs = [graph for number in self._numbers if (graph := renderer.renderers[number].graph) is not None]
+        self.graph = JoinedGraph(graphs) if graphs else None
         self._scenes = [
-            RecordedScene(renderer.renderers[number], covered[number], part, parts[number])
+            RecordedScene(renderer.renderers[number], covered[number], part, parts[number], self.graph)
             for number, part in zip(self._numbers, self._parts, strict=True)
         ]
-        if any(scene.varies for scene in self._scenes):
-            raise UnrecordableError("Values inside of a node graph are fitted to one picture.")
         self.model = self._scenes[0].model
 
     @property
@@ -99,6 +99,9 @@ class RecordedSheet:
             except BadInputError as error:
                 raise BadInputError(f"Picture {self.renderer.sheet.labels[number]}: {error}") from error
             parts[number] = self._of_first(recorded, number)
+        if self.graph is not None:
+            begins = self.graph.begins(vector[len(vector) - self.graph.table.length :])
+            parts = {n: _on_rows(paths, begin) for (n, paths), begin in zip(parts.items(), begins, strict=True)}
         return joined(parts, self.renderer.sheet)
 
     def _of_first(self, paths: RecordedPaths, number: int) -> RecordedPaths:
@@ -114,6 +117,12 @@ class RecordedSheet:
             scene.finest_grid(samples, part * lanes) for scene, part in zip(self._scenes, self._parts, strict=True)
         )
 
+    def images_of(
+        self, paths: RecordedPaths, groups: LaneGroups, vector: NDArray[np.float64]
+    ) -> Callable[[Mapping[str, NDArray[np.float32]]], NDArray[np.float32]]:
+        """See `RecordedScene.images_of`; the graph's pictures are those of all pictures."""
+        return self._scenes[0].images_of(paths, groups, vector)
+
     def pictures(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage:
         """See `RecordedScene.pictures`."""
         return self._scenes[0].pictures(paths, groups)
@@ -121,6 +130,12 @@ class RecordedSheet:
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """See `RecordedScene.evaluator`."""
         return self._scenes[0].evaluator(paths, groups, recalled)
+
+
+def _on_rows(paths: RecordedPaths, begin: int) -> RecordedPaths:
+    """A recording whose graph's pictures begin at this row of all pictures'."""
+    moved = paths.held[SUBPIXEL] + dr.opaque(mi.UInt32, begin)
+    return replace(paths, held={**paths.held, SUBPIXEL: moved})
 
 
 def joined(recorded: Mapping[int, RecordedPaths], sheet: ContactSheet) -> RecordedPaths:

@@ -194,6 +194,61 @@ def test_pictures_of_variants(graph: SimpleNamespace, tmp_path: Path) -> None:
     assert np.load(tmp_path / found["files"][0]["Coat Roughness"]).shape[2] == 1
 
 
+def asked(graph: SimpleNamespace, folder: Path, names: tuple[str, ...], **words: Any) -> tuple[dict[str, Any], Any]:
+    """The answer of the probe about these values, and whether a subpixel is on the target."""
+    from blender_addon.probe.value_pictures import answer
+
+    values = values_of(graph.material)
+    found = answer({
+        "scene": graph.bpy.context.scene.name, "layer": graph.bpy.context.view_layer.name, "object": "Väse", "slot": 0,
+        "sockets": PATHS, "places": [values[name].place.request() for name in names],
+        "scale": 1, "samples": 1, "folder": str(folder), **words,
+    })  # fmt: skip
+    return found, np.isfinite(np.load(folder / found["positions"])).all(axis=2)
+
+
+def test_a_picture_of_another_frame_camera_and_size_has_its_own_values(graph: SimpleNamespace, tmp_path: Path) -> None:
+    """What is animated has the frame's value; what is asked for has the value that is asked, keyframes or not."""
+    scene, tree, paint = graph.bpy.context.scene, graph.material.node_tree, graph.node.inputs["Paint"]
+    factor = "Mix/Factor"
+    for frame, red, mixed in ((9, 0.75, 0.9), (1, 0.25, 0.1)):
+        paint.default_value = (red, 0.5, 0.5, 1.0)
+        paint.keyframe_insert("default_value", frame=frame)
+        mix = next(node for node in graph.group.nodes if node.bl_idname == "ShaderNodeMix")
+        mix.inputs[0].default_value = mixed
+        mix.inputs[0].keyframe_insert("default_value", frame=frame)
+    scene.frame_set(1)
+    side = scene.camera.copy()
+    side.name = "Side"
+    side.matrix_world = side.matrix_world.copy()
+    scene.collection.objects.link(side)
+    variants = [{"values": [f], "sockets": ["Base Color"]} for f in (0.0, 1.0)]
+    shown = {"camera": "Side", "frame": 9.0, "width": scene.render.resolution_x // 2, "height": 20}
+    found, seen = asked(graph, tmp_path, (factor,), variants=variants, view=shown)
+    ramp, full = (np.load(tmp_path / files["Base Color"])[seen] for files in found["files"])
+    np.testing.assert_allclose(full, np.broadcast_to((0.75, 0.5, 0.5), full.shape), atol=1e-5)
+    assert ramp.std(axis=0).min() > 0.01
+    assert (scene.camera, scene.frame_current, scene.render.resolution_y) == (side, 9, 20)
+    assert tree.animation_data is not None  # the copies are still, and not the material
+    with pytest.raises(Exception, match="has no camera 'Rear' any more"):
+        asked(graph, tmp_path, (factor,), variants=variants, view=shown | {"camera": "Rear"})
+
+
+def test_all_answers_have_the_size_that_is_asked(
+    graph: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Many variants that are too large for one render are made in several, and not more coarsely."""
+    from blender_addon.probe import aov_render
+
+    names = ("Mix/Factor",)
+    variants = [{"values": [0.2 * k], "sockets": ["Base Color"]} for k in range(5)]
+    found, seen = asked(graph, tmp_path, names, variants=variants, scale=2)
+    monkeypatch.setattr(aov_render, "MOST_BYTES", seen.size * 16 * 5)  # three variants, mask and position
+    again, _ = asked(graph, tmp_path, names, variants=variants, scale=2)
+    assert (again["scale"], again["camera"]) == (2, found["camera"])
+    assert np.load(tmp_path / again["files"][4]["Base Color"]).shape[:2] == seen.shape
+
+
 def test_what_a_fit_is_refused(graph: SimpleNamespace, tmp_path: Path) -> None:
     from blender_addon.export.job import ExportError, export_job
 

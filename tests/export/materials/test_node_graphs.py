@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -144,10 +145,9 @@ def renderer_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[A
 
     wanted = render_cycles()
     report = export(target, reference=None)
-    (report.folder / "request.json").write_text(
-        (report.folder / "request.json").read_text().replace('"view":', '"reference": {"path": "scene.xml", '
-        '"encoding": "linear"}, "view":')
-    )  # fmt: skip
+    request = json.loads((report.folder / "request.json").read_text())
+    request["reference"] = {"path": "scene.xml", "encoding": "linear"}  # there is none, and nobody reads it
+    (report.folder / "request.json").write_text(json.dumps(request))
     folder = JobFolder.open(report.folder)
     request = read_request(folder)
     parameters = request.fit.parameters if isinstance(request.fit.parameters, tuple) else ["ior"]

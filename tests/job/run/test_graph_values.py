@@ -46,7 +46,7 @@ def test_the_entry_comes_back() -> None:
     assert [value.parameter.size for value in graph.values] == [3, 1]
     assert graph_from_json(json.loads(json.dumps(graph_to_json(graph))), "request.json") == graph
     plain = {key: ENTRY[key] for key in ("camera", "positions")}
-    assert set(graph_to_json(graph_from_json(plain, "request.json")) or ()) == {*plain, "depths"}
+    assert set(graph_to_json(graph_from_json(plain, "request.json")) or ()) == {*plain, "depths", "scale"}
 
 
 @pytest.mark.parametrize(
@@ -60,6 +60,8 @@ def test_the_entry_comes_back() -> None:
         (("evaluate", "slot"), -1, "slot is -1"),
         (("evaluate", "sockets"), {"Base Color": 3}, "must be paths of a node's names and a socket's by names"),
         (("evaluate", "command"), "rm", "unknown key 'command'"),
+        (("evaluate", "view"), {"camera": "A", "frame": 1.0, "width": 0, "height": 9}, "width is 0"),
+        (("scale",), 8, "scale is 8"),
         (("evaluate",), None, "graph.evaluate"),
     ],
 )
@@ -93,19 +95,21 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def ask(words: tuple[str, ...]) -> Any:
     graph = graph_from_json(ENTRY, "request.json")
     assert graph is not None
-    with GraphBlender(words, Path("scene.blend"), graph) as blender:
-        return blender([(((0.1, 0.2, 0.3), 4.0), ("Base Color",))], scale=2, samples=4)
+    with GraphBlender(words, Path("scene.blend")) as blender:
+        return blender(graph, [(((0.1, 0.2, 0.3), 4.0), ("Base Color",))], scale=2, samples=4)
+
+
+ANSWERS = (
+    "folder = asked['folder']; np.save(folder + '/a.npy', np.full((2, 3, 3), {value})); "
+    "np.save(folder + '/p.npy', np.zeros((2, 3, 3))); "
+    "files = [dict.fromkeys(v['sockets'], 'a.npy') for v in asked['variants']]; "
+    "print(json.dumps({{'status': 'ok', 'files': files, 'positions': '../p.npy', 'camera': [[1, 2, 3, 4]] * 3}}),"
+    " flush=True)"
+)
 
 
 def test_an_answer_is_read_and_nothing_is_left(temporary: Path) -> None:
-    does = (
-        "folder = asked['folder']; np.save(folder + '/a.npy', np.full((2, 3, 3), asked['variants'][0]['values'][1])); "
-        "np.save(folder + '/p.npy', np.zeros((2, 3, 3))); "
-        "files = [dict.fromkeys(asked['variants'][0]['sockets'], 'a.npy')]; "
-        "print(json.dumps({'status': 'ok', 'files': files, 'positions': '../p.npy', 'camera': [[1, 2, 3, 4]] * 3}),"
-        " flush=True)"
-    )
-    found = ask(server(does))
+    found = ask(server(ANSWERS.format(value="asked['variants'][0]['values'][1]")))
     assert np.asarray(found.pictures[0]["Base Color"]).tolist() == np.full((2, 3, 3), 4.0).tolist()
     assert found.camera.shape == (3, 4)
     assert list(temporary.iterdir()) == []
@@ -136,17 +140,44 @@ def test_a_program_that_is_not_there() -> None:
         ask((os.path.join("nowhere", "blender"),))
 
 
+def picture(folder: Path, graph: Any, parameters: tuple[str, ...] = (), **words: Any) -> Any:
+    """A picture of a job, as far as its nodes are asked about."""
+    request = SimpleNamespace(
+        graph=graph, fit=SimpleNamespace(preset="fast", parameters=parameters), width=3, height=2,
+        target=SimpleNamespace(bsdf_id="a"), materials={"a": SimpleNamespace(graph_names=["Base Color"])},
+    )  # fmt: skip
+    return SimpleNamespace(folder=JobFolder(folder), request=request, label="2 (b.exr)", **words)
+
+
+def test_one_blender_answers_for_each_picture_as_it_shows_the_copy(tmp_path: Path) -> None:
+    graphs = []
+    for frame in (1.0, 9.0):
+        entry = copy.deepcopy(ENTRY)
+        entry["evaluate"]["view"] = {"camera": "Side", "frame": frame, "width": 3, "height": 2}
+        graphs.append(graph_from_json(entry, "request.json"))
+    (tmp_path / "graph").mkdir()
+    (tmp_path / "graph" / "scene.blend").touch()
+    words = server(ANSWERS.format(value="asked['view']['frame']"))
+    with graph_blender.evaluated_graphs([picture(tmp_path, graph) for graph in graphs], words) as (found, notes):
+        start = found[0].table.pack({})
+        assert [float(each.state(start).pictures["base_color"].mean()) for each in found] == [1.0, 9.0]
+        assert notes == ()
+    old = graph_from_json({key: ENTRY[key] for key in ("camera", "positions")}, "request.json")
+    both = graph_blender.evaluated_graphs([picture(tmp_path, graph) for graph in (graphs[0], old)], words)
+    with pytest.raises(BadInputError, match=r"Picture 2 \(b.exr\) does not say how its camera sees"), both:
+        pass
+
+
 def test_a_job_whose_copy_is_gone_says_so(tmp_path: Path) -> None:
     """As it is once the job has a result: other values are fitted still."""
     graph = graph_from_json(ENTRY, "request.json")
     for parameters in (("roughness",), ()):
-        request: Any = SimpleNamespace(graph=graph, fit=SimpleNamespace(preset="fast", parameters=parameters))
-        found = graph_blender.evaluated_graph(JobFolder(tmp_path), request, server("pass"))
+        found = graph_blender.evaluated_graphs([picture(tmp_path, graph, parameters)], server("pass"))
         if not parameters:
             with pytest.raises(BadInputError, match="copy of the file that"), found:
                 pass
             continue
         with found as (pictures, notes):
-            assert pictures is None
+            assert pictures == ()
             assert "Color Ramp/Stop 0, Noise Texture/Scale" in notes[0]
             assert "Export the job anew" in notes[0]
