@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes of earlier exports, kept by what they hang on in a folder of the user's, at most so many bytes.
 
-An entry is a folder that appears whole or not at all. Several processes may read, add and remove at the same time.
+An entry is a folder that appears whole or not at all, with a digest of each of its files: what a disk or a crash of the
+machine has damaged is removed and made anew. Several processes may read, add and remove at the same time.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -59,23 +61,33 @@ def cached(
         return found
     answer = bake()
     with suppress(OSError):
+        _remove(cache / key)  # what is there is damaged, or of another process that was quicker
         _keep(cache, key, place, answer, most_bytes)
     return answer
 
 
 def _found(entry: Path, place: Path) -> dict[str, Any] | None:
     try:
-        answer = json.loads((entry / _ANSWER).read_text("utf-8"))
-        for path in entry.glob("*.npy"):
-            shutil.copyfile(path, place / path.name)
-        if len(list(place.iterdir())) != answer["files"]:  # removed by another process meanwhile
-            raise FileNotFoundError(entry)
+        kept = json.loads((entry / _ANSWER).read_text("utf-8"))
+        for name in kept["files"]:
+            shutil.copyfile(entry / Path(name).name, place / name)
+        if kept["digest"] != _digest(kept["answer"], {name: place / name for name in kept["files"]}):
+            raise ValueError(entry)
         os.utime(entry)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         for path in place.iterdir():
             path.unlink()
         return None
-    return answer["answer"]
+    return kept["answer"]
+
+
+def _digest(answer: dict[str, Any], files: dict[str, Path]) -> str:
+    """Of an answer and the files that it is about."""
+    found = hashlib.blake2b(json.dumps(answer, sort_keys=True).encode())
+    for name in sorted(files):
+        with files[name].open("rb") as file:
+            found.update(f"{name} {hashlib.file_digest(file, hashlib.blake2b).hexdigest()}".encode())
+    return found.hexdigest()
 
 
 def _keep(cache: Path, key: str, place: Path, answer: dict[str, Any], most_bytes: int) -> None:
@@ -89,7 +101,9 @@ def _keep(cache: Path, key: str, place: Path, answer: dict[str, Any], most_bytes
     try:
         for path in files:
             shutil.copyfile(path, partial / path.name)
-        (partial / _ANSWER).write_text(json.dumps({"answer": answer, "files": len(files)}), "utf-8")
+        kept = {path.name: path for path in files}
+        entry = {"answer": answer, "files": list(kept), "digest": _digest(answer, kept)}
+        (partial / _ANSWER).write_text(json.dumps(entry), "utf-8")
         partial.rename(cache / key)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
@@ -110,7 +124,13 @@ def _make_room(cache: Path, most_bytes: int) -> None:
         if total <= most_bytes:
             return
         with suppress(OSError):
-            gone = cache / f".{os.getpid()}.{path.name}"
-            path.rename(gone)  # first: no reader sees half of it
-            shutil.rmtree(gone, ignore_errors=True)
+            _remove(path)
             total -= size
+
+
+def _remove(entry: Path) -> None:
+    """Remove an entry, if it is there."""
+    gone = entry.with_name(f".{os.getpid()}.{entry.name}")
+    with suppress(FileNotFoundError):
+        entry.rename(gone)  # first: no reader sees half of it
+        shutil.rmtree(gone, ignore_errors=True)

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -238,6 +241,27 @@ def bake_into(place: Path, number: float) -> dict[str, Any]:
     return {"leaves": [number]}
 
 
+def cut(entry: Path) -> None:
+    """As after a loss of power."""
+    with (entry / "001.npy").open("r+b") as file:
+        file.truncate(1000)
+
+
+def flip(entry: Path) -> None:
+    content = bytearray((entry / "001.npy").read_bytes())
+    content[2000] ^= 4
+    (entry / "001.npy").write_bytes(content)
+
+
+def empty_answer(entry: Path) -> None:
+    (entry / "answer.json").write_text("{")
+
+
+def other_answer(entry: Path) -> None:
+    text = (entry / "answer.json").read_text()
+    (entry / "answer.json").write_text(text.replace('"leaves": [8', '"leaves": [9'))
+
+
 def test_the_oldest_go_and_what_was_cut_off_is_no_hit(tmp_path: Path) -> None:
     cache, places = tmp_path / "cache", iter(range(100))
 
@@ -258,18 +282,84 @@ def test_the_oldest_go_and_what_was_cut_off_is_no_hit(tmp_path: Path) -> None:
     ask("c", 4.0, most=9_000)
     assert sorted(path.name[0] for path in cache.iterdir()) == ["a", "c"]
     (cache / ("a" * 64) / "001.npy").unlink()
-    assert ask("a", 5.0) == 5.0  # half of an entry is none
-    (cache / ("c" * 64) / "answer.json").write_text("{")
-    assert ask("c", 6.0) == 6.0
+    assert (ask("a", 5.0), ask("a", 0.0)) == (5.0, 5.0)  # half of an entry is none, and is made whole
+    for number, damage in enumerate((cut, flip, empty_answer, other_answer), 6):
+        damage(cache / ("c" * 64))
+        assert (ask("c", number), ask("c", 0.0)) == (number, number), damage
     shutil.rmtree(cache)
     cache.write_text("a file")
     assert ask("a", 7.0) == 7.0
 
 
+BAKE = """
+import sys, time, shutil
+from pathlib import Path
+import numpy as np
+from blender_addon.bake import bake_cache
+cache, place, number, hangs = Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), sys.argv[4] == "hangs"
+place.mkdir()
+copy = shutil.copyfile
+def slow(source, target):
+    copy(source, target)
+    while hangs:
+        print("copied", flush=True)
+        time.sleep(60.0)
+    time.sleep(0.3)
+bake_cache.shutil.copyfile = slow
+def bake():
+    for name in ("001.npy", "002.npy"):
+        np.save(place / name, np.full(1000, number, np.float32))
+    print("baked", flush=True)
+    sys.stdin.readline()
+    return {"leaves": [number]}
+print(bake_cache.cached(cache, "a" * 64, place, bake)["leaves"][0], flush=True)
+"""
+
+
+def baking(tmp_path: Path, number: float, words: str = "") -> Any:
+    """A process that has baked, and keeps the bake once it reads a line."""
+    place = str(tmp_path / f"place_{number:g}")
+    command = [sys.executable, "-c", BAKE, str(tmp_path / "cache"), place, str(number), words]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "baked\n"
+    return process
+
+
+def test_two_that_bake_the_same_at_once_leave_one_whole_entry(tmp_path: Path) -> None:
+    both = [baking(tmp_path, number) for number in (1.0, 2.0)]
+    for process in both:
+        process.stdin.write("\n")
+        process.stdin.flush()
+    assert [process.communicate()[0] for process in both] == ["1.0\n", "2.0\n"]
+    (kept,) = (tmp_path / "cache").iterdir()
+    (tmp_path / "place").mkdir()
+    (found,) = cached(tmp_path / "cache", kept.name, tmp_path / "place", pytest.fail)["leaves"]
+    assert {np.load(path)[-1] for path in (tmp_path / "place").iterdir()} == {found}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows cannot be asked for a process")
+def test_one_that_is_killed_while_it_keeps_a_bake_leaves_none(tmp_path: Path) -> None:
+    killed = baking(tmp_path, 1.0, "hangs")
+    killed.stdin.write("\n")
+    killed.stdin.flush()
+    assert killed.stdout.readline() == "copied\n"
+    assert len(list((tmp_path / "cache").glob("*/*.npy"))) == 1
+    killed.kill()
+    killed.communicate()
+    (tmp_path / "place").mkdir()
+    assert cached(tmp_path / "cache", "a" * 64, tmp_path / "place", lambda: bake_into(tmp_path / "place", 3.0)) == {
+        "leaves": [3.0]
+    }
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == ["a" * 64]
+
+
 def test_the_second_export_takes_the_bake_of_the_first(
     ball: Any, export: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Told by a number written into what was kept."""
+    """Told by a number written into what is kept."""
+    from blender_addon.bake import bake_cache
+
     monkeypatch.setenv("MFO_BAKES", str(tmp_path / "cache"))
     add_camera("ORTHO", ortho_scale=4.0)
     target = add_quad("Target", 1.0, 1.5, new_material("Target"))
@@ -282,7 +372,9 @@ def test_the_second_export_takes_the_bake_of_the_first(
     (kept,) = (tmp_path / "cache").iterdir()
     text = (kept / "answer.json").read_text()
     assert '"IOR": 1.5' in text
-    (kept / "answer.json").write_text(text.replace('"IOR": 1.5', '"IOR": 1.75'))
+    entry = json.loads(text.replace('"IOR": 1.5', '"IOR": 1.75'))
+    entry["digest"] = bake_cache._digest(entry["answer"], {name: kept / name for name in entry["files"]})
+    (kept / "answer.json").write_text(json.dumps(entry))
     assert ior() == 1.75
     node(ball, "BsdfPrincipled").inputs["Coat Weight"].default_value = 0.3
     assert ior() == 1.5
