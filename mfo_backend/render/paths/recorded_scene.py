@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from ...material.recorded_models import RecordedModel, recorded_model
 from ...types.errors import UnrecordableError
-from ...types.image import Pixels
 from ...types.parameter import Value
 from ..camera.highlight_cells import Highlights
 from ..camera.primary_rays import tile_order
@@ -67,8 +66,8 @@ class RecordedScene:
     """Recording and evaluation for one renderer; `covered` is the number of pixels that see its target and count.
 
     Nothing is recorded of pixels where `counts` is False, (height, width); None counts everywhere. `part` is the part
-    of all lanes and rays that its recordings may have, where there are those of other pictures, too. Lanes to evaluate
-    are then those of all of them, and `graph` is what nodes give all of them.
+    of all lanes and rays that its recordings may have, where there are those of other pictures, too; `graph` is then
+    what nodes give all pictures.
 
     Raises
     ------
@@ -96,10 +95,8 @@ class RecordedScene:
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
         self.graph = graph or renderer.graph
-        self._varying, self._evaluated = (
-            None if each is None else VaryingValues(each, renderer.table, self.model.table)
-            for each in (renderer.graph, self.graph)
-        )
+        varying = partial(VaryingValues, table=renderer.table, sizes=self.model.table)
+        self._varying, self._evaluated = (each and varying(each) for each in (renderer.graph, self.graph))
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._evaluated)
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
         self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
@@ -125,7 +122,7 @@ class RecordedScene:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
         scene, sampled = self.renderer.scene, not self.lights_exact
         limit = int(getattr(self._integrator, "max_depth", 2))
-        depth = DEEPEST if limit < 0 or limit > DEEPEST else limit
+        depth = DEEPEST if limit < 0 else min(limit, DEEPEST)
         if depth <= 2:
             return SceneNeeds(sampled, 2, ())
         width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
@@ -160,7 +157,6 @@ class RecordedScene:
         """
         needs = needs or self.needs
         self.renderer.show(vector)
-        hide = bool(getattr(self._integrator, "hide_emitters", False))
         samples = samples if needs.sampled else 1
         lanes = float(self._covered) * float(np.mean(np.square(grid))) * (2 * samples if needs.sampled else 1)
         if self._near_target.any():
@@ -173,7 +169,7 @@ class RecordedScene:
             seed=seed,
             depth=needs.depth,
             proposal=self._proposal(vector, near=near),
-            hide_emitters=hide,
+            hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
             stride=stride,
             two_sided=self.model.two_sided,
             held=self._held,
@@ -279,7 +275,8 @@ class RecordedScene:
         It remembers two: solutions are compared in pairs.
         """
         constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
-        difference = _averaged(groups, paths.constant_difference)
+        apart = paths.constant_difference
+        difference = None if apart is None else groups.average(apart)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
@@ -310,7 +307,8 @@ class RecordedScene:
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """The function from a vector to image and Jacobian of the groups, background included."""
         constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
-        difference = _averaged(groups, paths.constant_difference)
+        apart = paths.constant_difference
+        difference = None if apart is None else groups.average(apart)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         cost = with_derivatives(self._share(groups), self.renderer.table.length)
 
@@ -361,10 +359,6 @@ class RecordedScene:
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
-
-
-def _averaged(groups: LaneGroups, image: Pixels | None) -> NDArray[np.float32] | None:
-    return None if image is None else groups.average(image)
 
 
 def _rays(squares: NDArray[np.int64], stride: int) -> int:
