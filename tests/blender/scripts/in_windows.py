@@ -16,7 +16,7 @@ from pathlib import Path
 import addon_utils
 import bpy
 
-sys.path.append(str(Path(__file__).parent))
+sys.path += [str(Path(__file__).parent), str(Path(__file__).parent / "timing")]
 import steps
 import stopwatch
 from steps import material, plain_picture, roughness, runtime

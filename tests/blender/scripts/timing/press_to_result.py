@@ -18,7 +18,7 @@ from pathlib import Path
 
 import bpy
 
-sys.path.append(str(Path(__file__).parent))
+sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 import steps
 import stopwatch
 from steps import runtime
