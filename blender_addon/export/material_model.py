@@ -65,7 +65,8 @@ class Material:
     path of names to its node, `labels` what that calls sockets that have another name here, and `is_nearest` says that
     its model is only the nearest. Free besides the fitted leaf's values are sockets of leaves, `free` with the names of
     their values, and Mix `factors`, which a weight depends on by its `ways`; both as in request.json. Values inside
-    nodes change sockets or weight of a leaf that `varies`.
+    nodes change sockets or weight of a leaf that `varies`. Where `emission_is_dimmed` its emission is what leaves its
+    alpha, coat and sheen, as a bake has it.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Material:
     factors: tuple[dict[str, Any], ...] = ()
     ways: tuple[dict[str, Any], ...] = ()
     varies: bool = False
+    emission_is_dimmed: bool = False
 
     @property
     def is_mixed(self) -> bool:

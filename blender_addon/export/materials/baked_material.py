@@ -99,7 +99,9 @@ class Baked:
             return {identifier: Material(name, "emission" if emission else "diffuse", {"Base Color": BLACK} | emission)}
         if len(weighted) == 1:
             whole = weighted[0][1]
-            return _with_normal(identifier, replace(whole, sockets=whole.sockets | emission), emission)
+            return _with_normal(
+                identifier, replace(whole, sockets=whole.sockets | emission, emission_is_dimmed=True), emission
+            )
         found: dict[str, Material] = {}
         parts = []
         for number, (share, material) in enumerate(weighted):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -68,22 +69,47 @@ def _mixed(parts: Sequence[Part], identifier: str, save: Callable[[Texture], str
     return add(plugin("bsdf", "blendbsdf", identifier), shown, reference(parts[0].bsdf), others)
 
 
-def emission_element(material: Material, scale: float, save: Callable[[Texture], str]) -> Element | None:
-    """Return the `<emitter>` for a shape of `material`, its radiance times `scale`; None if it emits nothing."""
+def emission_element(
+    material: Material, scale: float, save: Callable[[Texture], str], *, is_target: bool
+) -> Element | None:
+    """Return the `<emitter>` for a shape of `material`, its radiance times `scale`; None if it emits nothing.
+
+    What Alpha lets pass does not glow, in Cycles' Principled BSDF; of a target alpha may be sought, so it is left out.
+    """
     color, strength = material.sockets.get("Emission Color"), material.sockets.get("Emission Strength")
     if material.emission.max(initial=0.0) <= 0.0:
         return None
     emitter = plugin("emitter", "area")
     if material.is_mixed or color is None or strength is None:  # of a mix the mean; the backend has the whole of it
         return add(emitter, rgb("radiance", material.emission * scale))
-    if color.texture is not None and strength.texture is None:
-        pixels = (color.texture.pixels * float(strength.value) * scale).astype(np.float32)
-        shown = Texture(pixels, color.texture.uv_matrix, color.texture.wrap, color.texture.filter_type)
-        return add(emitter, _value("radiance", None, shown, save))
-    return add(emitter, rgb("radiance", material.emission * scale))
+    alpha = Socket(1.0) if is_target or material.emission_is_dimmed else material.sockets.get("Alpha", Socket(1.0))
+    dimmed = scale * min(max(float(alpha.value), 0.0), 1.0)
+    if strength.texture is not None:
+        return add(emitter, rgb("radiance", material.emission * dimmed))
+    shown = _product(color, alpha)
+    if shown is not None:
+        pixels = (shown.pixels * float(strength.value) * scale).astype(np.float32)
+        return add(emitter, _value("radiance", None, replace(shown, pixels=pixels), save))
+    if color.texture is not None:
+        pixels = (color.texture.pixels * float(strength.value) * dimmed).astype(np.float32)
+        return add(emitter, _value("radiance", None, replace(color.texture, pixels=pixels), save))
+    return add(emitter, rgb("radiance", material.emission * dimmed))
 
 
-def approximated(material: Material) -> list[str]:
+def _product(color: Socket, alpha: Socket) -> Texture | None:
+    """A colour times an alpha that is a picture; None where that is none, or lies elsewhere than the colour's."""
+    if alpha.texture is None:
+        return None
+    if color.texture is None:
+        return replace(alpha.texture, pixels=np.clip(alpha.texture.pixels, 0.0, 1.0) * np.float32(color.value))
+    first, second = color.texture, alpha.texture
+    same = first.pixels.shape[:2] == second.pixels.shape[:2] and np.allclose(first.uv_matrix, second.uv_matrix)
+    if not same or (first.wrap, first.filter_type) != (second.wrap, second.filter_type):
+        return None
+    return replace(first, pixels=first.pixels * np.clip(second.pixels, 0.0, 1.0))
+
+
+def approximated(material: Material, *, is_target: bool) -> list[str]:
     """Return a sentence for each thing that no model of the backend has, Blender's own included."""
     found = []
     if material.value("Subsurface Weight", 0.0) != 0.0:
@@ -94,11 +120,18 @@ def approximated(material: Material) -> list[str]:
     above = [
         name
         for name, nothing in (("Coat Weight", 0.0), ("Sheen Weight", 0.0), ("Alpha", 1.0))
-        if material.value(name, nothing) != nothing
+        if material.value(name, nothing) != nothing and not (name == "Alpha" and not is_target and _dims(material))
     ]
-    if above and material.emission.max(initial=0.0) > 0.0:
+    if above and material.emission.max(initial=0.0) > 0.0 and not material.emission_is_dimmed:
         found.append(f"the emission is not dimmed by {', '.join(above)}, as it is in Cycles.")
     return found
+
+
+def _dims(material: Material) -> bool:
+    """Whether Alpha dims the exported emission pixel by pixel."""
+    color, alpha = (material.sockets.get(name, Socket(1.0)) for name in ("Emission Color", "Alpha"))
+    strength = material.sockets.get("Emission Strength", Socket(0.0))
+    return alpha.texture is None or (strength.texture is None and _product(color, alpha) is not None)
 
 
 def _transmits(material: Material) -> bool:
@@ -125,7 +158,7 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
             f"Material '{material.name}': {', '.join(lost)} has no counterpart in Mitsuba's principled and is missing "
             "in a fit with the model mitsuba_principled."
         )
-    for sentence in approximated(material):
+    for sentence in approximated(material, is_target=every):
         findings.note(f"Material '{material.name}': {sentence}")
     element = plugin("bsdf", "principled")
     for name, value in values.items():

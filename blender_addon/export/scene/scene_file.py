@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -112,7 +113,7 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
             "passes through it differs from Cycles."
         )
     for shape in scene.shapes:
-        children += _shape_elements(shape, scene, radius * BACK_OFFSET, files)
+        children += _shape_elements(shape, scene, radius * BACK_OFFSET, files, fitted)
     files.text = scene_text(children)
     return files
 
@@ -134,7 +135,9 @@ def _weigh(emitters: list[tuple[Element, float]]) -> None:
         add(element, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
 
 
-def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneFiles) -> list[Element]:
+def _shape_elements(
+    shape: Shape, scene: SceneData, offset: float, files: SceneFiles, fitted: Set[str]
+) -> list[Element]:
     material = scene.materials[shape.bsdf]
     sides = [(shape.identifier, shape.mesh)]
     # an area emitter of Mitsuba shines on one side, a surface of Blender on both
@@ -146,7 +149,7 @@ def _shape_elements(shape: Shape, scene: SceneData, offset: float, files: SceneF
         files.meshes[path] = mesh
         element = add(plugin("shape", "ply", identifier), string("filename", path), reference(shape.bsdf))
         add(element, *_shadows(shape))
-        emitter = emission_element(material, scene.settings.exposure, files.texture)
+        emitter = emission_element(material, scene.settings.exposure, files.texture, is_target=shape.bsdf in fitted)
         elements.append(element if emitter is None else add(element, emitter))
     return elements
 

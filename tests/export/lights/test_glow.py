@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A glowing panel with holes or layers above a floor: Cycles against the exported scene in Mitsuba."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from ..scene.test_light_levels import tiles
+from ..scenes import add_camera, add_quad, diffuse_material, new_material
+
+GLOW = {"Emission_Color": (1.0, 0.5, 0.2), "Emission_Strength": 2.0}
+BLACK = {"Base_Color": (0.0, 0.0, 0.0), "Specular_IOR_Level": 0.0, "Roughness": 1.0}
+
+
+def image_node(material: Any) -> Any:
+    """An image node of smooth colours and alphas: between its pixels a product is not that of the pixels."""
+    image = bpy.data.images.new("glow", 16, 16, float_buffer=True, alpha=True)
+    image.alpha_mode = "CHANNEL_PACKED"
+    x, y = np.meshgrid(np.linspace(0.0, 3.0, 16), np.linspace(0.0, 2.0, 16))
+    waves = np.stack([np.sin(x + y), np.cos(x - y), np.sin(2.0 * y), np.cos(2.0 * x)], axis=-1)
+    image.pixels.foreach_set((0.5 + 0.4 * waves).astype(np.float32).ravel())
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    return node
+
+
+def link(material: Any, output: Any, name: str) -> None:
+    tree = material.node_tree
+    shader = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    tree.links.new(output, shader.inputs[name])
+
+
+def even(material: Any) -> None:
+    shader = material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    shader.inputs["Alpha"].default_value = 0.4
+
+
+def holes(material: Any) -> None:
+    link(material, image_node(material).outputs["Alpha"], "Alpha")
+
+
+def coloured(material: Any) -> None:
+    even(material)
+    link(material, image_node(material).outputs["Color"], "Emission Color")
+
+
+def sprite(material: Any) -> None:
+    node = image_node(material)
+    link(material, node.outputs["Alpha"], "Alpha")
+    link(material, node.outputs["Color"], "Emission Color")
+
+
+def baked(material: Any) -> None:
+    """Nodes that Cycles bakes, below a coat: the bake has what leaves both."""
+    noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
+    link(material, noise.outputs[0], "Alpha")
+    shader = material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    shader.inputs["Coat Weight"].default_value = 0.8
+    shader.inputs["Coat Tint"].default_value = (0.5, 0.5, 0.5, 1.0)
+
+
+@pytest.mark.parametrize("change", [even, holes, coloured, sprite, baked], ids=lambda change: change.__name__)
+def test_alpha_dims_what_it_lets_through(
+    scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any, change: Any
+) -> None:
+    add_quad("Floor", 4.0, 0.0, diffuse_material("Floor", (0.5, 0.5, 0.5)))
+    add_camera("ORTHO", ortho_scale=2.0)
+    target = add_quad("Target", 0.2, 0.001, new_material("Target"))
+    material = new_material("Panel", **BLACK, **GLOW)
+    panel = add_quad("Panel", 1.2, 1.0, material)
+    panel.data.uv_layers.new()
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 4  # Mitsuba counts what a ray passes
+    change(material)
+    report = export(target)
+    expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, spp=256))
+    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
+    np.testing.assert_allclose(found, expected, rtol=0.1, atol=0.02)
+    assert not [note for note in report.notes if "dimmed" in note]
