@@ -10,8 +10,10 @@ from functools import partial
 from typing import Any, Protocol
 
 from ..metrics.display.tone_mapping import View
+from ..render.paths.recorded_scene import RecordedScene
 from ..render.pictures.mitsuba_renderer import MitsubaRenderer
 from ..render.pictures.renderer import Interrupted, Renderer, Vector
+from ..render.sheet.recorded_sheet import RecordedSheet
 from ..render.sheet.sheet_renderer import SheetRenderer
 from ..types.errors import UnrecordableError
 from ..types.event import Listener, Preview, Started
@@ -72,6 +74,7 @@ def recover_material(
     judged: bool = True,
     nearer_than: float | None = None,
     candidates: Candidates = NOTHING_ELSE,
+    recorded: RecordedScene | RecordedSheet | None = None,
 ) -> FitOutcome:
     """Recover the renderer's parameters from a picture of the same scene.
 
@@ -102,6 +105,8 @@ def recover_material(
         come below it.
     candidates
         The scene's other cameras and lights, from which a further picture could be proposed.
+    recorded
+        What records the renderer's target, where an earlier fit has made it.
 
     Raises
     ------
@@ -117,7 +122,7 @@ def recover_material(
     task = check_task(renderer, reference, settings, display, listener, should_stop)
     task = replace(task, nearer_than=nearer_than, candidates=candidates)
     reasons: list[str] = []
-    for make, why in _ways(task, plan, begin, hand_over=hand_over):
+    for make, why in _ways(task, plan, begin, recorded, hand_over=hand_over):
         try:
             return _fit_along(make(), task, reasons, why, noted=noted, judged=judged)
         except UnrecordableError as error:
@@ -127,17 +132,24 @@ def recover_material(
     raise UnrecordableError(" ".join(reasons))
 
 
-def _ways(task: FitTask, plan: RecordedPlan | None, begin: Vector | None, *, hand_over: bool) -> Iterator[_Way]:
+def _ways(
+    task: FitTask,
+    plan: RecordedPlan | None,
+    begin: Vector | None,
+    recorded: RecordedScene | RecordedSheet | None,
+    *,
+    hand_over: bool,
+) -> Iterator[_Way]:
     """The routes by their order."""
     renderer, settings = task.renderer, task.settings
     several = renderer if settings.preset != "paper" and isinstance(renderer, SheetRenderer) else None
     ours = renderer if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer) else None
     no_losses = ""
     if several is not None:  # nothing stands in: whole light paths are traced for one picture, and the loop takes long
-        yield lambda: RecordedRoute(task, several, plan), lambda stages: ""
+        yield lambda: RecordedRoute(task, several, plan, begin, recorded), lambda stages: ""
         return
     if ours is not None:
-        yield lambda: RecordedRoute(task, ours, plan, begin), lambda stages: ""
+        yield lambda: RecordedRoute(task, ours, plan, begin, recorded), lambda stages: ""
         if ours.graph is not None:  # no other way has the slopes of values inside nodes
             return
         if settings.losses is None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import NormalEquations, Solution, step_in_box
 from ...types.parameter import ParameterTable
 from ..tolerances import OFF, SIGNIFICANT
@@ -87,6 +88,18 @@ def is_off(name: str, x: Vector, table: ParameterTable) -> bool:
     """Whether a value in `x` is so near its lower bound that it counts as none."""
     part = table.slice_of(name)
     return bool(np.all((x - table.lower)[part] <= OFF * (table.upper - table.lower)[part]))
+
+
+def with_user_details(x: Vector, user: Vector, table: ParameterTable) -> Vector:
+    """`x` with the user's details of the lobes that it does not have: no picture shows those."""
+    y = x.copy()
+    for detail, amount in AMOUNT_OF.items():
+        if detail not in table.names or amount not in table.names:
+            continue
+        part = table.slice_of(amount)
+        if np.all(x[part] == 0.0):
+            y[table.slice_of(detail)] = user[table.slice_of(detail)]
+    return y
 
 
 def dispensable(names: Iterable[str], cost: Callable[[list[str]], float], limit: float) -> list[str]:

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.display.colour import srgb_from_linear
+from ...metrics.flip.flip_filters import DEFAULT_PIXELS_PER_DEGREE, flip_reach
 from ...metrics.flip.ldr_flip import flip_map
 from ...metrics.pixels.neighbours import sums_around
 from ...types.verdict import Difference
+from .region import blocks_around
 
 # Pixels between two whose differences are multiplied. Those next to each other may share some of their noise: by
 # compression, by resampling
@@ -54,6 +56,8 @@ def beyond_noise(
     """
     if np.count_nonzero(mask) < LEAST_PIXELS:
         return None
+    near = blocks_around(mask, 1, flip_reach(DEFAULT_PIXELS_PER_DEGREE))  # all that counts, and what FLIP sees of it
+    reference, result, mask = reference[near], result[near], mask[near]
     shown = [_display(_blurred(light, mask)) for light in (reference, result)]
     seen = _mean_flip(shown[0], shown[1], mask)
     apart = np.where(mask[..., None], reference - result, 0.0).astype(np.float64)

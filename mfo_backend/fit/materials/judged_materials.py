@@ -75,13 +75,13 @@ def fit_together(
     Interrupted
         If it was asked to stop before one of them had been fitted.
     """
-    check_members(members, reference)
+    recorded = check_members(members, reference)
     tasks = [
         check_task(member.renderer, reference, member.settings, display, listener, should_stop) for member in members
     ]
     begin()
     turns = take_turns(
-        members, reference, tasks[0].light, display=display, listener=listener, should_stop=should_stop
+        members, reference, tasks[0].light, recorded, display=display, listener=listener, should_stop=should_stop
     )  # fmt: skip
     starts = [member.renderer.start for member in members]
     start = np.mean(_halves(members, starts, START_SAMPLES), axis=0, dtype=np.float32)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.display.tone_mapping import View
+from ...render.paths.recorded_scene import DIRECT, RecordedScene
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Interrupted
 from ...render.sheet.recorded_sheet import RecordedSheet
@@ -22,6 +23,7 @@ from ...types.status import Status
 from ..judge.checked_reference import check_reference
 from ..plans import RecordedPlan
 from ..random_streams import Stream
+from ..recorded.fit import recorded_scene
 from ..recover_material import recover_material
 from ..result.outcome import FitOutcome
 from ..settings import FitSettings
@@ -38,6 +40,9 @@ MOST_ROUNDS = 4
 LIGHT_MOVED = 0.01
 NOT_YET = "The fit was stopped before it came to this material."
 LOOK_SAMPLES = 8  # of a pixel of the picture that says how far the light has moved; all have the same random numbers
+
+
+Recorded = RecordedScene | RecordedSheet | None  # None where whole light paths are traced
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,8 @@ class Turns:
     still: bool
 
 
-def check_members(members: Sequence[Member], reference: Image) -> None:
-    """Refuse what cannot be fitted together.
+def check_members(members: Sequence[Member], reference: Image) -> list[Recorded]:
+    """Refuse what cannot be fitted together; what records each of the members.
 
     Raises
     ------
@@ -84,27 +89,32 @@ def check_members(members: Sequence[Member], reference: Image) -> None:
         raise BadInputError(
             "The preset 'paper' fits one material alone: choose 'fast', 'balanced' or 'best' for several."
         )
+    recorded: list[Recorded] = []
     for member in members:
-        if not member.renderer.table.length:
+        renderer = member.renderer
+        if not renderer.table.length:
             raise BadInputError(f"Material '{member.name}' has no value that can be fitted: leave it out.")
         try:
-            check_reference(reference, member.renderer.target_mask())
+            mask = check_reference(reference, renderer.target_mask())
         except BadInputError as error:
             raise BadInputError(f"Material '{member.name}': {error}") from error
-        if isinstance(member.renderer, SheetRenderer):
-            try:
-                RecordedSheet(member.renderer, reference.counts)
-            except UnrecordableError as error:
+        try:
+            recorded.append(recorded_scene(renderer, mask, reference.counts))
+        except UnrecordableError as error:
+            if isinstance(renderer, SheetRenderer):
                 raise BadInputError(
                     f"Material '{member.name}' cannot be fitted to several pictures: {error} Leave it out, or all "
                     "pictures but one."
                 ) from error
+            recorded.append(None)
+    return recorded
 
 
 def take_turns(
     members: Sequence[Member],
     reference: Image,
     light: Pixels,
+    recorded: Sequence[Recorded],
     *,
     display: View | None,
     listener: Listener,
@@ -115,7 +125,7 @@ def take_turns(
     The first round searches from nothing, quickly. The second has the preset's plan and searches again what sees other
     light than at its own first fit: in wrong light a coat or a sheen is easily missed, and no solution nearby has it.
     Those after it fit again what sees other light than at its own last fit, from its values there. A queue ends with
-    the first. `light` is the reference as scene-linear radiance.
+    the first. `light` is the reference as scene-linear radiance, `recorded` what `check_members` says.
 
     Raises
     ------
@@ -145,12 +155,14 @@ def take_turns(
                 continue
             still = queue
             member = members[k]
+            _share_needs(recorded, k)
             quick = replace(member.settings, preset="fast", verify_spp=LOOK_SAMPLES, losses=None)
             plan = None if number == 1 else RecordedPlan.of(member.settings.preset).among_others()
             try:
                 outcome = recover_material(
                     member.renderer, reference, quick if number == 1 else member.settings, display=display,
                     listener=course.of(k, number), should_stop=should_stop, hand_over=False, plan=plan,
+                    recorded=recorded[k],
                     begin=None if number == 1 or (number == 2 and moved) else present[k], judged=False,
                 )  # fmt: skip
             except UnrecordableError as error:
@@ -165,6 +177,16 @@ def take_turns(
     ended = [outcome or _as_it_was(member) for outcome, member in zip(outcomes, members, strict=True)]
     values = [x if outcome else m.renderer.start for x, outcome, m in zip(present, outcomes, members, strict=True)]
     return Turns(tuple(ended), tuple(values), number, still)
+
+
+def _share_needs(recorded: Sequence[Recorded], at: int) -> None:
+    """Record light over other surfaces for all where the one `at` this place needs it: that is asked with many rays."""
+    one = recorded[at]
+    if one is None or one.needs.depth <= DIRECT:
+        return
+    for other in recorded:
+        if other is not None:
+            other.needs = one.needs
 
 
 def _as_it_was(member: Member) -> FitOutcome:

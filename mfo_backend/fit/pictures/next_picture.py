@@ -47,6 +47,7 @@ GRID = 1  # squared: camera rays of a pixel. No measurement
 # Information of a direction, of the largest, from which on the unit is taken from it. Smaller: noise of few lanes sets
 # the unit. No measurement.
 STRONG = 1e-3
+DRAWS = 4  # of a candidate's residuals: one alone may put a firefly on the tile that rules a value. No measurement
 _SAME_PLACE = 1e-3  # of matrices of cameras, metres and sines: far above float32, far below a turn of 30 degrees
 
 
@@ -88,17 +89,23 @@ class Evidence:
     def with_further(self, told: _Told, unit: float, table: ParameterTable) -> Vector:
         """The covariance with a further picture, whose derivatives count in this `unit`.
 
-        Its residuals are as large as the present ones, of signs by chance.
+        Its residuals are drawn from the present ones, a tile's three channels together, for they share most of their
+        noise. The covariance is the mean over some draws.
         """
-        size = float(np.sqrt(np.mean(np.square(self.rows[:, :, 0]))))
+        random = np.random.default_rng(0)
         rows = told.rows / unit
-        rows[:, :, 0] = size * np.random.default_rng(0).choice((-1.0, 1.0), rows.shape[:2])
         own = None
         if self.own is not None:
             further = np.zeros_like(rows) if told.own is None else told.own / unit
             further[:, :, 0] = 0.0
             own = np.concatenate([self.own, further])
-        return covariance(np.concatenate([self.rows, rows]), own, table, self.model_error)
+
+        def drawn() -> Vector:
+            tiles = random.integers(len(self.rows), size=len(rows))
+            rows[:, :, 0] = self.rows[tiles, :, 0] * random.choice((-1.0, 1.0), (len(rows), 1))
+            return covariance(np.concatenate([self.rows, rows]), own, table, self.model_error)
+
+        return np.mean([drawn() for _ in range(DRAWS)], axis=0)
 
     def unit_of(self, present: _Told, table: ParameterTable) -> float:
         """How much larger the derivatives of the present picture's few lanes are than those of the fit.

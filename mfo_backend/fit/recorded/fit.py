@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...metrics.display.baked_view import BakedView
 from ...metrics.display.tone_mapping import DisplayView
@@ -59,10 +60,26 @@ NOTHING_BUT_NOISE = (
 )
 
 
+def recorded_scene(
+    renderer: MitsubaRenderer | SheetRenderer, mask: NDArray[np.bool_], counts: NDArray[np.bool_] | None
+) -> RecordedScene | RecordedSheet:
+    """What records a renderer's target, which `mask` sees, where `counts` is True.
+
+    Raises
+    ------
+    UnrecordableError
+        For materials that recorded paths cannot hold.
+    """
+    if isinstance(renderer, SheetRenderer):
+        return RecordedSheet(renderer, counts)
+    return RecordedScene(renderer, int(mask.sum()), counts=counts)
+
+
 class RecordedRoute:
     """A fit with no use of the material's start but as one guess; `plan` is that of the preset, unless it is given.
 
     Where light is sampled it may `begin` at values of an earlier fit in nearly the same light, instead of the search.
+    `scene` is that of the renderer and of what counts, where there is one already.
 
     The result is the best of the scene's own values and the end of every finishing stage, judged on path-traced
     pictures: by the least-squares residual of tiles for `fast` and where the picture's noise is reached, by the last of
@@ -82,6 +99,7 @@ class RecordedRoute:
         renderer: MitsubaRenderer | SheetRenderer,
         plan: RecordedPlan | None,
         begin: Vector | None = None,
+        scene: RecordedScene | RecordedSheet | None = None,
     ) -> None:
         settings = task.settings
         self._task, self._renderer = task, renderer
@@ -89,14 +107,10 @@ class RecordedRoute:
         named = None if settings.losses is None else settings.stage_names(task.reference.encoding)
         self._measure = named[-1] if named else task.measure
         self._finishing = finishing_residuals(settings, task.reference.encoding, task.light, task.mask, task.view)
-        several = isinstance(renderer, SheetRenderer)
-        counts = task.reference.counts
-        self._scene = (
-            RecordedSheet(renderer, counts) if several else RecordedScene(renderer, int(task.mask.sum()), counts=counts)
-        )
+        self._scene = scene or recorded_scene(renderer, task.mask, task.reference.counts)
         # where every light is exact the search is quick, and its recording serves for the refinement
         self._begin = begin if begin is not None and self._scene.needs.sampled else None
-        self._alone = begin is None  # of a fit in turns with others nobody asks for a further picture
+        self._alone = scene is None  # of a fit in turns with others nobody asks for a further picture
         self.stages = (
             *(STAGES if self._begin is None else STAGES[2:]),
             *self._finishing,

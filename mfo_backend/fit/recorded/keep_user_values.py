@@ -15,7 +15,7 @@ from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..alike.compare import rival_notes
-from ..alike.unneeded_lobes import box_holding, dispensable, moved_to_user, unneeded_lobes
+from ..alike.unneeded_lobes import box_holding, dispensable, moved_to_user, unneeded_lobes, with_user_details
 from ..certainty.covariance import certainties, covariance, standard_deviations, with_rivals
 from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
@@ -49,7 +49,7 @@ def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], fl
     """
     setting, refined = end.recording.setting, end.refined
     table, user = setting.table, setting.user
-    found, problem = refined.x, refined.all
+    found, problem = with_user_details(refined.x, user, table), refined.all
     judged, unseen_change = Judged(setting, refined, weighted), _UnseenChange(end.recording, refined, seen)
     cost, certainty, spread = judged(found)
     off = list(refined.off)
@@ -60,6 +60,7 @@ def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], fl
     if moved:
         allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
         simpler = _solve_holding(setting, refined, found, off)
+        simpler = None if simpler is None else with_user_details(simpler, user, table)
         if simpler is not None and (again := judged(simpler))[0] <= allowed + 1e-12 and unseen_change(simpler):
             found, (cost, certainty, spread) = simpler, again
         else:

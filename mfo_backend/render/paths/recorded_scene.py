@@ -50,7 +50,7 @@ MOST_RAYS = 12_000_000  # of one recording, those that miss the target included
 BYTES_PER_RAY_EXACT, BYTES_PER_RAY_SAMPLED = (150, 220), (340, 480)
 BYTES_PER_SAMPLE = 200  # of each further sample of the light
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
-DEEPEST = 16  # path length of a scene without a limit
+DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
 
 
 @dataclass(frozen=True)
@@ -121,10 +121,10 @@ class RecordedScene:
     def _probe(self) -> SceneNeeds:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
         scene, sampled = self.renderer.scene, not self.lights_exact
-        limit = int(getattr(self._integrator, "max_depth", 2))
+        limit = int(getattr(self._integrator, "max_depth", DIRECT))
         depth = DEEPEST if limit < 0 else min(limit, DEEPEST)
-        if depth <= 2:
-            return SceneNeeds(sampled, 2, ())
+        if depth <= DIRECT:
+            return SceneNeeds(sampled, DIRECT, ())
         width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
         stride = max(1, math.ceil(math.sqrt(width * height / PROBE_RAYS)))
         share = indirect_share(
@@ -132,7 +132,7 @@ class RecordedScene:
         )
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
-            return SceneNeeds(sampled, 2, (note,))
+            return SceneNeeds(sampled, DIRECT, (note,))
         return SceneNeeds(True, depth, ())
 
     def record(

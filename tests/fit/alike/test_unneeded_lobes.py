@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from mfo_backend.fit.alike.unneeded_lobes import box_holding, solve_without_unneeded
+from mfo_backend.fit.alike.unneeded_lobes import box_holding, solve_without_unneeded, with_user_details
 from mfo_backend.fit.tolerances import SIGNIFICANT
 from mfo_backend.solve.bounded_least_squares import NormalEquations, SolveLimits, solve_bounded
 from mfo_backend.types.parameter import Parameter, ParameterTable
@@ -81,3 +81,13 @@ def test_values_of_the_user_that_are_on_are_no_lobes():
     problem = Problem([0.5, 0.5, 0.6, 0.6], [5.0, 5.0, 0.05, 0.05])
     _, found = end_of(problem, np.array([0.4, 0.6, 0.6, 0.6]))
     assert found == ()
+
+
+def test_details_of_a_lobe_that_is_off_are_the_users():
+    """Noise had chosen them, and derivatives of the lobe's weight depend on them."""
+    table = ParameterTable(
+        Parameter(n, 1, 0.0, 1.0, 0.0) for n in ("sheen_weight", "sheen_roughness", "coat_roughness")
+    )
+    user = np.array([0.3, 0.5, 0.1])
+    np.testing.assert_array_equal(with_user_details(np.array([0.0, 0.9, 0.8]), user, table), [0.0, 0.5, 0.8])
+    np.testing.assert_array_equal(with_user_details(np.array([0.1, 0.9, 0.8]), user, table), [0.1, 0.9, 0.8])

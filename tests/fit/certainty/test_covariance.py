@@ -65,14 +65,29 @@ def test_noise_in_the_derivatives_makes_no_value_look_sharper():
     assert (np.mean(naive, axis=0) / INFLATION < 0.85 * scatter).all()
 
 
-def test_a_column_without_effect_is_as_unsure_as_its_box():
+def test_a_column_without_effect_may_lie_anywhere_in_its_box():
     jacobian = np.random.default_rng(1).normal(size=(200, 3, 4))
     jacobian[:, :, 3] = 0.0
     sd = standard_deviations(covariance(with_residual(jacobian, np.full((200, 3), 0.01)), None, TABLE), TABLE)
     levels = certainties(sd, TABLE)
-    assert sd[3] >= 2.0  # the width of its box
+    anywhere = np.random.default_rng(0).uniform(0.0, 2.0, 100_000)  # as far as that may be from a value at a bound
+    assert sd[3] == pytest.approx(np.sqrt(np.mean(anywhere**2)), rel=0.01)
     assert levels["width"].level is Level.NOT_VISIBLE
     assert levels["colour"].level is Level.DETERMINED
+
+
+def test_what_trades_against_a_value_that_cannot_leave_its_box_is_surer():
+    """Two columns whose effects nearly cancel: without the box both would be many boxes wide."""
+    random = np.random.default_rng(4)
+    jacobian = random.normal(size=(400, 3, 4))
+    jacobian[:, :, 3] = 0.05 * jacobian[:, :, 2] + 1e-5 * random.normal(size=(400, 3))
+    noise = random.normal(size=(400, 3))
+    rows = with_residual(jacobian, 0.01 * noise)
+    sd = standard_deviations(covariance(rows, None, TABLE), TABLE)
+    # of the posterior of a uniform prior, by the weights of points that the picture cannot tell: colour = -0.05 width
+    assert 0.3 * 2.0 < sd[3] <= 2.0 / np.sqrt(3.0)
+    assert sd[2] == pytest.approx(0.05 * sd[3], rel=0.05)
+    assert sd[0] < 0.001
 
 
 def test_an_exact_fit_still_has_the_error_of_the_model():

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from mfo_backend.fit.materials.rounds import LIGHT_MOVED, MOST_VALUES, NOT_YET, 
 from mfo_backend.fit.materials.whole_course import WholeCourse
 from mfo_backend.fit.result.outcome import FitOutcome
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.render.paths.recorded_scene import DIRECT, SceneNeeds
 from mfo_backend.render.pictures.pass_counter import PassCounter
 from mfo_backend.render.pictures.renderer import Interrupted
 from mfo_backend.types.errors import BadInputError
@@ -131,10 +134,12 @@ class Fits:
 
     def __init__(self, stop_after: int = 100) -> None:
         self.calls: list[tuple[str, str, bool]] = []
+        self.recorded: list[object] = []
         self.stop_after = stop_after
 
     def __call__(self, wall: Wall, reference: Image, settings: FitSettings, **options: object) -> FitOutcome:
         self.calls.append((wall._name, settings.preset, options["begin"] is not None))
+        self.recorded.append(options["recorded"])
         left = wall._name == "left"
         bright, lamp, lamp_of_other = (SHOWN.pixels[0, 0 if left else 7], *((1.0, 0.3) if left else (0.3, 1.0)))
         other = wall._shown["right" if left else "left"]
@@ -148,11 +153,13 @@ class Fits:
         return len(self.calls) >= self.stop_after
 
 
-def turns(fits: Fits, monkeypatch: pytest.MonkeyPatch, *, queue: bool = False) -> rounds.Turns:
+def turns(
+    fits: Fits, monkeypatch: pytest.MonkeyPatch, *, queue: bool = False, recorded: tuple = (None, None)
+) -> rounds.Turns:
     monkeypatch.setattr(rounds, "recover_material", fits)
     monkeypatch.setattr(rounds, "evened_light", lambda renderers, *_: [r.start.copy() for r in renderers])
     return take_turns(
-        members(3, queue=queue), SHOWN, SHOWN.pixels,
+        members(3, queue=queue), SHOWN, SHOWN.pixels, recorded,
         display=None, listener=lambda event: None, should_stop=fits.stopped,
     )  # fmt: skip
 
@@ -175,6 +182,28 @@ def test_a_queue_fits_each_once_and_quickly(monkeypatch: pytest.MonkeyPatch) -> 
     found = turns(fits, monkeypatch, queue=True)
     assert fits.calls == [("left", "fast", False), ("right", "fast", False)]
     assert (found.rounds, found.still) == (1, True)
+
+
+class Scene:
+    """What records a wall; it counts how often it is asked what it needs."""
+
+    def __init__(self, depth: int) -> None:
+        self._needs, self.asked = SceneNeeds(True, depth, ()), 0
+
+    @cached_property
+    def needs(self) -> SceneNeeds:
+        self.asked += 1
+        return self._needs
+
+
+@pytest.mark.parametrize(("depth", "asked"), [(16, 0), (DIRECT, 1)])
+def test_what_light_is_recorded_is_asked_for_the_largest_and_holds_for_all(monkeypatch, depth, asked) -> None:
+    """A probe for each material and round took a sixth of a queue's time."""
+    fits, scenes = Fits(), (Scene(depth), Scene(16))
+    turns(fits, monkeypatch, recorded=scenes)
+    assert (scenes[0].asked, scenes[1].asked) == (1, asked)
+    assert fits.recorded[:2] == [*scenes]  # each its own, in every round
+    assert set(map(id, fits.recorded)) == set(map(id, scenes))
 
 
 def test_what_was_found_before_a_stop_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.certainty.covariance import covariance
 from mfo_backend.fit.pictures import next_picture
 from mfo_backend.fit.pictures.next_picture import PRESENT, Choice, Evidence, Known, _proposal, _Told, predictions
 from mfo_backend.types.parameter import Parameter, ParameterTable
@@ -51,3 +52,19 @@ def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over(monkeypatch
     found = predictions(scene, known, SimpleNamespace(), np.zeros(3), 0)
     assert Choice(turn=60.0) not in found
     assert np.isfinite(found[Choice(turn=90.0)]).all()
+
+
+def test_a_second_picture_like_the_first_is_predicted_as_it_turns_out():
+    """Oracle: the covariance with a picture of other noise, whose three channels share it, and another scale."""
+    random = np.random.default_rng(1)
+
+    def rows(scale: float) -> np.ndarray:
+        shared = 0.3 * np.repeat(random.normal(size=(300, 1)), 3, axis=1)
+        slopes = random.normal(size=(300, 1, 2)) + 0.1 * random.normal(size=(300, 3, 2))
+        return np.concatenate([shared[:, :, None], scale * slopes * [1.0, 0.2]], axis=2)
+
+    first, second = rows(1.0), rows(1.0)
+    told = _Told(7.0 * second, None, np.empty(0))
+    predicted = Evidence(first, None, 0.0, 1).with_further(told, 7.0, TABLE)
+    realised = covariance(np.concatenate([first, second]), None, TABLE, 0.0)
+    np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.sqrt(np.diag(realised)), rtol=0.15)
