@@ -37,7 +37,8 @@ class Socket:
 
     `by_graph` says that nodes give it which Cycles has to evaluate; `seen` is the file with what they give where the
     camera sees the surface, `elsewhere` that for other rays if it hangs on the ray, and `value` the mean of the first,
-    once that is done.
+    once that is done. A normal that is `turned` has the opposite direction on the other side of the surface; others are
+    mirrored there.
     """
 
     value: Any
@@ -46,6 +47,7 @@ class Socket:
     by_graph: bool = False
     seen: Path | None = None
     elsewhere: Path | None = None
+    turned: bool = False
 
     @property
     def varies(self) -> bool:

@@ -36,22 +36,23 @@ def main() -> None:
     parser.add_argument("--graphs", nargs="+", choices=[*GRAPHS, *MIXES, *BUMPS], default=None)
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
     parser.add_argument("--seeds", type=int, default=1, help="scenes for each graph and light")
+    parser.add_argument("--views", type=int, choices=(1, 2), default=1, help="cameras whose pictures are fitted")
     parser.add_argument("--size", type=int, default=96, help="pixels along each side")
     chosen = parser.parse_args()
     import blender_addon
 
     blender_addon.register()  # what was applied is kept in properties of the material
     lines = chosen.rows.read_text("utf-8").splitlines() if chosen.rows.is_file() else []
-    keys = ("series", "graph", "light", "seed", "size")
-    known = {tuple({"series": SERIES[0], **json.loads(line)}[key] for key in keys) for line in lines}
+    keys = ("series", "graph", "light", "seed", "size", "views")
+    known = {tuple({"series": SERIES[0], "views": 1, **json.loads(line)}[key] for key in keys) for line in lines}
     all_graphs = {"sockets": GRAPHS, "values": FITTED, "mixes": MIXES, "bumps": BUMPS}[chosen.series]
     graphs = chosen.graphs or list(all_graphs)
     for seed in range(chosen.seeds):
         for light in chosen.lights:
             for graph in graphs:
-                if (chosen.series, graph, light, seed, chosen.size) in known:
+                if (chosen.series, graph, light, seed, chosen.size, chosen.views) in known:
                     continue
-                made = row(graph, light, seed, chosen.size, chosen.series)
+                made = row(graph, light, seed, chosen.size, chosen.series, chosen.views)
                 with chosen.rows.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(made) + "\n")
                 print(json.dumps(made), flush=True)

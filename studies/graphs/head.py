@@ -51,3 +51,15 @@ def head_scene(light: str, size: int) -> Any:
     target.data.materials.append(material)
     nodes: Any = material.node_tree.nodes  # pyright: ignore[reportOptionalMemberAccess]
     return target, next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+
+
+def side_camera() -> Any:
+    """A second camera, 70 degrees around the head and above it."""
+    import bpy
+    import mathutils
+
+    camera = bpy.data.objects.new("Side", bpy.data.objects["Camera"].data)
+    camera.location = (3.8, -1.4, 1.6)
+    camera.rotation_euler = (-mathutils.Vector(camera.location)).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(camera)
+    return camera

@@ -22,7 +22,7 @@ from mfo_backend.types.image import Encoding, Image, Pixels
 
 from ..verdicts.summary import DEVIATIONS, OFF
 from .bumps import BUMPS
-from .head import head_scene
+from .head import head_scene, side_camera
 from .materials import GRAPHS
 from .mixes import MIXES, DrawnMix, put_mix
 from .values import FITTED, SOCKETS, Drawn
@@ -42,11 +42,12 @@ def build_scene(graph: str, light: str, size: int) -> Any:
     return target, node
 
 
-def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, Any]:
-    """One fit and what Cycles says of it."""
+def row(graph: str, light: str, seed: int, size: int, series: str, views: int = 1) -> dict[str, Any]:
+    """One fit, to pictures of one or two cameras, and what Cycles says of it in the first."""
     import bpy
 
     from blender_addon.export.job import export_job
+    from blender_addon.export.reference.picture_setup import PictureSetup
     from blender_addon.result.job_result import read_job_result
     from blender_addon.result.write_back import apply_values, result_to_sockets
 
@@ -64,16 +65,21 @@ def row(graph: str, light: str, seed: int, size: int, series: str) -> dict[str, 
     start = drawn.draw(draw, near=truth)
     drawn.put(truth)
     reference, floor = (_cycles(SAMPLES[light], k) for k in (1, 2))
+    others = [] if views == 1 else [(side_camera().name, _cycles(SAMPLES[light], 5, "Side"))]
     drawn.put(start)
     before = _cycles(SAMPLES[light], 3)
     with tempfile.TemporaryDirectory() as folder:
         picture, job = Path(folder) / "reference.exr", Path(folder) / "job"
         write_exr(picture, reference)
+        setups = [PictureSetup(picture)]
+        for number, (camera, shown) in enumerate(others, 2):
+            write_exr(path := Path(folder) / f"{camera}.exr", shown)
+            setups.append(PictureSetup(path, number, camera=camera))
         began = time.monotonic()
         parameters = [name if "/" in name else name.lower().replace(" ", "_") for name in names]
-        export_job(bpy.context, target, job, reference=picture, fit={"parameters": parameters})
+        export_job(bpy.context, target, job, reference=setups if others else picture, fit={"parameters": parameters})
         done = run_folder(job, partial(fit_scene, blender=NODE_SERVER), is_new=True)
-        known = {"series": series, "graph": graph, "light": light, "seed": seed, "size": size}
+        known = {"series": series, "graph": graph, "light": light, "seed": seed, "size": size, "views": views}
         if done.result is None:
             return {**known, "failed": done.sentence}
         seconds = time.monotonic() - began
@@ -109,17 +115,19 @@ def _key_of(name: str, key: str, result: Any) -> str:
     return plain.get(name.removeprefix(own), name.removeprefix(own).lower().replace(" ", "_"))
 
 
-def _cycles(samples: int, seed: int) -> Pixels:
+def _cycles(samples: int, seed: int, camera: str = "Camera") -> Pixels:
     import bpy
     import OpenEXR
 
     scene = bpy.context.scene
+    scene.camera = bpy.data.objects[camera]
     scene.cycles.samples, scene.cycles.seed = samples, seed
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
     with tempfile.TemporaryDirectory() as folder:
         scene.render.filepath = str(Path(folder) / "cycles.exr")
         bpy.ops.render.render(write_still=True)
+        scene.camera = bpy.data.objects["Camera"]
         channels = OpenEXR.File(scene.render.filepath).channels()
         return np.array(channels["RGB"].pixels, np.float32)[..., :3]
 

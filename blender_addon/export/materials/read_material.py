@@ -9,6 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...probe.graph_copy import GROUP
 from ...versions import (
     DIFFUSE,
     PRINCIPLED,
@@ -230,7 +231,18 @@ def _read_direction(name: str, place: Place, material: str, findings: Findings) 
     by_graph = source is not None and not (name == "Tangent" and _is_uv_tangent(source.node))
     if by_graph:
         _refuse(name, place, material, findings, is_copied=True)
-    return Socket(plain_value(socket), source is not None, by_graph=by_graph)
+    turned = by_graph and _maker(source).bl_idname == "ShaderNodeNormalMap"
+    return Socket(plain_value(socket), source is not None, by_graph=by_graph, turned=turned)
+
+
+def _maker(source: bpy.types.NodeSocket) -> bpy.types.Node:
+    """The node that makes what an output gives, inside of groups where it is a group's."""
+    node = source.node
+    if node.bl_idname != GROUP or node.node_tree is None:
+        return node
+    end = next((n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput" and n.is_active_output), None)
+    inner = None if end is None else source_of(end.inputs[source.identifier])
+    return node if inner is None or inner.node.bl_idname == "NodeGroupInput" else _maker(inner)
 
 
 def read_context(material: bpy.types.Material | None, owner: str, findings: Findings) -> Material:

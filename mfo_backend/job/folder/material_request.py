@@ -22,7 +22,8 @@ _FILES = ("texture", "graph", "elsewhere")  # of a socket
 class Socket:
     """A socket of a Blender Principled node; a linked one stays as it is.
 
-    Files of the job: a `texture` over the UV map, a `graph` as the camera sees it, and `elsewhere` for other rays.
+    Files of the job: a `texture` over the UV map, a `graph` as the camera sees it, and `elsewhere` for other rays. A
+    normal that is `turned` has the opposite direction on the surface's other side, and is mirrored there if not.
     """
 
     value: Any = None
@@ -30,6 +31,7 @@ class Socket:
     texture: str | None = None
     graph: str | None = None
     elsewhere: str | None = None
+    turned: bool = False
 
 
 @dataclass(frozen=True)
@@ -112,13 +114,13 @@ def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
 
 
 def _socket(data: Any, where: str) -> Socket:
-    socket = CheckedObject(data, where, ("value", "linked", *_FILES))
+    socket = CheckedObject(data, where, ("value", "linked", "turned", *_FILES))
     value = socket.raw("value", None)
     numbers = value if isinstance(value, list) else [value]
     if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
         raise socket.wrong("value", "a number, a list of one to four, true, false or null")
     files = {key: socket.text(key) for key in _FILES if socket.raw(key, None) is not None}
-    return Socket(value, socket.boolean("linked", False), **files)
+    return Socket(value, socket.boolean("linked", False), turned=socket.boolean("turned", False), **files)
 
 
 def without_nothing(material: dict[str, Any]) -> None:
@@ -127,6 +129,8 @@ def without_nothing(material: dict[str, Any]) -> None:
         for key in _FILES:
             if socket[key] is None:
                 del socket[key]
+        if not socket["turned"]:
+            del socket["turned"]
     for key in MIX_KEYS:
         if not material[key]:
             del material[key]

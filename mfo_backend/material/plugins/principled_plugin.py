@@ -165,10 +165,12 @@ class BlenderPrincipled(mi.BSDF):
                 return instead
             length = dr.norm(given[name])
             found = given[name] / dr.maximum(length, 1e-6)
-            if name != "tangent":  # nodes gave it for the side that the camera sees: a bump is mirrored on the other
+            if name != "tangent":  # nodes gave it for the side that the camera sees
                 # at silhouettes a point takes its value from one that looks another way, on the same side of the mesh
                 behind = self.directions[name].surface.is_behind(si) & (dr.dot(found, smooth) < 0)
-                found = dr.select(behind, found - 2 * dr.dot(found, smooth) * smooth, found)
+                # Cycles (kernel/svm): a Normal Map is negated on back faces, a Bump turns their normal by its slope
+                other = -found if self.directions[name].turned else found - 2 * dr.dot(found, smooth) * smooth
+                found = dr.select(behind, other, found)
             return dr.select(length > 0.1, found, instead)
 
         bumped = normal("normal", smooth)

@@ -4,7 +4,8 @@
 Choose the variant before importing this. Properties are `filename` and `positions`, .npy files of float32
 (height, width, 1 or 3) for the same subpixels, world positions NaN where the camera does not see the surface, further
 `camera`, the (3, 4) matrix from the world to column, row and 1 as twelve numbers, and `outside`, the value of points
-that the camera does not see. The files may hold several `depths`, as of `seen_surface.SeenSurface`.
+that the camera does not see. Normals that are `turned` have the opposite direction on the other side of the surface;
+others are mirrored there (`principled_plugin`). The files may hold several `depths`, as of `seen_surface.SeenSurface`.
 
 Where values hang on the ray `elsewhere` is a file of what other rays find, one block of rows below the other for even
 steps of the cosine between ray and normal, 0 to 1. A block is as `filename` in a whole number of subpixels a place.
@@ -40,7 +41,7 @@ class ProjectiveTexture(mi.Texture):
         values = np.load(str(props["filename"]), allow_pickle=False)
         if values.ndim != 3 or values.shape[:2] != (self.surface.rows, self.surface.width):
             raise RuntimeError(f"{props['filename']} has the shape {values.shape}: it does not fit its positions")
-        self.size = values.shape[2]
+        self.size, self.turned = values.shape[2], bool(props.get("turned", False))
         outside = props.get("outside", 0.0)
         self.outside = mi.Color3f(outside if isinstance(outside, (int, float)) else mi.ScalarColor3f(outside))
         self.values = own_memory(values, mi.Float)

@@ -174,6 +174,7 @@ def projective(content: Mapping[str, Any], outside: Any) -> dict[str, Any]:
         "outside": outside,
         "depths": int(content.get("depths", 1)),
         **({"elsewhere": str(content["elsewhere"])} if content.get("elsewhere") else {}),
+        **({"turned": True} if content.get("turned") else {}),
     }
 
 

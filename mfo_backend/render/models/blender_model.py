@@ -232,6 +232,8 @@ def _projective(name: str, properties: Mapping[str, Any]) -> Element:
         if key in properties:
             ElementTree.SubElement(texture, "string", name=key, value=properties[key])
     ElementTree.SubElement(texture, "integer", name="depths", value=str(properties["depths"]))
+    if properties.get("turned"):
+        ElementTree.SubElement(texture, "boolean", name="turned", value="true")
     outside = properties["outside"]
     if isinstance(outside, Sequence):
         ElementTree.SubElement(texture, "rgb", name="outside", value=", ".join(repr(float(v)) for v in outside))

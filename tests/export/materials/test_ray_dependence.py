@@ -16,7 +16,7 @@ from mfo_backend.job.folder.request import read_request  # noqa: E402
 
 from ..scenes import new_material  # noqa: E402
 from .test_graph_values import evaluator  # noqa: E402
-from .test_node_graphs import lit_scene, principled, recorded_and_cycles  # noqa: E402
+from .test_node_graphs import lit_scene, principled, recorded_and_cycles, renderer_and_cycles  # noqa: E402
 
 
 def bowl(material: Any) -> Any:
@@ -82,3 +82,50 @@ def test_bounces_find_what_rays_from_elsewhere_find(
     shown = evaluator(request, tmp_path)([([(0.9, 0.9, 0.9)], ["Base Color"])], scale=4, samples=4, elsewhere=True)
     (evaluated,) = shown.elsewhere.values()
     np.testing.assert_allclose(evaluated, np.load(report.folder / socket.elsewhere), atol=1e-5)
+
+
+def floor_and_lid(material: Any) -> Any:
+    """A floor with a smaller lid above it, in one mesh; the camera sees the lid's upper side."""
+    bpy.ops.mesh.primitive_plane_add(size=3.0)
+    item = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.primitive_plane_add(size=1.6, location=(0.0, 0.0, 1.0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    item.data.materials.append(material)
+    return item
+
+
+@pytest.mark.parametrize("in_group", [False, True])
+def test_a_normal_map_is_turned_on_the_side_that_the_camera_does_not_see(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, in_group: bool
+) -> None:
+    """A lamp below the lid lights the floor by way of the lid's lower side; mirrored, as a bump, it is 1.1 % off."""
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    lit_scene(scene)
+    light = next(item for item in scene.objects if item.type == "LIGHT")
+    light.location, scene.cycles.samples = (0.1, 0.2, 0.4), 512
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 1
+    material = new_material("Target", Base_Color=(0.9, 0.9, 0.9), Roughness=1.0)
+    tree, shader = material.node_tree, principled(material)
+    shader.inputs["Specular IOR Level"].default_value = 0.0
+    inner = bpy.data.node_groups.new("Relief", "ShaderNodeTree") if in_group else tree
+    relief = inner.nodes.new("ShaderNodeNormalMap")
+    relief.inputs["Color"].default_value = (0.2, 0.5, 0.9, 1.0)
+    made = relief.outputs[0]
+    if in_group:
+        inner.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketVector")
+        inner.links.new(made, inner.nodes.new("NodeGroupOutput").inputs[0])
+        outer = tree.nodes.new("ShaderNodeGroup")
+        outer.node_tree = inner
+        made = outer.outputs[0]
+    tree.links.new(made, shader.inputs["Normal"])
+    renderer, truth = renderer_and_cycles(export, render_cycles, floor_and_lid(material))
+    recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    levels = []
+    for seed in range(6):
+        paths = recorded.record(renderer.start, grid=4, seed=seed, near=True)
+        groups = paths.pixel_groups(paths.interior)
+        found = np.asarray(recorded.pictures(paths, groups)(renderer.start))[:, :, 0]
+        levels.append(found.mean() / truth.reshape(-1, 3)[groups.pixels].mean())
+    assert abs(np.mean(levels) - 1.0) < 0.003
