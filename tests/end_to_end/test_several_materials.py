@@ -140,3 +140,16 @@ def test_two_pictures_show_both_and_one_of_them_only_the_floor(corner: Path, tmp
         (job / "targets" / "1").resolve(),
         (job / "more_pictures" / "2").resolve(),
     ]
+
+    # the same folder as one of a batch, as a queue, which takes less
+    request = json.loads((job / "request.json").read_text("utf-8"))
+    request["fit"]["queue"] = True
+    (job / "request.json").write_text(json.dumps(request), "utf-8")
+    batch = run_mfo("batch", job, "--again", "--json")
+    assert (batch.code, batch.answer["status"]) == (0, "converged"), batch.stderr
+    again = json.loads((job / "result.json").read_text("utf-8"))
+    assert [(p["number"], p["verdict"]) for p in again["pictures"]] == [(1, "same"), (2, "same")]
+    for name, found in zip(TRUTH, again["materials"], strict=True):
+        own = json.loads((job / found["folder"] / "result.json").read_text("utf-8"))
+        assert own["recovered"]["base_color"] != answer["materials"][[*TRUTH].index(name)]["recovered"]["base_color"]
+        np.testing.assert_allclose(own["recovered"]["base_color"], TRUTH[name], atol=0.05)

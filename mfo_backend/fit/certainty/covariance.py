@@ -31,7 +31,7 @@ TOGETHER, MOST_NAMED = 0.5, 2  # correlation from which on two values move toget
 # from any point. In 30 fits of Cycles' pictures 73 of 220 known values are called determined with it and 67 without,
 # one of them wrongly in both (docs/notebook/several_pictures.md). Smaller: more is promised of what values trade.
 BOX_SD = 3.0**-0.5
-FAR = 1e3  # of the box: keeps directions without any effect finite until the box is asked
+FAR = 10.0  # of the box: keeps directions without any effect finite until the box is asked
 
 
 def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:

@@ -164,10 +164,11 @@ class RecordedRoute:
             times = end.recording.number
             notes.append(f"The light was recorded {times} times: the solution had moved away from the first.")
         weak = tuple(weak_combinations(kept.spread, setting.table, kept.certainty, kept.held))
-        richer = end.refined.richer
+        # an earlier fit's values come back where an eye sees it: a noisy recording may prefer worse ones
+        asked = (*end.refined.richer, *(() if self._begin is None else (self._begin,)))
         ends = [
             End("refine", kept.x, notes=kept.notes),
-            *(End("refine", x) for x in richer),
+            *(End("refine", x) for x in asked),
             *(replace(other, notes=kept.notes) for other in later),
         ]
 
@@ -176,8 +177,8 @@ class RecordedRoute:
 
         return RouteEnds(
             ends=tuple(replace(end, certainty=known(end.x), weak_combinations=weak) for end in ends),
-            by_squares=1 + len(richer),
-            choose=self._unless_seen(len(richer), self._choose_by(counts)),
+            by_squares=1 + len(asked),
+            choose=self._unless_seen(len(asked), self._choose_by(counts)),
             stages=tuple(course.reports),
             notes=tuple(notes),
             contradiction=disagree,
@@ -263,19 +264,19 @@ class RecordedRoute:
         light, mask = task.light, task.mask
         return PictureJudge(self._measure, task.reference, light, mask, task.settings, task.view, blurred=blurred)
 
-    def _unless_seen(self, richer: int, choose: Callable[..., Choice]) -> Callable[..., Choice]:
-        """A choice among start and ends, but for the ends after the first that are `richer`.
+    def _unless_seen(self, asked: int, choose: Callable[..., Choice]) -> Callable[..., Choice]:
+        """A choice among start and ends, but for the `asked` ends after the first.
 
         One of these is taken where an eye sees that it is better.
         """
-        if not richer:
+        if not asked:
             return choose
         seen = self._judge(blurred=self._task.linear).value
 
         def choice(images: Sequence[Pixels]) -> Choice:
-            chosen = choose([*images[:2], *images[2 + richer :]])
-            end = chosen.end if chosen.end == 0 else chosen.end + richer
-            least, best = min((seen(images[1 + k]), k) for k in range(1, 1 + richer))
+            chosen = choose([*images[:2], *images[2 + asked :]])
+            end = chosen.end if chosen.end == 0 else chosen.end + asked
+            least, best = min((seen(images[1 + k]), k) for k in range(1, 1 + asked))
             if least < seen(images[1 + end]) - VISIBLE:
                 return Choice(best, chosen.beats_start or least < seen(images[0]))
             return replace(chosen, end=end)

@@ -11,6 +11,7 @@ import pytest
 from mfo_backend.fit.certainty.covariance import covariance
 from mfo_backend.fit.pictures import next_picture
 from mfo_backend.fit.pictures.next_picture import PRESENT, Choice, Evidence, Known, _proposal, _Told, predictions
+from mfo_backend.render.pictures.pass_counter import PassCounter
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
 TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coat_weight", 1, 0.0, 1.0, 0.5)])
@@ -39,17 +40,15 @@ def test_where_no_deviation_falls_nothing_is_proposed():
     )
 
 
-def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over(monkeypatch):
+def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over():
     """From inside of a mesh some are not; the result of the fit was lost by it."""
     random = np.random.default_rng(0)
     rows = [random.normal(size=(40, 3, 3)) for _ in range(4)]
     rows[2][5, 1, 2] = np.inf
     choices = (PRESENT, Choice(turn=60.0), Choice(turn=90.0))
-    told = [(choice, _Told(each, None, np.empty(0))) for choice, each in zip(choices, rows[1:], strict=True)]
-    monkeypatch.setattr(next_picture, "_told", lambda *given: iter(told))
+    told = {choice: _Told(each, None, np.empty(0)) for choice, each in zip(choices, rows[1:], strict=True)}
     known = Known(np.full(2, 0.5), np.eye(2), TABLE.names, Evidence(rows[0], None, 0.002, 1))
-    scene = SimpleNamespace(renderer=SimpleNamespace(table=TABLE))
-    found = predictions(scene, known, SimpleNamespace(), np.zeros(3), 0)
+    found = predictions(known, told, TABLE)
     assert Choice(turn=60.0) not in found
     assert np.isfinite(found[Choice(turn=90.0)]).all()
 
@@ -68,3 +67,26 @@ def test_a_second_picture_like_the_first_is_predicted_as_it_turns_out():
     predicted = Evidence(first, None, 0.0, 1).with_further(told, 7.0, TABLE)
     realised = covariance(np.concatenate([first, second]), None, TABLE, 0.0)
     np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.sqrt(np.diag(realised)), rtol=0.15)
+
+
+def test_what_chance_favours_is_looked_at_again(monkeypatch):
+    """A ray that met a highlight made one candidate of many look best; with others, of many rays, it tells little."""
+    random = np.random.default_rng(2)
+    present = random.normal(size=(200, 3, 3)) * [1.0, 1.0, 0.02]
+
+    def told(*given: object, grid: int = 1, only: tuple[Choice, ...] | None = None):
+        for choice in only or (PRESENT, Choice(turn=60.0), Choice(turn=90.0)):
+            rows = present.copy()
+            rows[:, :, 2] *= 10.0 if choice.turn == 90.0 else 1.0
+            if choice.turn == 60.0 and grid == 1:
+                rows[7, :, 2] = 1e3
+            yield choice, _Told(rows, None, np.empty(0))
+
+    monkeypatch.setattr(next_picture, "_told", told)
+    monkeypatch.setattr(next_picture, "target_center", lambda shape: np.zeros(3))
+    scene = SimpleNamespace(renderer=SimpleNamespace(table=TABLE, shape=None, counter=PassCounter()))
+    evidence = Evidence(present, None, 0.0, 1)
+    known = Known(np.full(2, 0.5), covariance(present, None, TABLE, 0.0), ("coat_weight",), evidence)
+    found = next_picture.next_picture(scene, known, SimpleNamespace(), 0)
+    assert found is not None
+    assert found.turn == 90.0
