@@ -21,6 +21,9 @@ from ..types.processors import processors
 RETRIES = 2  # of work that raises; a lost worker's work goes to another one without counting here
 POLL_SECONDS = 0.2
 NO_WORKER_SECONDS = 120.0  # a cluster may take this long to replace one
+# after which workers are added to a cluster of our own: a nanny of Dask (2026.8.0) does not replace one that died while
+# it started. Larger: a longer wait after that. Smaller: busy cores start workers that were not needed
+RENEW_SECONDS = 20.0
 _CONNECT_SECONDS = 15
 
 
@@ -91,14 +94,17 @@ def as_they_come(
     keys = {future.key: name for name, future in futures.items()}
     for future in futures.values():
         future.add_done_callback(ended.put)
-    left, alive = len(futures), time.monotonic()
+    left, alive, renewed = len(futures), time.monotonic(), False
     lost: list[Any] = []  # whose result was on a worker that died: Dask computes them again
     while left and not should_stop():
         try:
             future = ended.get(timeout=POLL_SECONDS)
         except queue.Empty:
             if client.scheduler_info()["workers"]:
-                alive = time.monotonic()
+                alive, renewed = time.monotonic(), False
+            elif time.monotonic() - alive > RENEW_SECONDS and client.cluster is not None and not renewed:
+                client.cluster.scale(2 * len(client.cluster.worker_spec))
+                renewed = True
             elif time.monotonic() - alive > NO_WORKER_SECONDS:
                 raise SetupError(
                     "No Dask worker is left: start workers, then the same command goes on where it was."

@@ -120,7 +120,9 @@ class Ended:
 
 
 class Scheduler:
-    """A client whose scheduler knows these workers."""
+    """A client of another machine's scheduler, which knows these workers."""
+
+    cluster = None
 
     def __init__(self, **workers):
         self.workers = workers
@@ -137,6 +139,20 @@ def test_a_scheduler_that_is_lost_makes_no_row():
 def test_a_result_that_is_lost_is_waited_for():
     lost = Ended(TimeoutError(), "its row")
     assert list(as_they_come(Scheduler(one={}), {TASKS[0]: lost}, lambda: False)) == [(TASKS[0], Outcome("its row"))]
+
+
+def test_workers_that_nobody_replaces_are_made_anew(tmp_path, client, monkeypatch):
+    """As where one dies while it starts: its nanny lets it go."""
+
+    async def let_go(self, exitcode):
+        await self._unregister()
+
+    monkeypatch.setattr("distributed.nanny.Nanny._on_worker_exit", let_go)
+    monkeypatch.setattr("mfo_backend.job.cluster.RENEW_SECONDS", 0.5)
+    for worker in client.run(os.getpid).values():
+        os.kill(worker, signal.SIGKILL)
+    assert scatter(tmp_path, client, FakeRecipe(str(tmp_path)), tasks=TASKS[:4])
+    assert not any(row.error for row in RowFile(tmp_path).read())
 
 
 def test_without_workers_it_ends(monkeypatch):
