@@ -116,3 +116,34 @@ def test_a_camera_that_looks_away_is_refused_before_the_fit(turning, tmp_path):
     bpy.data.objects["Side"].rotation_euler[0] = 3.0
     with pytest.raises(ExportError, match=r"Picture 2 \(side.exr\): .*camera"):
         export(turning, tmp_path, setups(tmp_path))
+
+
+def test_values_inside_nodes_are_seen_by_each_picture(turning, tmp_path):
+    """Of a mix the leaf that the first picture shows most of; one copy of the file, and each picture's view of it."""
+    tree = turning.active_material.node_tree
+    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    geometry, parts, mask = (tree.nodes.new(f"ShaderNode{k}") for k in ("NewGeometry", "SeparateXYZ", "Math"))
+    glossy, mix, ramp = (tree.nodes.new(f"ShaderNode{k}") for k in ("BsdfAnisotropic", "MixShader", "ValToRGB"))
+    mask.operation = "GREATER_THAN"
+    tree.links.new(geometry.outputs["Position"], parts.inputs[0])
+    tree.links.new(parts.outputs["Y"], mask.inputs[0])
+    tree.links.new(parts.outputs["X"], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], principled.inputs["Base Color"])
+    tree.links.new(mask.outputs[0], mix.inputs[0])
+    tree.links.new(principled.outputs[0], mix.inputs[1])
+    tree.links.new(glossy.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL").inputs[0])
+    for camera, y in (("Front", -0.5), ("Side", 0.7)):
+        bpy.data.objects[camera].location = (0.0, y, 2.0)
+        bpy.data.objects[camera].rotation_euler = (0.0, 0.0, 0.0)
+    export(turning, tmp_path, setups(tmp_path, frame=5))
+    folders = [tmp_path / "job", tmp_path / "job" / "more_pictures" / "2"]
+    first, second = (json.loads((folder / "request.json").read_text("utf-8")) for folder in folders)
+    assert [len(each["graph"]["values"]) for each in (first, second)] == [2, 2]  # the ramp's stops
+    assert first["target"]["node"] == second["target"]["node"] == ["Principled BSDF"]
+    views = [each["graph"]["evaluate"]["view"] for each in (first, second)]
+    assert views == [
+        {"camera": "Front", "frame": 2.0, "width": 32, "height": 32},
+        {"camera": "Side", "frame": 5.0, "width": 40, "height": 24},
+    ]
+    assert [(folder / "graph" / "scene.blend").is_file() for folder in folders] == [True, False]
