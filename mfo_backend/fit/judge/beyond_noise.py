@@ -40,6 +40,11 @@ FEW_PIXELS = 500
 # exported scenes, s = 0.4155 pixels, exp(-d^2 / 4 s^2) over eight neighbours is 1.16: half of that beside a reference
 # of as much noise. More is taken for an error. Larger: fine errors count as noise. Smaller: noise counts as error.
 FILTERED = 0.6
+# Display values: a larger difference of two pixels counts as this much. Under light probes with 4 samples 12 true
+# pictures of 12 share nothing with it, and wrong ones more than in display values (docs/notebook/verdicts.md). Larger:
+# rare bright pixels hide what others share. Smaller: noise with a long tail has a mean again.
+MOST_APART = 0.5
+LEAST_STEP = 1e-3  # of light: over which the slope of a display is taken. No measurement
 DRAWS = 4  # whose mean is the noise of few pixels; of one, FLIP scattered by 0.005
 CHANCE = 2.0  # standard deviations of chance that are taken from what neighbours share
 
@@ -65,7 +70,7 @@ def beyond_noise(
     drawn = _of_few(apart, variance, mask, lags) if np.count_nonzero(mask) < FEW_PIXELS else _normal(apart, variance)
     calm = _blurred(result, mask)
     noisy = [_display(np.maximum(calm + _blurred(noise, mask), 0.0)) for noise in drawn]
-    displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
+    displayed = np.clip(apart * _slope(_blurred(reference, mask), calm), -MOST_APART, MOST_APART)
     shared, deviation = _shared_square(displayed, mask, lags)
     fine = max(abs(square) - CHANCE * sd for square, sd in (_shared_square(displayed, mask, of) for of in FINE))
     return Difference(
@@ -75,6 +80,16 @@ def beyond_noise(
         max(shared - CHANCE * deviation, 0.0) ** 0.5,
         max(fine, 0.0) ** 0.5,
     )
+
+
+def _slope(first: Light, second: Light) -> NDArray[np.float64]:
+    """What a display makes of a difference in light, between two calm pictures.
+
+    A display bends and clips, so it shows noisy pixels darker in the mean than calm ones. Times this slope, which hangs
+    on no pixel by itself, the mean of noise stays 0.
+    """
+    low, step = np.minimum(first, second), np.maximum(np.abs(first - second), LEAST_STEP)
+    return (_display(low + step).astype(np.float64) - _display(low)) / step
 
 
 def _normal(apart: Light, variance: NDArray[np.float64]) -> Iterator[Light]:

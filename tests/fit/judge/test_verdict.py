@@ -73,6 +73,25 @@ def test_what_neighbours_share_is_found_in_noise_of_any_size():
         assert found.shared_at_least <= found.shared
 
 
+def of_few_samples(picture, samples, seed):
+    """The mean of samples that seldom meet the light: most pixels are too dark, a few far too bright."""
+    paths = np.random.default_rng(seed).gamma(0.25 * samples, 4.0 / samples, picture.shape[:2])
+    return (picture * paths[..., None]).astype(np.float32)
+
+
+def test_noise_that_a_display_darkens_is_no_difference():
+    """A display shows noisy pixels darker: a true result looked too bright, one too dark by a fifth right."""
+    same, darker = (
+        [
+            beyond_noise(of_few_samples(scene(), 8, k), of_few_samples(level * scene(), 64, 100 + k), MASK)
+            for k in range(6)
+        ]
+        for level in (1.0, 0.8)
+    )
+    assert max(difference.shared_at_least for difference in same) < 0.01
+    assert min(difference.shared_at_least for difference in darker) > 0.03
+
+
 def flickering(picture, seed):
     """With noise of one colour whose tails are heavier than those of any variance."""
     tails = np.random.default_rng(seed).standard_t(2.2, picture.shape[:2])
