@@ -58,12 +58,18 @@ def contradiction(
     together = squares(x)
     if together.mean() < AT_NOISE**2:
         return None
-    gains = np.empty(len(labels))
+    limits = SolveLimits(evaluations=NEAR_EVALUATIONS, cost_change=1e-3)
+    ends, rest = [], np.empty(len(labels))
     for number in range(len(labels)):
-        limits = SolveLimits(evaluations=NEAR_EVALUATIONS, cost_change=1e-3)
-        found = solve_bounded(_without(solved, numbers == number), x, *box, limits, should_stop).x
-        gains[number] = together.mean() / max(np.delete(squares(found), number).mean(), 1e-12)
-    if should_stop() or gains.max() < AGAINST_REST:
+        ends.append(solve_bounded(_without(solved, numbers == number), x, *box, limits, should_stop).x)
+        rest[number] = max(np.delete(squares(ends[-1]), number).mean(), 1e-12)
+    if should_stop() or together.mean() / rest.min() < AGAINST_REST:
+        return None
+    # all together may have ended in another basin than without one of them, which is no contradiction
+    start = ends[int(rest.argmin())]
+    again = squares(solve_bounded(_without(solved, numbers < 0), start, *box, limits, should_stop).x).mean()
+    gains = min(together.mean(), again) / rest
+    if should_stop() or again < AT_NOISE**2 or gains.max() < AGAINST_REST:
         return None
     named = tuple(label for label, gain in zip(labels, gains, strict=True) if gain > gains.max() / TOLD_APART)
     return Contradiction(named, _sentence(named, len(labels)))
