@@ -11,7 +11,7 @@ one that may lie anywhere in it, and what trades against it gains by that.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,29 +34,60 @@ BOX_SD = 3.0**-0.5
 FAR = 10.0  # of the box: keeps directions without any effect finite until the box is asked
 
 
-def covariance(rows: Vector, own: Vector | None, table: ParameterTable, model_error: float = MODEL_ERROR) -> Vector:
+@dataclass(frozen=True)
+class Further:
+    """Derivatives (g, 3, k) of residuals that are not known yet, and the recording's own noise in them (None: none)."""
+
+    derivatives: Vector
+    own: Vector | None = None
+
+
+def covariance(
+    rows: Vector,
+    own: Vector | None,
+    table: ParameterTable,
+    model_error: float = MODEL_ERROR,
+    further: Further | None = None,
+) -> Vector:
     """Covariance (k, k) in widths of the box from weighted residuals and their derivatives (g, 3, 1 + k), in the box.
 
     `own` is the recording's noise in them, half the difference of two samples (None for none): squares of derivatives
     hold it, too, and would make every value look better determined. `model_error` is the least error of a residual;
-    the default is for relative ones.
+    the default is for relative ones. With what `further` groups would tell, it is that which is to be expected.
     """
-    g, _, columns = rows.shape
-    k = columns - 1
+    k = rows.shape[2] - 1
     width = table.upper - table.lower
-    scaled, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
-    noise = np.maximum(np.abs(residual), model_error)
-    gram, own_products = np.einsum("gck,gcl->kl", scaled, scaled, optimize=True), 0.0
+    known, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
+    noise = np.copysign(np.maximum(np.abs(residual), model_error), residual)
+    told = np.zeros((0, *known.shape[1:])) if further is None else further.derivatives * width
+    gram, own_products = _products(known) + _products(told), 0.0
     if own is not None:
         half = own[:, :, 1:] * width
-        gram, inflation = without_own_noise(gram, np.einsum("gck,gcl->kl", half, half, optimize=True)), 1.0
+        spread = _products(half)
+        if further is not None and further.own is not None:
+            spread += _products(further.own * width)
+        gram, inflation = without_own_noise(gram, spread), 1.0
         own_products = np.einsum("gck,gc->gk", half, own[:, :, 0], optimize=True)
     ridge = float(np.mean(noise**2)) / FAR**2  # in units of the mean noise
     inverse = np.linalg.inv(gram + ridge * np.eye(k))
-    left_out = residuals_left_out(scaled, np.where(residual < 0.0, -noise, noise)[:, :, None], inverse)[:, :, 0]
-    q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True) - own_products
-    found = inverse @ (q.T @ q + ridge * ridge * FAR**2 * np.eye(k)) @ inverse
+    left_out = residuals_left_out(known, noise[:, :, None], inverse)[:, :, 0]
+    q = np.einsum("gck,gc->gk", known, left_out, optimize=True) - own_products
+    moved = q.T @ q
+    if len(told):
+        # residuals like the present ones, group by group, of signs by chance: these columns have their mean square
+        levels, columns = np.linalg.eigh(noise.T @ noise / len(noise))
+        root: Vector = columns * np.sqrt(np.maximum(levels, 0.0))
+        drawn = np.broadcast_to(root, (len(told), *root.shape))
+        q = np.einsum("gck,gcd->gdk", told, residuals_left_out(told, drawn, inverse), optimize=True)
+        moved = moved + _products(q)
+    g = len(known) + len(told)
+    found = inverse @ (moved + ridge * ridge * FAR**2 * np.eye(k)) @ inverse
     return _in_box(inflation**2 * g / max(g - k / 3, 1) * found)
+
+
+def _products(rows: Vector) -> Vector:
+    """Sum of the products of rows (g, n, k) by themselves, (k, k)."""
+    return np.einsum("gnk,gnl->kl", rows, rows, optimize=True)
 
 
 def _in_box(spread: Vector) -> Vector:

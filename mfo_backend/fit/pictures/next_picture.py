@@ -32,7 +32,7 @@ from ...types.parameter import ParameterTable
 from ...types.result import NextPicture
 from ..alike.compare import Comparison
 from ..candidates import Candidates
-from ..certainty.covariance import covariance
+from ..certainty.covariance import Further, covariance
 from ..squares.problem import Rival
 from ..squares.recording_noise import MOST_OWN, rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
@@ -51,7 +51,6 @@ LOOKED_AT_AGAIN, FINER = 3, 3
 # Information of a direction, of the largest, from which on the unit is taken from it. Smaller: noise of few lanes sets
 # the unit. No measurement.
 STRONG = 1e-3
-DRAWS = 4  # of a candidate's residuals: one alone may put a firefly on the tile that rules a value. No measurement
 _SAME_PLACE = 1e-3  # of matrices of cameras, metres and sines: far above float32, far below a turn of 30 degrees
 
 
@@ -93,23 +92,10 @@ class Evidence:
     def with_further(self, told: _Told, unit: float, table: ParameterTable) -> Vector:
         """The covariance with a further picture, whose derivatives count in this `unit`.
 
-        Its residuals are drawn from the present ones, a tile's three channels together, for they share most of their
-        noise. The covariance is the mean over some draws.
+        Its residuals are as large as the present ones, tile by tile, whose three channels share most of their noise.
         """
-        random = np.random.default_rng(0)
-        rows = told.rows / unit
-        own = None
-        if self.own is not None:
-            further = np.zeros_like(rows) if told.own is None else told.own / unit
-            further[:, :, 0] = 0.0
-            own = np.concatenate([self.own, further])
-
-        def drawn() -> Vector:
-            tiles = random.integers(len(self.rows), size=len(rows))
-            rows[:, :, 0] = self.rows[tiles, :, 0] * random.choice((-1.0, 1.0), (len(rows), 1))
-            return covariance(np.concatenate([self.rows, rows]), own, table, self.model_error)
-
-        return np.mean([drawn() for _ in range(DRAWS)], axis=0)
+        further = Further(told.rows[:, :, 1:] / unit, None if told.own is None else told.own[:, :, 1:] / unit)
+        return covariance(self.rows, self.own, table, self.model_error, further)
 
     def unit_of(self, present: _Told, table: ParameterTable) -> float:
         """How much larger the derivatives of the present picture's few lanes are than those of the fit.

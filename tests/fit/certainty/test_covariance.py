@@ -10,6 +10,7 @@ import pytest
 
 from mfo_backend.fit.certainty.covariance import (
     INFLATION,
+    Further,
     certainties,
     certainties_away,
     covariance,
@@ -130,3 +131,21 @@ def test_an_end_of_another_stage_is_as_unsure_as_it_is_far():
     assert away["roughness"].along == ("tint",)
     assert away["tint"] == known["tint"]
     assert certainties_away({}, np.ones(4), table) == {}
+
+
+def test_further_groups_count_as_the_mean_over_residuals_like_the_present_ones():
+    """Oracle: many draws, each a present group's three channels with a sign by chance."""
+    random = np.random.default_rng(4)
+    table = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coat_weight", 1, 0.0, 1.0, 0.5)])
+    rows = random.normal(size=(60, 3, 3)) * [0.05, 1.0, 0.3]
+    rows[:, :, 0] += 0.1 * random.normal(size=(60, 1))
+    further = random.normal(size=(40, 3, 3)) * [0.0, 0.5, 2.0]
+    further[3, :, 2] *= 20.0  # rules the second value
+    told = Further(further[:, :, 1:])
+
+    def drawn() -> np.ndarray:
+        further[:, :, 0] = rows[random.integers(60, size=40), :, 0] * random.choice((-1.0, 1.0), (40, 1))
+        return covariance(np.concatenate([rows, further]), None, table, 1e-6)
+
+    expected = np.mean([drawn() for _ in range(3000)], axis=0)
+    np.testing.assert_allclose(covariance(rows, None, table, 1e-6, told), expected, rtol=0.06, atol=2e-6)
