@@ -76,7 +76,7 @@ def covariance(
     if len(told):
         # residuals like the present ones, group by group, of signs by chance: these columns have their mean square
         levels, columns = np.linalg.eigh(noise.T @ noise / len(noise))
-        root: Vector = columns * np.sqrt(np.maximum(levels, 0.0))
+        root = np.multiply(columns, np.sqrt(np.maximum(levels, 0.0)), dtype=np.float64)
         drawn = np.broadcast_to(root, (len(told), *root.shape))
         q = np.einsum("gck,gcd->gdk", told, residuals_left_out(told, drawn, inverse), optimize=True)
         moved = moved + _products(q)

@@ -342,7 +342,7 @@ def _proposal(
         turn=_signed(choice.turn),
         center=(float(center[0]), float(center[1]), float(center[2])),
         settles=settles,
-        predicted={name: worst[name] * width[name] for name in wanted},
+        predicted={name: worst[name] * width[name] for name in wanted if worst[name] < before[name]},
         sentence=f"A further picture {choice.words} {what}.",
         camera=choice.camera,
         light=choice.light,

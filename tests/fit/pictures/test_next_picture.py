@@ -40,6 +40,12 @@ def test_where_no_deviation_falls_nothing_is_proposed():
     )
 
 
+def test_nothing_is_promised_of_a_value_that_no_picture_shows():
+    found = _proposal(Choice(), np.zeros(3), np.array([0.1, 0.5753]), np.array([0.3, 0.5752]), TABLE.names, TABLE)
+    assert found is not None
+    assert list(found.predicted) == ["roughness"]
+
+
 def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over():
     """From inside of a mesh some are not; the result of the fit was lost by it."""
     random = np.random.default_rng(0)
