@@ -71,7 +71,7 @@ class NextPicture:
     settles
         Values that it would determine.
     predicted
-        Standard deviations that values would have that are not determined now, each in its own unit.
+        Standard deviations that values would have that are not determined now and get surer, each in its own unit.
     """
 
     turn: float
