@@ -40,8 +40,7 @@ FEW_PIXELS = 500
 # exported scenes, s = 0.4155 pixels, exp(-d^2 / 4 s^2) over eight neighbours is 1.16: half of that beside a reference
 # of as much noise. More is taken for an error. Larger: fine errors count as noise. Smaller: noise counts as error.
 FILTERED = 0.6
-# Display values: a larger difference of two pixels counts as this much. Under light probes with 4 samples 12 true
-# pictures of 12 share nothing with it, and wrong ones more than in display values (docs/notebook/verdicts.md). Larger:
+# Display values: a larger difference in light of two pixels counts as this much (docs/notebook/verdicts.md). Larger:
 # rare bright pixels hide what others share. Smaller: noise with a long tail has a mean again.
 MOST_APART = 0.5
 LEAST_STEP = 1e-3  # of light: over which the slope of a display is taken. No measurement
@@ -70,16 +69,34 @@ def beyond_noise(
     drawn = _of_few(apart, variance, mask, lags) if np.count_nonzero(mask) < FEW_PIXELS else _normal(apart, variance)
     calm = _blurred(result, mask)
     noisy = [_display(np.maximum(calm + _blurred(noise, mask), 0.0)) for noise in drawn]
-    displayed = np.clip(apart * _slope(_blurred(reference, mask), calm), -MOST_APART, MOST_APART)
-    shared, deviation = _shared_square(displayed, mask, lags)
-    fine = max(abs(square) - CHANCE * sd for square, sd in (_shared_square(displayed, mask, of) for of in FINE))
+    light = np.clip(apart * _slope(_blurred(reference, mask), calm), -MOST_APART, MOST_APART)
+    displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
+    shared, at_least = _beyond_chance(light, displayed, mask, lags)
+    fine = max(_beyond_chance(light, displayed, mask, of, either=True)[1] for of in FINE)
     return Difference(
         seen,
         float(np.mean([_mean_flip(shown[1], picture, mask) for picture in noisy])),
-        max(shared, 0.0) ** 0.5,
-        max(shared - CHANCE * deviation, 0.0) ** 0.5,
-        max(fine, 0.0) ** 0.5,
+        shared,
+        at_least,
+        fine,
     )
+
+
+def _beyond_chance(
+    light: Light, displayed: Light, mask: Mask, lags: Sequence[tuple[int, int]], *, either: bool = False
+) -> tuple[float, float]:
+    """What near pixels share of differences, and at least, as display values.
+
+    Those of `displayed` values scatter less, but noise gives them a mean. So they count where those of `light` are more
+    than chance. With `either` their products may have the mean of either sign.
+    """
+    means, least = [], []
+    for apart in (light, displayed):
+        mean, deviation = _shared_square(apart, mask, lags)
+        mean = abs(mean) if either else mean
+        means.append(max(mean, 0.0) ** 0.5)
+        least.append(max(mean - CHANCE * deviation, 0.0) ** 0.5)
+    return (max(means), max(least)) if least[0] > 0.0 else (means[0], 0.0)
 
 
 def _slope(first: Light, second: Light) -> NDArray[np.float64]:
@@ -89,7 +106,8 @@ def _slope(first: Light, second: Light) -> NDArray[np.float64]:
     on no pixel by itself, the mean of noise stays 0.
     """
     low, step = np.minimum(first, second), np.maximum(np.abs(first - second), LEAST_STEP)
-    return (_display(low + step).astype(np.float64) - _display(low)) / step
+    high = np.add(low, step, dtype=np.float64)
+    return (_display(high).astype(np.float64) - _display(low)) / step
 
 
 def _normal(apart: Light, variance: NDArray[np.float64]) -> Iterator[Light]:
