@@ -14,8 +14,8 @@ WRONG = [
     # the part of the scores that a recording's own noise makes is added instead of taken away
     (
         "mfo_backend/fit/certainty/covariance.py",
-        'q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True) - own_products',
-        'q = np.einsum("gck,gc->gk", scaled, left_out, optimize=True) + own_products',
+        'q = np.einsum("gck,gc->gk", known, left_out, optimize=True) - own_products',
+        'q = np.einsum("gck,gc->gk", known, left_out, optimize=True) + own_products',
     ),
     (
         "mfo_backend/fit/squares/recording_noise.py",
