@@ -14,7 +14,7 @@ import bpy
 from .sentences.languages import FOLDERS
 
 CONTEXT = "Material Fit"  # of names that Blender's own languages have as other words: Fast as "Einfügen"
-_IN_CONTEXT = ("Preset", "Balanced", "Best", "Fast", "Paper")
+_IN_CONTEXT = ("Preset", "Balanced", "Best", "Fast", "Paper", "Fit", "History")
 
 
 def _entries(labels: Mapping[str, str], operators: Mapping[str, str]) -> dict[tuple[str, str], str]:

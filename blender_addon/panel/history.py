@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..result.shown_result import VERDICT_ICONS
+from ..translations import CONTEXT
 from .layout import is_narrow
 
 
@@ -40,6 +41,7 @@ class History:
     """Go back to an earlier result."""
 
     bl_label = "History"
+    bl_translation_context = CONTEXT
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

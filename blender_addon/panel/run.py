@@ -11,6 +11,7 @@ from ..result import previews, shown_result
 from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
 from ..sentences.translated import translated
+from ..translations import CONTEXT
 from .layout import draw_pictures, draw_sentence, letters
 
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
@@ -20,6 +21,7 @@ class Run:
     """Start, watch and stop a fit."""
 
     bl_label = "Fit"
+    bl_translation_context = CONTEXT
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw settings and button, or the progress."""
