@@ -94,16 +94,16 @@ def as_they_come(
     keys = {future.key: name for name, future in futures.items()}
     for future in futures.values():
         future.add_done_callback(ended.put)
-    left, alive, renewed = len(futures), time.monotonic(), False
+    left, alive, renewed, crew = len(futures), time.monotonic(), False, 1
     lost: list[Any] = []  # whose result was on a worker that died: Dask computes them again
     while left and not should_stop():
         try:
             future = ended.get(timeout=POLL_SECONDS)
         except queue.Empty:
-            if client.scheduler_info()["workers"]:
-                alive, renewed = time.monotonic(), False
+            if workers := client.scheduler_info()["workers"]:
+                alive, renewed, crew = time.monotonic(), False, max(crew, len(workers))
             elif time.monotonic() - alive > RENEW_SECONDS and client.cluster is not None and not renewed:
-                client.cluster.scale(2 * len(client.cluster.worker_spec))
+                client.cluster.scale(len(client.cluster.worker_spec) + crew)  # those that are gone stay in it
                 renewed = True
             elif time.monotonic() - alive > NO_WORKER_SECONDS:
                 raise SetupError(

@@ -155,7 +155,7 @@ def request_of(
     }  # fmt: skip
 
 
-def _view(scene: bpy.types.Scene) -> dict[str, Any] | None:
+def _view(scene: bpy.types.Scene) -> dict[str, Any]:
     """What the picture shows of the copy, which another picture's export may have made."""
     width, height = picture_size(scene.render)
     assert scene.camera is not None  # it was read

@@ -83,30 +83,27 @@ def emission_element(
     if material.is_mixed or color is None or strength is None:  # of a mix the mean; the backend has the whole of it
         return add(emitter, rgb("radiance", material.emission * scale))
     alpha = Socket(1.0) if is_target or material.emission_is_dimmed else material.sockets.get("Alpha", Socket(1.0))
-    dimmed = scale * min(max(float(alpha.value), 0.0), 1.0)
-    if strength.texture is not None:
+    by_mean = alpha.texture is None or not _is_dimmed_by(alpha, color, strength)
+    dimmed = scale * (min(max(float(alpha.value), 0.0), 1.0) if by_mean else 1.0)
+    texture = color.texture if by_mean else color.texture or alpha.texture
+    if strength.texture is not None or texture is None:
         return add(emitter, rgb("radiance", material.emission * dimmed))
-    shown = _product(color, alpha)
-    if shown is not None:
-        pixels = (shown.pixels * float(strength.value) * scale).astype(np.float32)
-        return add(emitter, _value("radiance", None, replace(shown, pixels=pixels), save))
-    if color.texture is not None:
-        pixels = (color.texture.pixels * float(strength.value) * dimmed).astype(np.float32)
-        return add(emitter, _value("radiance", None, replace(color.texture, pixels=pixels), save))
-    return add(emitter, rgb("radiance", material.emission * dimmed))
+    pixels = np.asarray(color.value if color.texture is None else color.texture.pixels, np.float32)
+    pixels = pixels * np.float32(float(strength.value) * dimmed)
+    if not by_mean and alpha.texture is not None:
+        pixels = pixels * np.clip(alpha.texture.pixels, 0.0, 1.0)
+    return add(emitter, _value("radiance", None, replace(texture, pixels=pixels), save))
 
 
-def _product(color: Socket, alpha: Socket) -> Texture | None:
-    """A colour times an alpha that is a picture; None where that is none, or lies elsewhere than the colour's."""
+def _is_dimmed_by(alpha: Socket, color: Socket, strength: Socket) -> bool:
+    """Whether the exported emission is dimmed by Alpha as in Cycles, pixel by pixel where that is a picture."""
     if alpha.texture is None:
-        return None
-    if color.texture is None:
-        return replace(alpha.texture, pixels=np.clip(alpha.texture.pixels, 0.0, 1.0) * np.float32(color.value))
+        return True
+    if strength.texture is not None or color.texture is None:
+        return strength.texture is None
     first, second = color.texture, alpha.texture
     same = first.pixels.shape[:2] == second.pixels.shape[:2] and np.allclose(first.uv_matrix, second.uv_matrix)
-    if not same or (first.wrap, first.filter_type) != (second.wrap, second.filter_type):
-        return None
-    return replace(first, pixels=first.pixels * np.clip(second.pixels, 0.0, 1.0))
+    return same and (first.wrap, first.filter_type) == (second.wrap, second.filter_type)
 
 
 def approximated(material: Material, *, is_target: bool) -> list[str]:
@@ -117,21 +114,14 @@ def approximated(material: Material, *, is_target: bool) -> list[str]:
         found.append(f"Subsurface is fitted as diffuse: no light travels below the surface.{weight}")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
-    above = [
-        name
-        for name, nothing in (("Coat Weight", 0.0), ("Sheen Weight", 0.0), ("Alpha", 1.0))
-        if material.value(name, nothing) != nothing and not (name == "Alpha" and not is_target and _dims(material))
-    ]
+    layers = [("Coat Weight", 0.0), ("Sheen Weight", 0.0)]
+    names = ("Alpha", "Emission Color", "Emission Strength")
+    if is_target or not _is_dimmed_by(*(material.sockets.get(name, Socket(1.0)) for name in names)):
+        layers.append(("Alpha", 1.0))
+    above = [name for name, nothing in layers if material.value(name, nothing) != nothing]
     if above and material.emission.max(initial=0.0) > 0.0 and not material.emission_is_dimmed:
         found.append(f"the emission is not dimmed by {', '.join(above)}, as it is in Cycles.")
     return found
-
-
-def _dims(material: Material) -> bool:
-    """Whether Alpha dims the exported emission pixel by pixel."""
-    color, alpha = (material.sockets.get(name, Socket(1.0)) for name in ("Emission Color", "Alpha"))
-    strength = material.sockets.get("Emission Strength", Socket(0.0))
-    return alpha.texture is None or (strength.texture is None and _product(color, alpha) is not None)
 
 
 def _transmits(material: Material) -> bool:

@@ -31,7 +31,10 @@ TOGETHER, MOST_NAMED = 0.5, 2  # correlation from which on two values move toget
 # from any point. In 30 fits of Cycles' pictures 73 of 220 known values are called determined with it and 67 without,
 # one of them wrongly in both (docs/notebook/several_pictures.md). Smaller: more is promised of what values trade.
 BOX_SD = 3.0**-0.5
-FAR = 10.0  # of the box: keeps directions without any effect finite until the box is asked
+# Of the box: keeps directions without any effect finite until the box is asked. Of 40 random problems, half with own
+# noise, no deviation changes by more than 0.6 % from here on. Smaller: it counts beside the box. Larger: an inverse of
+# what no pixel shows loses its digits.
+FAR = 10.0
 
 
 @dataclass(frozen=True)

@@ -62,14 +62,14 @@ def beyond_noise(
         return None
     near = blocks_around(mask, 1, flip_reach(DEFAULT_PIXELS_PER_DEGREE))  # all that counts, and what FLIP sees of it
     reference, result, mask = reference[near], result[near], mask[near]
-    shown = [_display(_blurred(light, mask)) for light in (reference, result)]
+    calm_reference, calm = (_blurred(light, mask) for light in (reference, result))
+    shown = [_display(light) for light in (calm_reference, calm)]
     seen = _mean_flip(shown[0], shown[1], mask)
     apart = np.where(mask[..., None], reference - result, 0.0).astype(np.float64)
     variance = _noise_variance(apart, mask, lags)
     drawn = _of_few(apart, variance, mask, lags) if np.count_nonzero(mask) < FEW_PIXELS else _normal(apart, variance)
-    calm = _blurred(result, mask)
     noisy = [_display(np.maximum(calm + _blurred(noise, mask), 0.0)) for noise in drawn]
-    light = np.clip(apart * _slope(_blurred(reference, mask), calm), -MOST_APART, MOST_APART)
+    light = np.clip(apart * _slope(calm_reference, calm), -MOST_APART, MOST_APART)
     displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
     shared, at_least = _beyond_chance(light, displayed, mask, lags)
     fine = max(_beyond_chance(light, displayed, mask, of, either=True)[1] for of in FINE)

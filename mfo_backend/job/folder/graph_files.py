@@ -11,10 +11,10 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ...types.errors import BadInputError
-from .graph_request import NodeGraph
+from .graph_request import FINEST, LARGEST_SIDE, NodeGraph
 from .job_folder import JobFolder
 
-LARGEST_SIDE = 4 * 16384  # subpixels
+MOST_SUBPIXELS = FINEST * LARGEST_SIDE  # along a side
 _VALUES = np.dtype("<f4")
 
 
@@ -73,7 +73,7 @@ def _size(path: Path) -> tuple[int, int, int]:
             left = path.stat().st_size - file.tell()
     except (OSError, ValueError) as error:
         raise BadInputError(f"{path.name} is no array that NumPy reads ({error}): export the job anew.") from None
-    fits = len(shape) == 3 and shape[2] in (1, 3) and all(0 < side <= LARGEST_SIDE for side in shape[:2])
+    fits = len(shape) == 3 and shape[2] in (1, 3) and all(0 < side <= MOST_SUBPIXELS for side in shape[:2])
     if not fits or by_columns or kind != _VALUES or left != int(np.prod(shape)) * _VALUES.itemsize:
         raise BadInputError(f"{path.name} does not hold float32 (height, width, 1 or 3): export the job anew.")
     return shape

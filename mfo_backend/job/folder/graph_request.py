@@ -18,7 +18,7 @@ MOST_VALUES = 256
 MOST_DEPTHS = 32
 FINEST = 4  # subpixels along a pixel; fewer where the picture is large
 _EVALUATE = ("scene", "layer", "object", "slot", "sockets", "view")
-LARGEST_SIDE = 16384  # pixels
+LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 LAST_FRAME = 1_048_574  # as Blender's
 
 

@@ -16,7 +16,7 @@ from ...types.image import Encoding
 from ...types.light_paths import LightPaths
 from .checked_object import CheckedObject, shown
 from .graph_files import check_graph_files
-from .graph_request import NodeGraph, graph_from_json, graph_to_json
+from .graph_request import LARGEST_SIDE, NodeGraph, graph_from_json, graph_to_json
 from .job_folder import JobFolder
 from .material_request import Material, material_from_json, without_nothing
 from .picture_part import PicturePart, part_from_json, part_to_json
@@ -28,7 +28,6 @@ SCHEMA_VERSION = 1
 MOST_PICTURES = 32  # of one fit: each one's scene is in memory, and more say little that is new
 MOST_TARGETS = 64  # materials of one fit; without a queue the number of free values says no before
 _MOST_OF = {"more_pictures": (MOST_PICTURES, "pictures"), "targets": (MOST_TARGETS, "materials")}
-LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 WHERE = "request.json"
 _KEYS = (
     *("schema_version", "generator", "scene", "target", "image", "reference", "view", "light_paths", "materials"),

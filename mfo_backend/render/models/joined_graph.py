@@ -4,44 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...types.parameter import ParameterTable, Vector
+from ...types.parameter import Vector
 from .graph_pictures import GraphPictures, GraphState
 
 
-class Graph(Protocol):
-    """Flat pictures of a graph's sockets for any values inside it; see `GraphPictures`."""
-
-    @property
-    def table(self) -> ParameterTable:
-        """The values."""
-        ...
-
-    @property
-    def varying(self) -> Mapping[str, tuple[int, ...]]:
-        """What they change, with the components that each changes with."""
-        ...
-
-    @property
-    def scanned(self) -> tuple[int, ...]:
-        """Entries of the vector that have many minima."""
-        ...
-
-    def state(self, vector: Vector) -> GraphState:
-        """Pictures and derivatives."""
-        ...
-
-    def plain(self, vectors: Sequence[Vector]) -> list[Mapping[str, NDArray[np.float32]]]:
-        """Pictures alone."""
-        ...
-
-
 class JoinedGraph:
-    """The `Graph` of several pictures: the rows of the second one follow those of the first, and so on.
+    """As `GraphPictures`, of several pictures: the rows of the second one follow those of the first, and so on.
 
     Each picture's last row is its mean. They are the same values, seen by other cameras.
     """
@@ -76,3 +49,6 @@ class JoinedGraph:
         """The first row of each picture."""
         rows = [len(next(iter(graph.state(vector).pictures.values()))) for graph in self._graphs]
         return [sum(rows[:number]) for number in range(len(rows))]
+
+
+Graph: TypeAlias = GraphPictures | JoinedGraph

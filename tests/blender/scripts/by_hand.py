@@ -11,7 +11,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import bpy
@@ -34,7 +33,7 @@ from hand import (
     wheel,
     widen,
 )
-from steps import material, plain_picture, roughness, runtime
+from steps import material, plain_picture, roughness, runtime, until
 
 addon_id, *words = sys.argv[sys.argv.index("--") + 1 :]
 folder, scale, width = Path(words[0]), float(words[1]), int(words[2])
@@ -75,13 +74,6 @@ def shot(name, *, whole=False):
 
 def screen_shot(name):
     yield from shot(name, whole=True)
-
-
-def until(condition, seconds):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, f"waited {seconds} s, state {runtime().state}: {runtime().sentence}"
-        yield 0.05
 
 
 def set_the_scene():

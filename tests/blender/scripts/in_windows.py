@@ -19,7 +19,7 @@ import bpy
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parent / "timing")]
 import steps
 import stopwatch
-from steps import material, plain_picture, roughness, runtime
+from steps import material, over, plain_picture, roughness, runtime, until
 
 addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
@@ -33,13 +33,6 @@ running_job, preflight, fit_queue, handlers, cycles_check, shown_result, waiting
 LONGEST_STALL = 0.05  # seconds
 bpy.context.preferences.view.show_splash = False
 stopwatch.time_the_addon(f"{addon_id}.blender_addon")
-
-
-def over():
-    window = bpy.context.window_manager.windows[0]
-    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    return bpy.context.temp_override(window=window, area=area, region=region)
 
 
 def do(operator, **options):
@@ -89,13 +82,6 @@ def fit(seconds, **control):
     waiting_backend.close()  # one that waits has the environment of an earlier fit
     do(bpy.ops.mfo.fit)
     return running_job.current.process
-
-
-def until(condition, seconds):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, f"waited {seconds} s, state {runtime().state}: {runtime().sentence}"
-        yield 0.05
 
 
 def alive(process):

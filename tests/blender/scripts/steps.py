@@ -2,6 +2,7 @@
 """Take the steps of a walk through Blender's windows, one after another, and quit; and what walks look at."""
 
 import sys
+import time
 import traceback
 
 import bpy
@@ -24,6 +25,22 @@ def take(steps):
         return None
 
     bpy.app.timers.register(tick, first_interval=FIRST_SECONDS, persistent=True)
+
+
+def until(condition, seconds, look=0.05):
+    """Wait for a condition, looked at after so many seconds each."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, f"waited {seconds} s, state {runtime().state}: {runtime().sentence}"
+        yield look
+
+
+def over():
+    """With the first window's 3D view, as where its buttons are pressed."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    return bpy.context.temp_override(window=window, area=area, region=region)
 
 
 def runtime():

@@ -21,7 +21,7 @@ import bpy
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 import steps
 import stopwatch
-from steps import runtime
+from steps import over, runtime, until
 
 ADDON = "bl_ext.user_default.material_fit_mfo.blender_addon"
 LOOK = 0.005  # seconds between two looks
@@ -38,29 +38,14 @@ bpy.context.preferences.view.show_splash = False
 stopwatch.time_the_addon(ADDON)
 
 
-def over():
-    window = bpy.context.window_manager.windows[0]
-    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
-    return bpy.context.temp_override(
-        window=window, area=area, region=next(r for r in area.regions if r.type == "WINDOW")
-    )
-
-
-def until(condition, seconds):
-    end = time.perf_counter() + seconds
-    while not condition():
-        assert time.perf_counter() < end, f"waited {seconds} s: {runtime().state} {runtime().sentence}"
-        yield LOOK
-
-
 def fit(rows):
     """One press; `rows` gets its seconds to the first picture and to the result."""
     began = time.perf_counter()
     with over():
         bpy.ops.mfo.fit("INVOKE_DEFAULT", True)
-    yield from until(lambda: previews.icon("current") or runtime().state in ("DONE", "FAILED"), 120.0)
+    yield from until(lambda: previews.icon("current") or runtime().state in ("DONE", "FAILED"), 120.0, LOOK)
     first = time.perf_counter() - began
-    yield from until(lambda: runtime().state in ("DONE", "FAILED"), 120.0)
+    yield from until(lambda: runtime().state in ("DONE", "FAILED"), 120.0, LOOK)
     rows.append((first, time.perf_counter() - began))
     print(f"picture {rows[-1][0]:.2f} s, result {rows[-1][1]:.2f} s: {runtime().sentence}", flush=True)
     assert runtime().state == "DONE", runtime().sentence
