@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba in the LLVM variant, with our plugin, for every test of the models."""
+"""Mitsuba in the variant of the tests, with our plugin, for every test of the models."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from types import ModuleType
 import mitsuba as mi
 import pytest
 
-VARIANT = "llvm_ad_rgb"
+from mfo_backend.render.machine.variant import load_variant
+
+VARIANT = load_variant()  # the one that MFO_VARIANT names, if it names one
 
 
 @pytest.fixture(autouse=True)
@@ -19,7 +21,6 @@ def _variant() -> None:
 
 @pytest.fixture(scope="session")
 def plugin() -> ModuleType:
-    mi.set_variant(VARIANT)
     from mfo_backend.material.plugins import principled_plugin
 
     principled_plugin.register()

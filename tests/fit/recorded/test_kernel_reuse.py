@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import drjit as dr
-import mitsuba as mi
 import pytest
 
-mi.set_variant("llvm_ad_rgb")
+from mfo_backend.render.machine.variant import load_variant
+
+load_variant()
 
 from mfo_backend.fit.recover_material import recover_material  # noqa: E402  after the variant is set
 from mfo_backend.fit.settings import FitSettings  # noqa: E402

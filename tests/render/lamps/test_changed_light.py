@@ -6,11 +6,12 @@ from __future__ import annotations
 import re
 from contextlib import ExitStack
 
-import mitsuba as mi
 import numpy as np
 import pytest
 
-mi.set_variant("llvm_ad_rgb")
+from mfo_backend.render.machine.variant import load_variant
+
+load_variant()
 
 from mfo_backend.render.lamps.changed_light import alone, has_other_light, lamp_named, turned  # noqa: E402  needs it
 from mfo_backend.render.pictures.renderer import load_renderer  # noqa: E402

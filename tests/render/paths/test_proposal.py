@@ -8,7 +8,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-mi.set_variant("llvm_ad_rgb")
+from mfo_backend.render.machine.variant import load_variant
+
+load_variant()
 
 from mfo_backend.render.paths.proposal import DefensiveProposal  # noqa: E402  after the variant is set
 

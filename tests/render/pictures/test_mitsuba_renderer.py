@@ -246,8 +246,8 @@ def test_an_exr_world_loads_on_a_single_thread(tmp_path: Path) -> None:
     light = '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'
     (tmp_path / "scene.xml").write_text(SCENE.format(bsdf=OPAQUE.format(more=""), light=light, depth=2))
     program = (
-        "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); import drjit as dr; dr.set_thread_count(1)\n"
-        "from pathlib import Path; from mfo_backend.render.pictures.renderer import load_renderer\n"
+        "from mfo_backend.render.machine.variant import load_variant, use_threads; load_variant(); use_threads(1)\n"
+        "import drjit as dr; from pathlib import Path; from mfo_backend.render.pictures.renderer import load_renderer\n"
         f"load_renderer(Path({str(tmp_path / 'scene.xml')!r}), 'target', model='mitsuba_principled', "
         "parameters='reduced'); print(dr.thread_count())"
     )
