@@ -156,7 +156,7 @@ def _shape_elements(
 
 def _shows_its_back(shape: Shape, scene: SceneData) -> bool:
     """Whether light from the back of faces gets anywhere: in a lamp whose inside shows nothing it does not."""
-    if not is_closed(shape.mesh) or not looks_outwards(shape.mesh):
+    if _passes_light(shape.bsdf, scene) or not is_closed(shape.mesh) or not looks_outwards(shape.mesh):
         return True
     _, depths = scene.camera.project(shape.mesh.positions.astype(np.float64))
     if depths.min() < scene.camera.clip_start < depths.max():  # around the camera, or cut open by near clipping
@@ -164,6 +164,11 @@ def _shows_its_back(shape: Shape, scene: SceneData) -> bool:
     others = [other.mesh.positions for other in scene.shapes if other is not shape]
     points = [some[:: max(1, len(some) // POINTS_OF_A_SHAPE)].astype(np.float64) for some in others]
     return any((winding_numbers(shape.mesh, some) > 0.5).all() for some in points)
+
+
+def _passes_light(bsdf: str, scene: SceneData) -> bool:
+    material = scene.materials[bsdf]
+    return material.passes_light or any(_passes_light(part.bsdf, scene) for part in material.parts)
 
 
 def _shadows(shape: Shape) -> list[Element]:

@@ -67,11 +67,13 @@ def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
     plain, coated = new_material("Plain", Subsurface_Weight=0.3), new_material("Coated", Coat_Weight=0.5, **glow)
     add_quad("Floor", 1.0, -1.0, new_material("Glow", **glow))
     add_quad("Wall", 1.0, -2.0, coated)
+    add_quad("Tube", 1.0, -3.0, new_material("Neon", Transmission_Weight=0.5, **glow))
     notes = export(add_quad("Target", 1.0, 0.0, plain)).notes
     assert [note for note in notes if "mitsuba_principled" not in note] == [
         "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface. "
         "Its weight has no effect at Diffuse Roughness 0.",
         "Material 'Coated': the emission is not dimmed by Coat Weight, as it is in Cycles.",
+        "Material 'Neon': how much of its own light comes through glowing glass differs from Cycles.",
     ]
 
 
@@ -174,6 +176,13 @@ def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycle
         np.testing.assert_allclose(found[area].mean(axis=(0, 1)), expected[area].mean(axis=(0, 1)), rtol=0.02)
 
 
+def _cut_out(glow: Any) -> None:
+    glow.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node.inputs["Alpha"].default_value = 0.3
+    cycles = bpy.context.scene.cycles
+    cycles.max_bounces = cycles.diffuse_bounces = 6  # Mitsuba counts what a ray passes
+    _lamp_box(glow, 3.0)
+
+
 def _lamp_box(glow: Any, size: float, *, around: bool = False, inwards: bool = False, faces: Any = None) -> None:
     bpy.ops.mesh.primitive_cube_add(size=size, location=(0.3, 0.2, 0.0 if around else 8.0))
     mesh = bpy.context.object.data
@@ -191,6 +200,7 @@ def _lamp_box(glow: Any, size: float, *, around: bool = False, inwards: bool = F
         pytest.param(lambda glow: add_quad("Glow", 1.5, 8.0, glow), 2, id="a quad, its back to the floor"),
         pytest.param(lambda glow: _lamp_box(glow, 0.8), 1, id="a box"),
         pytest.param(lambda glow: _lamp_box(glow, 0.8, inwards=True), 2, id="a box inside out"),
+        pytest.param(_cut_out, 2, id="a box that lets light through"),
         pytest.param(lambda glow: _lamp_box(glow, 60.0, around=True), 2, id="a box around everything"),
         pytest.param(
             lambda glow: _lamp_box(glow, 60.0, around=True, faces=lambda at: at.z > 1.0), 2, id="the ceiling of a box"
