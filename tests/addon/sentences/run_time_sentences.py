@@ -15,7 +15,7 @@ _SAID = {"Finding": 1, "translated": 0, "draw_sentence": 2, "note": 0, "error": 
 _NAMED = {"said", "sentence"}  # what a sentence is called before it goes into one of them
 _KINDS = {"Kind": (0, 1)}
 _FIELD = re.compile(r"\{[^{}]*\}")  # of a template that is filled in later
-_SENTENCE = re.compile(r"[A-Z{'](\S* ){3}.*(\.|: \{\}|\. \{\})")  # whatever call it is in
+_SENTENCE = re.compile(r"[A-Za-z{'](\S* ){3}.*(\.|: \{\}|\. \{\})")  # whatever call it is in
 
 
 def run_time_sentences(folders: tuple[str, ...]) -> set[str]:
