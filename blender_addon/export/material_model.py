@@ -99,17 +99,12 @@ class Material:
     @property
     def passes_light(self) -> bool:
         """Whether light comes through it, or through one of its leaves."""
-        alpha = self.sockets.get("Alpha")
+        if self.model == "null" or self.shader in ("glass", "refraction", "translucent"):
+            return True
+        alpha, glass = self.sockets.get("Alpha"), self.sockets.get("Transmission Weight")
         is_cut = alpha is not None and (alpha.varies or alpha.value != 1.0) and self.model == "principled"
-        own = self.model == "null" or self.shader == "translucent" or is_cut or self.refracts
-        return own or any(leaf.passes_light for leaf in self.leaves)
-
-    @property
-    def refracts(self) -> bool:
-        """Whether it is glass on its way through, or one of its leaves is."""
-        glass = self.sockets.get("Transmission Weight")
-        own = glass is not None and (glass.varies or glass.value != 0.0)
-        return own or self.shader in ("glass", "refraction") or any(leaf.refracts for leaf in self.leaves)
+        is_glass = glass is not None and (glass.varies or glass.value != 0.0)
+        return is_cut or is_glass or any(leaf.passes_light for leaf in self.leaves)
 
     @property
     def asks_graph(self) -> bool:

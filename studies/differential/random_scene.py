@@ -312,6 +312,5 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("bump correction", _uncorrected, ("Bump Map Correction",)),
 )  # fmt: skip
 SETTINGS += ARTIST_SETTINGS
-# what the plain scene has at times, and what two settings make together that are exported each
-PLAIN_WORDS = ("smooth over few faces", "emission is not dimmed by", "glowing glass")
+PLAIN_WORDS = ("smooth over few faces",)  # of what the plain scene has at times
 WORDS = {setting.name: setting.words for setting in SETTINGS}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..files.xml_scene import Element, add, bitmap, plugin, reference, rgb, scalar, transform
+from ..files.xml_scene import Element, add, bitmap, boolean, plugin, reference, rgb, scalar, transform
 from ..findings import Findings
 from ..material_model import Material, Part, Socket, Texture
 from .principled_mapping import UNMATCHED, sockets_to_mitsuba
@@ -69,44 +69,26 @@ def _mixed(parts: Sequence[Part], identifier: str, save: Callable[[Texture], str
     return add(plugin("bsdf", "blendbsdf", identifier), shown, reference(parts[0].bsdf), others)
 
 
-def emission_element(
-    material: Material, scale: float, save: Callable[[Texture], str], *, is_target: bool
-) -> Element | None:
+def emission_element(material: Material, scale: float, save: Callable[[Texture], str]) -> Element | None:
     """Return the `<emitter>` for a shape of `material`, its radiance times `scale`; None if it emits nothing.
 
-    What Alpha lets pass does not glow, in Cycles' Principled BSDF; of a target alpha may be sought, so it is left out.
+    What alpha, coat and sheen take of it is for the backend to say, unless the emission is dimmed already.
     """
     color, strength = material.sockets.get("Emission Color"), material.sockets.get("Emission Strength")
     if material.emission.max(initial=0.0) <= 0.0:
         return None
-    emitter = plugin("emitter", "area")
+    emitter = plugin("emitter", "blender_glow")
     if material.is_mixed or color is None or strength is None:  # of a mix the mean; the backend has the whole of it
         return add(emitter, rgb("radiance", material.emission * scale))
-    alpha = Socket(1.0) if is_target or material.emission_is_dimmed else material.sockets.get("Alpha", Socket(1.0))
-    by_mean = alpha.texture is None or not _is_dimmed_by(alpha, color, strength)
-    dimmed = scale * (min(max(float(alpha.value), 0.0), 1.0) if by_mean else 1.0)
-    texture = color.texture if by_mean else color.texture or alpha.texture
-    if strength.texture is not None or texture is None:
-        return add(emitter, rgb("radiance", material.emission * dimmed))
-    pixels = np.asarray(color.value if color.texture is None else color.texture.pixels, np.float32)
-    pixels = pixels * np.float32(float(strength.value) * dimmed)
-    if not by_mean and alpha.texture is not None:
-        pixels = pixels * np.clip(alpha.texture.pixels, 0.0, 1.0)
-    return add(emitter, _value("radiance", None, replace(texture, pixels=pixels), save))
-
-
-def _is_dimmed_by(alpha: Socket, color: Socket, strength: Socket) -> bool:
-    """Whether the exported emission is dimmed by Alpha as in Cycles, pixel by pixel where that is a picture."""
-    if alpha.texture is None:
-        return True
+    if not material.emission_is_dimmed:
+        add(emitter, boolean("layered", True))
     if strength.texture is not None or color.texture is None:
-        return strength.texture is None
-    first, second = color.texture, alpha.texture
-    same = first.pixels.shape[:2] == second.pixels.shape[:2] and np.allclose(first.uv_matrix, second.uv_matrix)
-    return same and (first.wrap, first.filter_type) == (second.wrap, second.filter_type)
+        return add(emitter, rgb("radiance", material.emission * scale))
+    pixels = color.texture.pixels * np.float32(float(strength.value) * scale)
+    return add(emitter, _value("radiance", None, replace(color.texture, pixels=pixels), save))
 
 
-def approximated(material: Material, *, is_target: bool) -> list[str]:
+def approximated(material: Material) -> list[str]:
     """Return a sentence for each thing that no model of the backend has, Blender's own included."""
     found = []
     if material.value("Subsurface Weight", 0.0) != 0.0:
@@ -114,16 +96,6 @@ def approximated(material: Material, *, is_target: bool) -> list[str]:
         found.append(f"Subsurface is fitted as diffuse: no light travels below the surface.{weight}")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
-    layers = [("Coat Weight", 0.0), ("Sheen Weight", 0.0)]
-    names = ("Alpha", "Emission Color", "Emission Strength")
-    if is_target or not _is_dimmed_by(*(material.sockets.get(name, Socket(1.0)) for name in names)):
-        layers.append(("Alpha", 1.0))
-    above = [name for name, nothing in layers if material.value(name, nothing) != nothing]
-    if above and material.emission.max(initial=0.0) > 0.0 and not material.emission_is_dimmed:
-        found.append(f"the emission is not dimmed by {', '.join(above)}, as it is in Cycles.")
-    if material.refracts and material.emission.max(initial=0.0) > 0.0:
-        # a glowing glass box was 10 % too dark, a sheet 22 % too bright: its back is glass that looks the other way
-        found.append("how much of its own light comes through glowing glass differs from Cycles.")
     return found
 
 
@@ -151,7 +123,7 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
             f"Material '{material.name}': {', '.join(lost)} has no counterpart in Mitsuba's principled and is missing "
             "in a fit with the model mitsuba_principled."
         )
-    for sentence in approximated(material, is_target=every):
+    for sentence in approximated(material):
         findings.note(f"Material '{material.name}': {sentence}")
     element = plugin("bsdf", "principled")
     for name, value in values.items():

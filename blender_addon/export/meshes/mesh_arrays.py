@@ -84,12 +84,6 @@ def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     )
 
 
-def turned(mesh: TriangleMesh, offset: float) -> TriangleMesh:
-    """Return the back of `mesh`: turned around and moved by `offset` metres against its normals."""
-    positions = (mesh.positions - offset * mesh.normals).astype(np.float32)
-    return TriangleMesh(positions, -mesh.normals, mesh.uvs, np.ascontiguousarray(mesh.triangles[:, ::-1]))
-
-
 def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Return the distinct rows of `rows` (n, 8) and the index of each row among them."""
     rows = rows + np.float32(0.0)  # -0.0 and 0.0 are one

@@ -26,7 +26,7 @@ def candidates(scene: bpy.types.Scene, data: SceneData) -> dict[str, Any]:
     cameras = [_camera(obj, data.camera) for obj in scene.objects if obj.type == "CAMERA" and obj != scene.camera]
     counts = Counter(light.name for light in data.lights)
     single = all(count == 1 and name in scene.objects for name, count in counts.items())
-    middle = data.bounds()[0] if data.target is None else data.target.mesh.positions.mean(axis=0)
+    middle = data.middle() if data.target is None else data.target.mesh.positions.mean(axis=0)
     found = [
         (irradiance_at(light, middle), {"name": light.name, "emitter": f"light_{number + 1:04d}"})
         for number, light in enumerate(data.lights if single else ())

@@ -94,10 +94,10 @@ class SceneData:
         """Shapes whose material gives light."""
         return [shape for shape in self.shapes if self.materials[shape.bsdf].emission.max(initial=0.0) > 0.0]
 
-    def bounds(self) -> tuple[NDArray[np.float64], float]:
-        """Return middle and radius of a sphere around all geometry."""
+    def middle(self) -> NDArray[np.float64]:
+        """Return the middle of all geometry."""
         if not self.shapes:
-            return np.zeros(3), 1.0
+            return np.zeros(3)
         low = np.min([shape.mesh.positions.min(axis=0) for shape in self.shapes], axis=0).astype(np.float64)
         high = np.max([shape.mesh.positions.max(axis=0) for shape in self.shapes], axis=0).astype(np.float64)
-        return 0.5 * (low + high), max(float(np.linalg.norm(high - low)) / 2.0, 1e-6)
+        return 0.5 * (low + high)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Set
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,15 +19,9 @@ from ..lights.light_elements import light_element
 from ..lights.light_model import irradiance_at
 from ..material_model import Texture
 from ..materials.material_elements import bsdf_element, emission_element
-from ..meshes.enclosed import is_closed, looks_outwards, winding_numbers
-from ..meshes.mesh_arrays import turned
 from .scene_data import SceneData, Shape, target_bsdf
 from .world_model import camera_world_element, world_element, world_irradiance
 
-# the back of an open emitter lies this part of the scene's radius behind its front
-BACK_OFFSET = 1e-5
-# vertices of another shape, about, that are looked for inside of an emitter
-POINTS_OF_A_SHAPE = 64
 # a weak emitter may still matter elsewhere: it is sampled at least this often, relative to the strongest
 LEAST_WEIGHT = 0.1
 # Clamping of indirect light by the radiance of a white matt surface at the target. At 1 plastic, metal and coat were
@@ -77,11 +70,10 @@ class SceneFiles:
 def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     """Return scene.xml and its files; what had to be approximated goes into `findings`."""
     files = SceneFiles()
-    center, radius = scene.bounds()
     targets = [shape for n in range(scene.target_count) if (shape := scene.target_of(n)) is not None]
     # of several the middle of their middles
     middles = [shape.mesh.positions.mean(axis=0).astype(np.float64) for shape in targets]
-    middle = np.mean(middles, axis=0) if middles else center
+    middle = np.mean(middles, axis=0) if middles else scene.middle()
     children: list[Element] = [
         add(
             plugin("integrator", "path"),
@@ -113,7 +105,7 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
             "passes through it differs from Cycles."
         )
     for shape in scene.shapes:
-        children += _shape_elements(shape, scene, radius * BACK_OFFSET, files, fitted)
+        children.append(_shape_element(shape, scene, files))
     files.text = scene_text(children)
     return files
 
@@ -135,40 +127,14 @@ def _weigh(emitters: list[tuple[Element, float]]) -> None:
         add(element, scalar("sampling_weight", max(irradiance / most, LEAST_WEIGHT)))
 
 
-def _shape_elements(
-    shape: Shape, scene: SceneData, offset: float, files: SceneFiles, fitted: Set[str]
-) -> list[Element]:
-    material = scene.materials[shape.bsdf]
-    sides = [(shape.identifier, shape.mesh)]
-    # an area emitter of Mitsuba shines on one side, a surface of Blender on both
-    if material.emission.max(initial=0.0) > 0.0 and _shows_its_back(shape, scene):
-        sides.append((f"{shape.identifier}_back", turned(shape.mesh, offset)))
-    elements = []
-    for identifier, mesh in sides:
-        path = f"meshes/{identifier}.ply"
-        files.meshes[path] = mesh
-        element = add(plugin("shape", "ply", identifier), string("filename", path), reference(shape.bsdf))
-        add(element, *_shadows(shape))
-        emitter = emission_element(material, scene.settings.exposure, files.texture, is_target=shape.bsdf in fitted)
-        elements.append(element if emitter is None else add(element, emitter))
-    return elements
-
-
-def _shows_its_back(shape: Shape, scene: SceneData) -> bool:
-    """Whether light from the back of faces gets anywhere: in a lamp whose inside shows nothing it does not."""
-    if _passes_light(shape.bsdf, scene) or not is_closed(shape.mesh) or not looks_outwards(shape.mesh):
-        return True
-    _, depths = scene.camera.project(shape.mesh.positions.astype(np.float64))
-    if depths.min() < scene.camera.clip_start < depths.max():  # around the camera, or cut open by near clipping
-        return True
-    others = [other.mesh.positions for other in scene.shapes if other is not shape]
-    points = [some[:: max(1, len(some) // POINTS_OF_A_SHAPE)].astype(np.float64) for some in others]
-    return any((winding_numbers(shape.mesh, some) > 0.5).all() for some in points)
-
-
-def _passes_light(bsdf: str, scene: SceneData) -> bool:
-    material = scene.materials[bsdf]
-    return material.passes_light or any(_passes_light(part.bsdf, scene) for part in material.parts)
+def _shape_element(shape: Shape, scene: SceneData, files: SceneFiles) -> Element:
+    path = f"meshes/{shape.identifier}.ply"
+    files.meshes[path] = shape.mesh
+    element = add(plugin("shape", "ply", shape.identifier), string("filename", path), reference(shape.bsdf))
+    add(element, *_shadows(shape))
+    material, exposure = scene.materials[shape.bsdf], scene.settings.exposure
+    emitter = emission_element(material, exposure, files.texture)
+    return element if emitter is None else add(element, emitter)
 
 
 def _shadows(shape: Shape) -> list[Element]:

@@ -110,7 +110,6 @@ FIT = {
     "The material is mixed with one that lets light through.": "Le matériau est mélangé à un autre qui laisse passer la lumière.",
     "Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.": "Plusieurs shaders d'un mélange, ou ses facteurs, ne sont ajustés que sur des surfaces opaques.",
     "The emission of a mix, and one that nodes give, is held: leave emission_color out of the parameters.": "L'émission d'un mélange, et celle que des nœuds donnent, est gardée : omettre emission_color des paramètres.",
-    "The target is open and glows on both sides: the emission of one side alone can be fitted.": "L'objet est ouvert et luit des deux côtés : seule l'émission d'un côté peut être ajustée.",
     "Light over other surfaces is left out: it is {} % of the direct light.": "La lumière passant par d'autres surfaces est omise : elle fait {} % de la lumière directe.",
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and limits for one kind of bounce.": "Omis de l'ajustement avec le modèle 'mitsuba_principled' : le Filter Glossy de Cycles, l'écrêtage de la lumière indirecte et les limites d'une sorte de rebond.",
     "The model 'mitsuba_principled' takes the averages of what nodes give ({}), and leaves their normals out.": "Le modèle 'mitsuba_principled' prend les moyennes de ce que les nœuds donnent ({}), et omet leurs normales.",

@@ -110,7 +110,6 @@ FIT = {
     "The material is mixed with one that lets light through.": "Das Material ist mit einem gemischt, das Licht durchlässt.",
     "Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.": "Mehrere Shader einer Mischung, oder ihre Faktoren, werden nur auf undurchsichtigen Oberflächen angepasst.",
     "The emission of a mix, and one that nodes give, is held: leave emission_color out of the parameters.": "Das Leuchten einer Mischung, und eines, das Nodes geben, wird festgehalten: emission_color nicht auswählen.",
-    "The target is open and glows on both sides: the emission of one side alone can be fitted.": "Das Objekt ist offen und leuchtet auf beiden Seiten: nur das Leuchten einer Seite kann angepasst werden.",
     "Light over other surfaces is left out: it is {} % of the direct light.": "Licht über andere Oberflächen wird weggelassen: es ist {} % des direkten Lichts.",
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and limits for one kind of bounce.": "In der Anpassung mit dem Modell 'mitsuba_principled' fehlen: Filter Glossy von Cycles, die Begrenzung indirekten Lichts und Grenzen für eine Art von Reflexion.",
     "The model 'mitsuba_principled' takes the averages of what nodes give ({}), and leaves their normals out.": "Das Modell 'mitsuba_principled' nimmt die Mittel dessen, was Nodes geben ({}), und lässt ihre Normalen weg.",

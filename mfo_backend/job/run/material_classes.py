@@ -28,7 +28,7 @@ from ...types.verdict import Cause, Judgement, Verdict
 GLASS = {"Transmission Weight": 1.0, "Metallic": 0.0, "Alpha": 1.0, "Roughness": 0.1, "Base Color": [0.9, 0.9, 0.9]}
 CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
 OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
-# Layers above the emission, which dim it in Cycles and not in Mitsuba, are off
+# Layers above the emission are off: recordings have no derivative of how they dim it
 GLOWING = OPAQUE | {"Coat Weight": 0.0, "Sheen Weight": 0.0, "Emission Color": [0.5, 0.5, 0.5]}
 _OF_GLASS = ("transmission_weight", "ior")
 _ABOVE_EMISSION = tuple(name for name in BLENDER_PRINCIPLED.names if name.startswith(("coat_", "sheen_")))

@@ -12,9 +12,8 @@ the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of 
 `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be textures of world directions on the camera's side, zero
 for the mesh's own.
 
-A Mitsuba BSDF cannot emit. An emitting material needs an `area` emitter of radiance emission_color * emission_strength
-on each side of its shape, which is exact without coat, sheen and alpha; with them `emitted` in `blender_principled`
-tells the radiance by view direction. The tangent is that of Mitsuba's shading frame, dp/du of the UV map.
+A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter of radiance emission_color *
+emission_strength, which asks `emission_share` what alpha, sheen and coat leave of it. The tangent is that of Mitsuba's shading frame, dp/du of the UV map.
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ import mitsuba as mi
 from ...types.errors import SetupError
 from ...types.parameter import Value
 from ..cycles_model import cycles_model
-from ..principled.blender_principled import evaluate
+from ..principled.blender_principled import emitted, evaluate
 from ..principled.bumped_normals import valid_normal
-from ..principled.layers import Layers, layer_stack
+from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
 from ..principled.needed_lobes import needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
@@ -134,6 +133,14 @@ class BlenderPrincipled(mi.BSDF):
             self._choose_lobes()
         for name in changed:
             dr.make_opaque(getattr(self, name))
+
+    def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
+        """What alpha, sheen and coat leave of the surface's own light towards `si.wi`, perhaps to a light sample."""
+        own = {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
+        values = self.values_at(si, active) | own
+        if sampled:
+            return mi.Color3f(sampled_emission(values, si.wi, self.lobes))
+        return mi.Color3f(emitted(values, si.wi, self.lobes, self.model))
 
     def picture_of(self, name: str) -> Any:
         """The texture of a parameter or a direction that has one."""

@@ -101,12 +101,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
 
     Values are numbers, tuples or Dr.Jit arrays of the float type of `wi`; missing ones are Blender's defaults.
     """
-    number = dr.kind_of(wi.z)
-    colour = next((dr.kind_of(v) for k, v in parameters.items() if _is_colour(k) and dr.is_array_v(v)), dr.kind_of(wi))
-    p = {
-        item.name: (colour if item.size == 3 else number)(parameters.get(item.name, item.default))
-        for item in BLENDER_PRINCIPLED
-    }
+    number, colour, p = _typed(parameters, wi)
     stack: dict[str, Any] = {"flip": wi.z}
     angle = p["anisotropic_rotation"] * (2 * dr.pi)
     # The rotation is about the normal of the side that is seen
@@ -162,6 +157,29 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
     return Layers(**stack)
 
 
+def sampled_emission(parameters: Mapping[str, Any], wi: Any, lobes: Lobes) -> Any:
+    """Radiance emitted towards `wi` as Cycles' light samples of a surface see it.
+
+    It makes no closures for them, so of what lies above only alpha and the coat's tint count. Found by renders: the
+    light of a surface with a sheen is 8 % brighter with light samples (Emission Sampling) than without.
+    """
+    _, colour, p = _typed(parameters, wi)
+    w = colour(saturate(p["alpha"])) if lobes.alpha else colour(1)
+    if lobes.coat:
+        w = w * _below_coat(p, dr.maximum(dr.abs(wi.z), 1e-7))
+    return p["emission_color"] * p["emission_strength"] * w
+
+
+def _typed(parameters: Mapping[str, Any], wi: Any) -> tuple[Any, Any, dict[str, Any]]:
+    """The kinds of numbers and of colours, and all values by name as such."""
+    number = dr.kind_of(wi.z)
+    colour = next((dr.kind_of(v) for k, v in parameters.items() if _is_colour(k) and dr.is_array_v(v)), dr.kind_of(wi))
+    return number, colour, {
+        item.name: (colour if item.size == 3 else number)(parameters.get(item.name, item.default))
+        for item in BLENDER_PRINCIPLED
+    }  # fmt: skip
+
+
 def _is_colour(name: str) -> bool:
     return name in BLENDER_PRINCIPLED.names and BLENDER_PRINCIPLED[name].size == 3
 
@@ -188,11 +206,14 @@ def _add_coat(stack: dict[str, Any], p: Mapping[str, Any], w: Any, mu: Any, mode
     else:
         gain, albedo = NO_COMPENSATION, dielectric(mu, n)
     stack |= {"coat": w * weight * gain.scale, "coat_alpha": dr.maximum(dr.square(roughness), 1e-6), "coat_ior": n}
-    w = w * saturate(1 - weight * gain.weight * albedo)
-    # Absorption along the refracted view path, once for in and out
-    path = dr.rcp(root(1 - (1 - dr.square(mu)) / dr.square(n)))
+    return w * saturate(1 - weight * gain.weight * albedo) * _below_coat(p, mu)
+
+
+def _below_coat(p: Mapping[str, Any], mu: Any) -> Any:
+    """What the coat's tint leaves: absorption along the refracted view path, once for in and out."""
+    path = dr.rcp(root(1 - (1 - dr.square(mu)) / dr.square(at_least(p["coat_ior"], 1))))
     absorbed = dr.exp(dr.log(dr.maximum(p["coat_tint"], 1e-30)) * path)
-    return w * (1 + (absorbed - 1) * weight)
+    return 1 + (absorbed - 1) * at_least(p["coat_weight"], 0)
 
 
 def _add_glass(

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The names of the lamps in scene files. Choose the variant before importing this."""
+"""The names of our emitters in scene files. Choose the variant before importing this."""
 
 from __future__ import annotations
 
 import mitsuba as mi
 
 from .area_lamp import AreaLamp
+from .glow import Glow
 from .point_lamp import PointLamp, SharpSpot, SpotLamp
 from .sun_lamp import SunLamp
 
@@ -15,10 +16,11 @@ PLUGINS = {
     "blender_sharp_spot": SharpSpot,
     "blender_area": AreaLamp,
     "blender_sun": SunLamp,
+    "blender_glow": Glow,
 }
 
 
 def register() -> None:
-    """Make the lamps known to Mitsuba in the current variant."""
+    """Make them known to Mitsuba in the current variant."""
     for name, plugin in PLUGINS.items():
         mi.register_emitter(name, plugin)

@@ -11,7 +11,10 @@ from ...scene.scene_xml import Element
 from ...types.errors import BadInputError
 
 # registered from Python
-OURS = ("blender_principled", "blender_point", "blender_spot", "blender_sharp_spot", "blender_area", "blender_sun")
+OURS = (
+    *("blender_principled", "blender_point", "blender_spot", "blender_sharp_spot", "blender_area", "blender_sun"),
+    "blender_glow",
+)
 
 
 def trust_only_mitsuba() -> None:

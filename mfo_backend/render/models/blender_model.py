@@ -24,7 +24,7 @@ from ...material.principled.principled_dict import (
 )
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...scene.scene_xml import Element, Target
-from ...types.errors import BadInputError, UnrecordableError
+from ...types.errors import BadInputError
 from ...types.parameter import ParameterTable, Value
 from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
 
@@ -152,17 +152,13 @@ def _prepared(
 
 
 def _open_emission(scene: Element, shape_id: str, radiance: NDArray[np.float64]) -> None:
-    """Give the shape an area emitter of this radiance instead of any other."""
-    shapes = {shape.get("id"): shape for shape in scene.iter("shape")}
-    if f"{shape_id}_back" in shapes:
-        raise UnrecordableError(
-            "The target is open and glows on both sides: the emission of one side alone can be fitted."
-        )
-    shape = shapes[shape_id]
+    """Let the shape glow with this radiance and no other."""
+    shape = next(shape for shape in scene.iter("shape") if shape.get("id") == shape_id)
     for emitter in shape.findall("emitter"):
         shape.remove(emitter)
-    emitter = ElementTree.SubElement(shape, "emitter", type="area")
+    emitter = ElementTree.SubElement(shape, "emitter", type="blender_glow")
     ElementTree.SubElement(emitter, "rgb", name="radiance", value=", ".join(repr(float(v)) for v in radiance))
+    ElementTree.SubElement(emitter, "boolean", name="layered", value="true")
 
 
 def _replace_radiance(

@@ -16,7 +16,7 @@ from ...types.parameter import ParameterTable
 
 Materials = Mapping[str, Mapping[str, Any]]  # `materials` of request.json
 EMISSION = "emission_color"  # the one parameter that belongs to an emitter beside the BSDF
-RADIANCE_KEY = "emitter.radiance.value"  # of an area emitter, below its shape
+RADIANCE_KEY = "emitter.radiance.value"  # of a glow, below its shape
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.free_emission else None
-        glowing = dr.select(mi.Frame3f.cos_theta(si.wi) > 0.0, filter_weight, 0.0) if settings.free_emission else None
+        glowing = shape.emitter().share(si) * filter_weight if settings.free_emission else None
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
@@ -168,7 +168,7 @@ def record_paths(
             add_radiance(constant, rays.pixel[np.array(position)], glow)
         merged = merged_lanes(lanes, settings.samples, settings.held, rays, covered, coverage, constant)
         if glowing is not None:
-            own = add_radiance(np.zeros_like(constant), rays.pixel[np.array(position)], mi.Color3f(glowing))
+            own = add_radiance(np.zeros_like(constant), rays.pixel[np.array(position)], glowing)
             merged = replace(merged, own_emission=own)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")

@@ -64,16 +64,12 @@ def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
     world_color(scene, 1.0)
     add_camera("ORTHO", ortho_scale=2.0)
     glow = {"Emission_Color": (1.0, 0.5, 0.2), "Emission_Strength": 2.0}
-    plain, coated = new_material("Plain", Subsurface_Weight=0.3), new_material("Coated", Coat_Weight=0.5, **glow)
     add_quad("Floor", 1.0, -1.0, new_material("Glow", **glow))
-    add_quad("Wall", 1.0, -2.0, coated)
-    add_quad("Tube", 1.0, -3.0, new_material("Neon", Transmission_Weight=0.5, **glow))
-    notes = export(add_quad("Target", 1.0, 0.0, plain)).notes
+    add_quad("Wall", 1.0, -2.0, new_material("Coated", Coat_Weight=0.5, **glow))
+    notes = export(add_quad("Target", 1.0, 0.0, new_material("Plain", Subsurface_Weight=0.3))).notes
     assert [note for note in notes if "mitsuba_principled" not in note] == [
         "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface. "
         "Its weight has no effect at Diffuse Roughness 0.",
-        "Material 'Coated': the emission is not dimmed by Coat Weight, as it is in Cycles.",
-        "Material 'Neon': how much of its own light comes through glowing glass differs from Cycles.",
     ]
 
 
@@ -195,21 +191,21 @@ def _lamp_box(glow: Any, size: float, *, around: bool = False, inwards: bool = F
 
 
 @pytest.mark.parametrize(
-    ("build", "sides"),
+    "build",
     [
-        pytest.param(lambda glow: add_quad("Glow", 1.5, 8.0, glow), 2, id="a quad, its back to the floor"),
-        pytest.param(lambda glow: _lamp_box(glow, 0.8), 1, id="a box"),
-        pytest.param(lambda glow: _lamp_box(glow, 0.8, inwards=True), 2, id="a box inside out"),
-        pytest.param(_cut_out, 2, id="a box that lets light through"),
-        pytest.param(lambda glow: _lamp_box(glow, 60.0, around=True), 2, id="a box around everything"),
+        pytest.param(lambda glow: add_quad("Glow", 1.5, 8.0, glow), id="a quad, its back to the floor"),
+        pytest.param(lambda glow: _lamp_box(glow, 0.8), id="a box"),
+        pytest.param(lambda glow: _lamp_box(glow, 0.8, inwards=True), id="a box inside out"),
+        pytest.param(_cut_out, id="a box that lets light through"),
+        pytest.param(lambda glow: _lamp_box(glow, 60.0, around=True), id="a box around everything"),
         pytest.param(
-            lambda glow: _lamp_box(glow, 60.0, around=True, faces=lambda at: at.z > 1.0), 2, id="the ceiling of a box"
+            lambda glow: _lamp_box(glow, 60.0, around=True, faces=lambda at: at.z > 1.0), id="the ceiling of a box"
         ),
-        pytest.param(lambda glow: _lamp_box(glow, 0.8, faces=lambda at: at.z < -0.1), 2, id="one side of a box"),
+        pytest.param(lambda glow: _lamp_box(glow, 0.8, faces=lambda at: at.z < -0.1), id="one side of a box"),
     ],
 )
 def test_glowing_mesh_lights_what_its_faces_see(
-    build: Any, sides: int, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+    build: Any, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
 ) -> None:
     """Oracle: Cycles, in which both sides of every face give light."""
     from ..scene.test_light_levels import floor, tiles
@@ -218,8 +214,7 @@ def test_glowing_mesh_lights_what_its_faces_see(
     build(new_material("Glow", Base_Color=(0, 0, 0), Emission_Color=(1.0, 0.5, 0.2), Emission_Strength=4.0))
     scene.cycles.samples = 256
     report = export(target)
-    assert len(list((report.folder / "meshes").glob("*_back.ply"))) == sides - 1
-    expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 256 * sides))
+    expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 512))
     assert expected.mean() > 0.002
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
 

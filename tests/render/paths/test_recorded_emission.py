@@ -36,6 +36,8 @@ def test_free_emission_is_linear_in_picture_and_derivatives(tmp_path):
     }
     materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": sockets, "film_exposure": 1.5}}
     path = write_scene(tmp_path, POINT, shape=GLOW)  # which the sockets know better
+    # of meshes, as exported targets are: from its own surface Mitsuba's sphere is sampled wrongly
+    path.write_text(path.read_text("utf-8").replace('type="sphere"', 'type="cube"'), "utf-8")
     names = ["base_color", "roughness", "emission_color"]
     renderer = load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
     from mfo_backend.render.paths.recorded_scene import RecordedScene
@@ -49,7 +51,7 @@ def test_free_emission_is_linear_in_picture_and_derivatives(tmp_path):
     got = scene.evaluator(paths, groups)(x)
     expected = groups.average(renderer.image(x, seed=7, spp=256))
     error = np.sqrt(np.mean((got[:, :, 0] - expected) ** 2) / np.mean(expected**2))
-    assert error < 0.02  # a ball does not light itself
+    assert error < 0.02  # a cube does not light itself
     assert got[:, 2, 0].min() > 0.6 * 0.8 * 1.5 - 0.02
     np.testing.assert_allclose(got[:, :, -3:], 1.2 * np.broadcast_to(np.eye(3), (len(got), 3, 3)), atol=1e-4)
     np.testing.assert_allclose(scene.pictures(paths, groups)(x)[:, :, 0], got[:, :, 0], rtol=1e-4)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The light of a surface as Blender's have it: from both sides of every face.
+
+Mitsuba's `area` shines on one side. A second mesh for the other would be a surface of its own, at which glass refracts
+the wrong way. Choose the variant before importing this.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# pyright: reportIncompatibleMethodOverride=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+
+class Glow(mi.Emitter):
+    """Properties: `radiance`, linear Rec.709, a colour or a texture over the shape it belongs to, and `layered`
+    (false): whether what the shape's BSDF has above takes its part of that, by its `emission_share`, else by alpha."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        super().__init__(props)
+        self.radiance = props.get_emissive_texture("radiance", 1.0)
+        self.layered = bool(props.get("layered", False))
+        self.m_flags = +mi.EmitterFlags.Surface
+        if self.radiance.is_spatially_varying():
+            self.m_flags |= +mi.EmitterFlags.SpatiallyVarying
+
+    def traverse(self, callback: Any) -> None:
+        """See `mi.Object`."""
+        callback.put("radiance", self.radiance, mi.ParamFlags.Differentiable)
+
+    def eval(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
+        """See `mi.Emitter`."""
+        return dr.select(active, self.radiance.eval(si, active) * self.share(si, active), 0.0)
+
+    def share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool = False) -> mi.Color3f:
+        """What layers above leave of the radiance towards the view, or towards a point that has `sampled` the light."""
+        if not self.layered:
+            return mi.Color3f(1.0)
+        bsdf: Any = self.get_shape().bsdf()
+        if hasattr(bsdf, "emission_share"):
+            return bsdf.emission_share(si, active, sampled=sampled)
+        return 1.0 - mi.Color3f(bsdf.eval_null_transmission(si, active))
+
+    def sample_direction(
+        self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
+    ) -> tuple[mi.DirectionSample3f, mi.Color3f]:
+        """See `mi.Emitter`."""
+        ds = self.get_shape().sample_direction(it, sample, active)
+        ds.emitter = mi.EmitterPtr(self)
+        active = active & (ds.pdf > 0.0)
+        return ds, dr.select(active, self.eval_direction(it, ds, active) / ds.pdf, 0.0)
+
+    def pdf_direction(self, it: mi.Interaction3f, ds: mi.DirectionSample3f, active: Any = True) -> mi.Float:
+        """See `mi.Emitter`."""
+        return dr.select(active, self.get_shape().pdf_direction(it, ds, active), 0.0)
+
+    def eval_direction(self, it: mi.Interaction3f, ds: mi.DirectionSample3f, active: Any = True) -> mi.Color3f:
+        """See `mi.Emitter`."""
+        si = mi.SurfaceInteraction3f(ds, it.wavelengths)
+        si.wi = si.to_local(-ds.d)
+        return dr.select(active, self.radiance.eval(si, active) * self.share(si, active, sampled=True), 0.0)
+
+    def to_string(self) -> str:
+        """See `mi.Object`."""
+        return f"Glow[radiance = {self.radiance}]"
