@@ -92,7 +92,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return made
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def blend(scene: Scene) -> Callable[..., Done]:
     """Run `mfo blend` on the start with further arguments."""
 
