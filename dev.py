@@ -233,8 +233,8 @@ def test(arguments: list[str]) -> int:
         return test_other_bpy(arguments[1] if len(arguments) > 1 else "", arguments[2:])
     python = str(venv_program("python"))
     # Two at a time: a test compiles kernels or starts a Blender on one core for about as long as it renders on all.
-    # Neighbours share fixtures and kernels, so each process takes its tests in order, and one that has none left takes
-    # half of the other's. By whole files one of two cores was idle for a third of the time.
+    # Neighbours share fixtures and kernels, so each process takes its half in order, and one that has none left takes
+    # half of what the other has, seven times in a run.
     two_at_a_time = ["-n", "2", "--dist", "worksteal"]
     if arguments[:1] == ["--quick"]:
         arguments = [*QUICK, *two_at_a_time, *arguments[1:]]
