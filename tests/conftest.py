@@ -13,7 +13,10 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
+from mfo_backend.render.machine.cache_folder import use_kernel_cache
+
 os.environ.setdefault("MFO_BAKES", "")  # tests leave nothing in the user's folders
+use_kernel_cache()  # the one of the commands that tests start: what either has compiled is there for both
 
 # a machine under load is slow, so no example has a deadline; the database would write into the working folder
 _ALWAYS = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}

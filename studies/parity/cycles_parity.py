@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "docs" / "reference" / "cycles_parity.md"
 WIDTH = 118  # of a line of the page
 BLOCK = 4  # pixels along each side of the means that are compared
-SPP_AT_ONCE = 32
+SPP_AT_ONCE = 256  # 1024 samples of 32 x 32 pixels take 0.22 processor seconds, and 0.6 with 32 at once
 NOISY = {"glass": (2, 4)}  # smaller by, and more samples by: caustics
 CONFIDENCE = 1.64  # standard deviations that 95 % of normal draws stay below
 Array = NDArray[np.float64]
@@ -92,13 +92,11 @@ def render_job(job: Path, spp: int) -> tuple[Array, Array]:
         materials=request_materials(folder, request),
         light_paths=request.light_paths,
     )
-    rounds = max(1, spp // (2 * SPP_AT_ONCE))
+    at_once = max(1, min(SPP_AT_ONCE, spp // 2))
+    rounds = max(1, spp // (2 * at_once))
     halves = [
         np.mean(
-            [
-                renderer.image(renderer.start, seed=half * rounds + k, spp=SPP_AT_ONCE).astype(float)
-                for k in range(rounds)
-            ],
+            [renderer.image(renderer.start, seed=half * rounds + k, spp=at_once).astype(float) for k in range(rounds)],
             axis=0,
         )
         for half in (0, 1)

@@ -21,20 +21,27 @@ from .light_scene import FLOORS, SIZE, Lights, build
 TABLE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "light_parity.md"
 
 
-def measure(floor: str, lights: Lights, folder: Path, samples: int) -> tuple[Difference, list[str]]:
+def measure(
+    floor: str, lights: Lights, folder: Path, samples: int, cycles_samples: int | None = None
+) -> tuple[Difference, list[str]]:
     """Build one scene and compare it; returns the difference and the exporter's notes."""
-    return measure_scene(build(floor, lights), folder, samples)
+    return measure_scene(build(floor, lights), folder, samples, cycles_samples)
 
 
-def measure_scene(target: Any, folder: Path, samples: int) -> tuple[Difference, list[str]]:
-    """Compare the scene that is open; half of `samples` go into each of two renders."""
+def measure_scene(
+    target: Any, folder: Path, samples: int, cycles_samples: int | None = None
+) -> tuple[Difference, list[str]]:
+    """Compare the scene that is open; half of `samples` go into each of two renders.
+
+    Cycles' own number of samples is `cycles_samples`, if that is given: its sequence is less noisy.
+    """
     import bpy
 
     from blender_addon.export.job import export_job
     from mfo_backend.scene.image_file import read_image
 
     scene = bpy.context.scene
-    scene.cycles.samples = samples // 2
+    scene.cycles.samples = (cycles_samples or samples) // 2
     halves = []
     for seed in range(2):
         scene.cycles.seed = seed

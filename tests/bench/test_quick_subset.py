@@ -17,7 +17,7 @@ from mfo_backend.bench.scenes.assets import Assets
 
 @pytest.fixture(scope="module")
 def runner(tmp_path_factory):
-    return FitRunner(tmp_path_factory.mktemp("bench"), 32, Assets(None))
+    return FitRunner(tmp_path_factory.mktemp("bench"), 32, Assets(None), warm_up=False)
 
 
 def _row(runner, monkeypatch, task, number):

@@ -52,18 +52,19 @@ def run_bpy(code: str, *arguments: object) -> None:
     assert done.returncode == 0, done.stderr
 
 
+# one render, written in three ways
 RENDER = """
 bpy.ops.wm.open_mainfile(filepath=argv[0])
 scene = bpy.context.scene
 scene.cycles.samples, scene.cycles.seed = 64, 3
+bpy.ops.render.render()
 settings = scene.render.image_settings
 for path, kind, view in ((argv[1], "OPEN_EXR", "Standard"), (argv[2], "PNG", "Standard"), (argv[3], "PNG", "AgX")):
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"
     settings.file_format, scene.view_settings.view_transform = kind, view
     settings.color_depth = "32" if kind == "OPEN_EXR" else "8"
-    scene.render.filepath = path
-    bpy.ops.render.render(write_still=True)
+    bpy.data.images["Render Result"].save_render(path)
 """
 
 
@@ -92,7 +93,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return made
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def blend(scene: Scene) -> Callable[..., Done]:
     """Run `mfo blend` on the start with further arguments."""
 

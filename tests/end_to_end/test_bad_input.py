@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mfo_backend.cli.main import main
 from mfo_backend.scene.image_file import write_exr
 
 from .conftest import SIZE, Done, Scene, run_bpy, run_mfo
@@ -33,7 +34,33 @@ BROKEN_SCENES = {
         ("Roughness", "group"),
     ),
 }
-SAVE = "\nbpy.ops.wm.save_as_mainfile(filepath=argv[1], copy=True)"
+SAVE = "bpy.ops.wm.save_as_mainfile(filepath=argv[{number}], copy=True)\n"
+Blend = Callable[..., Done]
+
+
+@pytest.fixture
+def blend(scene: Scene, capsys: pytest.CaptureFixture[str]) -> Blend:
+    """Run `mfo blend` on the start with further arguments, in this process; Blender has one of its own."""
+
+    def call(reference: Path, *arguments: object, file: Path = scene.start) -> Done:
+        words = ["blend", file, "--object", scene.object, "--reference", reference, *arguments]
+        code = main([str(word) for word in words])
+        return Done(code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def broken_scenes(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A file for each of `BROKEN_SCENES`."""
+    folder = tmp_path_factory.mktemp("broken")
+    files = {name: folder / f"{name}.blend" for name in BROKEN_SCENES}
+    steps = [
+        f"bpy.ops.wm.open_mainfile(filepath=argv[0])\n{change}\n{SAVE.format(number=number)}"
+        for number, (change, _) in enumerate(BROKEN_SCENES.values(), start=1)
+    ]
+    run_bpy("".join(steps), scene.start, *files.values())
+    return files
 
 
 def refused(done: Done, job: Path, *words: str) -> None:
@@ -46,17 +73,17 @@ def refused(done: Done, job: Path, *words: str) -> None:
 
 
 @pytest.mark.parametrize("name", BROKEN_SCENES)
-def test_scene_that_cannot_be_fitted(name: str, scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
-    change, words = BROKEN_SCENES[name]
-    broken = tmp_path / "broken.blend"
-    run_bpy(f"bpy.ops.wm.open_mainfile(filepath=argv[0])\n{change}{SAVE}", scene.start, broken)
+def test_scene_that_cannot_be_fitted(
+    name: str, scene: Scene, blend: Blend, broken_scenes: dict[str, Path], tmp_path: Path
+) -> None:
+    broken, words = broken_scenes[name], BROKEN_SCENES[name][1]
     before = hashlib.sha256(broken.read_bytes()).hexdigest()
     refused(blend(scene.exr, "--out", tmp_path / "job", file=broken), tmp_path / "job", *words)
     assert hashlib.sha256(broken.read_bytes()).hexdigest() == before
 
 
 @pytest.mark.parametrize("kind", ["size", "unreadable", "missing", "black", "nan", "infinite"])
-def test_reference_that_cannot_be_used(kind: str, scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+def test_reference_that_cannot_be_used(kind: str, scene: Scene, blend: Blend, tmp_path: Path) -> None:
     reference = tmp_path / "reference.exr"
     pixels = np.full((SIZE, SIZE, 3), 0.3, np.float32)
     words = {
@@ -82,7 +109,7 @@ def test_reference_that_cannot_be_used(kind: str, scene: Scene, blend: Callable[
     refused(blend(reference, "--out", tmp_path / "job"), tmp_path / "job", *words)
 
 
-def test_unknown_parameter(scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+def test_unknown_parameter(scene: Scene, blend: Blend, tmp_path: Path) -> None:
     done = blend(scene.exr, "--out", tmp_path / "job", "--parameters", "shininess")
     refused(done, tmp_path / "job", "shininess", "roughness")
 
@@ -92,7 +119,7 @@ def test_unknown_object(scene: Scene, tmp_path: Path) -> None:
     refused(done, tmp_path / "job", "Teapot", "Suzanne")
 
 
-def test_job_folder_that_cannot_be_written(scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+def test_job_folder_that_cannot_be_written(scene: Scene, blend: Blend, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("mine")
     done = blend(scene.exr, "--out", file / "job")
@@ -100,7 +127,7 @@ def test_job_folder_that_cannot_be_written(scene: Scene, blend: Callable[..., Do
     assert file.read_text() == "mine"
 
 
-def test_foreign_folder_is_left_alone(scene: Scene, blend: Callable[..., Done], tmp_path: Path) -> None:
+def test_foreign_folder_is_left_alone(scene: Scene, blend: Blend, tmp_path: Path) -> None:
     (tmp_path / "job").mkdir()
     (tmp_path / "job" / "mine.txt").write_text("mine")
     done = blend(scene.exr, "--out", tmp_path / "job")

@@ -138,10 +138,15 @@ def evaluate_cases(cases: Cases, group: Group, version: Sequence[int], double: b
     """Our f_r |cos|, (cases, 3), in single or double precision (LLVM)."""
     import drjit as dr
 
+    from mfo_backend.material.arrays.own_memory import own_memory
     from mfo_backend.material.cycles_model import cycles_model
     from mfo_backend.material.principled.blender_principled import blender_principled
 
-    vector, number = (dr.llvm.ad.Array3f64, dr.llvm.ad.Float64) if double else (dr.llvm.ad.Array3f, dr.llvm.ad.Float)
+    vector, kind = (dr.llvm.ad.Array3f64, dr.llvm.ad.Float64) if double else (dr.llvm.ad.Array3f, dr.llvm.ad.Float)
+
+    def number(values: Array) -> Any:
+        return own_memory(values, kind)
+
     parameters = {
         name: vector(*(number(value[:, k]) for k in range(3))) if value.ndim == 2 else number(value)
         for name, value in cases.values.items()

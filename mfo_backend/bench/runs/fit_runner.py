@@ -43,6 +43,7 @@ class _Measured:
 class FitRunner:
     """Writes scenes into `folder`, fits and judges. All methods of a scene start from the same material and seed, the
     number of the scene; references and the judge have seeds far from it. Pictures go to `pictures`, if that is given.
+    Unless `warm_up` is false, a fit before the first of its kind keeps the compiling of kernels out of its seconds.
 
     Raises
     ------
@@ -59,6 +60,7 @@ class FitRunner:
         *,
         threads: int = 0,
         host: CallsBlender | None = None,
+        warm_up: bool = True,
     ) -> None:
         from ...render.machine.llvm import configure_llvm, needs_llvm
 
@@ -77,6 +79,7 @@ class FitRunner:
         self._assets = assets
         self._kept_at = pictures
         self._host = host
+        self._warms_up = warm_up
         # scenarios, methods and lights: a light probe of another size needs other kernels
         self._warm: set[tuple[str, str, str]] = set()
         self._at: tuple[str, int] | None = None
@@ -89,7 +92,7 @@ class FitRunner:
         settings = method_settings(task.method, self._scene.scenario, task.scene)
         warm_up = 0.0
         kind = (task.scenario, task.method, self._scene.light)
-        if kind not in self._warm:
+        if self._warms_up and kind not in self._warm:
             began = time.monotonic()
             measured = self._fit(task, warm_up_settings(settings), should_stop)
             if measured.outcome.result.status is Status.CANCELLED:

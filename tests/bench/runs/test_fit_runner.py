@@ -25,6 +25,12 @@ def runner(tmp_path_factory):
     return FitRunner(tmp_path_factory.mktemp("bench"), 32, Assets(None))
 
 
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """For what depends neither on the size of the pictures nor on seconds."""
+    return FitRunner(tmp_path_factory.mktemp("small"), 16, Assets(None), warm_up=False)
+
+
 def never() -> bool:
     return False
 
@@ -51,7 +57,7 @@ def test_every_light_is_warmed_up_for(tmp_path, monkeypatch):
     """A probe of another size has kernels of its own, whose compilation is no part of a fit's time."""
     lights, write = ("small", "small", "large", "small"), fit_runner.write_scene
     monkeypatch.setattr(fit_runner, "write_scene", lambda s, k, *rest: replace(write(s, k, *rest), light=lights[k]))
-    runner = FitRunner(tmp_path, 32, Assets(None))
+    runner = FitRunner(tmp_path, 8, Assets(None))
     rows = [runner(Task("parameters", scene, "fast"), never) for scene in range(4)]
     assert [row.light for row in rows] == [*lights]
     assert [row.warm_up_seconds > 0 for row in rows] == [True, False, True, False]
@@ -121,20 +127,20 @@ def test_a_wrong_picture_is_not_saved_by_more_samples(runner, monkeypatch):
     assert again.jod == 8.0
 
 
-def test_glass_is_fitted_in_blenders_model(runner):
-    row = runner(Task("transparency_4spp", 0, "fast"), never)
+def test_glass_is_fitted_in_blenders_model(small):
+    row = small(Task("transparency_4spp", 0, "fast"), never)
     assert set(row.recovered) == {"base_color", "roughness", "ior", "transmission_weight"}
     assert row.flip < row.start_flip
 
 
-def test_the_papers_loop_improves_on_the_start_under_a_probe(runner, monkeypatch):
+def test_the_papers_loop_improves_on_the_start_under_a_probe(small, monkeypatch):
     monkeypatch.setattr(fit_runner, "method_settings", lambda *a: replace(method_settings(*a), max_iterations=8))
-    row = runner(Task("noise", 0, "mfo-hdr"), never)
+    row = small(Task("noise", 0, "mfo-hdr"), never)
     assert row.status == "max_iterations"
     assert row.flip < row.start_flip
     # start; two stages, whose last iteration needs no slope; the final pictures of start and both stages
     assert row.passes == 1 + 2 * (8 + 7 * 2) + 3
 
 
-def test_a_stopped_fit_is_no_row(runner):
-    assert runner(Task("parameters", 0, "balanced"), lambda: True).status == "cancelled"
+def test_a_stopped_fit_is_no_row(small):
+    assert small(Task("parameters", 0, "balanced"), lambda: True).status == "cancelled"

@@ -24,7 +24,7 @@ TASK = Task("cycles", 0, "fast")
 def test_a_material_is_recovered_from_cycles_pictures(tmp_path, monkeypatch):
     scenario = replace(SCENARIOS["cycles"], reference_spp=16)
     monkeypatch.setitem(fit_runner.SCENARIOS, "cycles", scenario)
-    row = FitRunner(tmp_path, 32, Assets(None), host=find_blender_host())(TASK, lambda: False)
+    row = FitRunner(tmp_path, 32, Assets(None), host=find_blender_host(), warm_up=False)(TASK, lambda: False)
     assert row.flip < 0.25 * row.start_flip
     # our picture of the true values: noise of 512 samples in both, and a few hundredths of export and renderer
     assert row.flip < row.gap_flip + 0.06

@@ -17,6 +17,10 @@ from studies.parity.light_scene import FLOORS, MATT, SHINY, add_light, build
 from ..scenes import world_color
 
 SAMPLES = 1024
+# Cycles' sequence leaves little noise. With a quarter of the samples the deviation of the level is the same within a
+# fifth for every fourth light over the matt floor, but for a beam (0.44 and 0.60 permille), and within a tenth where
+# lights are seen themselves; in reflections it is half as large again
+FEWER = SAMPLES // 4
 
 
 def assert_equal(found: Any, notes: list[str]) -> None:
@@ -29,7 +33,7 @@ def assert_equal(found: Any, notes: list[str]) -> None:
 
 @pytest.mark.parametrize("case", MATT)
 def test_irradiance_on_a_floor(case: str, tmp_path: Path, mitsuba: Any) -> None:
-    assert_equal(*measure("matt", MATT[case], tmp_path, SAMPLES))
+    assert_equal(*measure("matt", MATT[case], tmp_path, SAMPLES, FEWER))
 
 
 @pytest.mark.parametrize("case", SHINY)
@@ -49,7 +53,7 @@ def test_a_light_before_the_target_is_seen_as_cycles_shows_it(visible: bool, tmp
     ]
     for light in lights:
         light.visible_camera = visible
-    assert_equal(*measure_scene(target, tmp_path, 4 * SAMPLES))
+    assert_equal(*measure_scene(target, tmp_path, 4 * SAMPLES, 4 * FEWER))
 
 
 def test_every_light_of_the_table_is_within_the_limit() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mfo_backend.material.arrays.own_memory import own_memory
 from mfo_backend.material.principled.blender_principled import blender_principled
 from mfo_backend.material.principled.principled_parameters import BLENDER_PRINCIPLED
 
@@ -41,13 +42,16 @@ def scene(seed: int) -> tuple[Array, Array, Values]:
 
 
 def arrays(values: Values, number: type, vector: type) -> dict[str, Any]:
-    return {k: number(v[0]) if len(v) == 1 else vector(*(number(c) for c in v)) for k, v in values.items()}
+    # where NumPy happens to put an array makes another kernel otherwise, each of which compiles for seconds
+    own = {k: [own_memory(c, number) for c in v] for k, v in values.items()}
+    return {k: v[0] if len(v) == 1 else vector(*v) for k, v in own.items()}
 
 
 def value(view: Array, light: Array, values: Values) -> Array:
     """The mixed channels, (CASES,)."""
     number, vector = dr.llvm.ad.Float64, dr.llvm.ad.Array3f64
-    result = blender_principled(arrays(values, number, vector), vector(*map(number, view)), vector(*map(number, light)))
+    view_array, light_array = (vector(*(own_memory(c, number) for c in d)) for d in (view, light))
+    result = blender_principled(arrays(values, number, vector), view_array, light_array)
     return MIX @ np.array(result)
 
 
@@ -57,7 +61,7 @@ def derivatives(view: Array, light: Array, values: Values, double: bool = True) 
     number, vector = types
     parameters = arrays(values, *types)
     dr.enable_grad(parameters)
-    view_array, light_array = (vector(*map(number, d)) for d in (view, light))
+    view_array, light_array = (vector(*(own_memory(c, number) for c in d)) for d in (view, light))
     result = blender_principled(parameters, view_array, light_array)
     dr.backward(float(MIX[0]) * result.x + float(MIX[1]) * result.y + float(MIX[2]) * result.z)
     gradients = {name: dr.grad(parameters[name]) for name in NAMES}

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from mfo_backend.material.arrays.own_memory import own_memory
 from mfo_backend.material.mitsuba_parameters import MITSUBA_PRINCIPLED, eta_to_specular, specular_to_eta
 from mfo_backend.material.mitsuba_principled import MitsubaPrincipled
 from mfo_backend.material.principled.blender_principled import BLENDER_5_0, blender_principled, evaluate
@@ -69,7 +70,7 @@ def test_blender_s_values_densities_and_samples(values: dict[str, Any]) -> None:
     assert finite("value", evaluate(layers, layers.to_frame(light))).min() >= 0
     assert finite("density", pdf(layers, choice, layers.to_frame(light), reachable_only=True)).min() >= 0
     rng = np.random.default_rng(3)
-    u = [mi.Float(rng.random(LANES).astype(np.float32)) for _ in range(3)]
+    u = [own_memory(rng.random(LANES), mi.Float) for _ in range(3)]
     drawn, lobe, valid = sample(layers, choice, u[0], mi.Point2f(u[1], u[2]))
     drawn = dr.select(valid, drawn, mi.Vector3f(0, 0, 1))
     np.testing.assert_allclose(np.linalg.norm(finite("sample", drawn), axis=0), 1.0, atol=2e-2)
@@ -95,7 +96,7 @@ def corner_values(table: Any, first: int, count: int) -> dict[str, Any]:
     number = np.arange(first, first + count)
     values: dict[str, Any] = {}
     for k, p in enumerate(table):
-        numbers = mi.Float(np.where(number >> k & 1, p.upper, p.lower).astype(np.float32))
+        numbers = own_memory(np.where(number >> k & 1, p.upper, p.lower), mi.Float)
         values[p.name] = mi.Color3f(numbers) if p.size == 3 else numbers
     return values
 

@@ -21,10 +21,10 @@ def some(renderer: Any, pixels: np.ndarray, *, seed: int, spp: int) -> np.ndarra
 @pytest.mark.parametrize("rfilter", ["box", "gaussian", "tent", "mitchell", "lanczos"])
 def test_the_mean_of_every_pixel_is_the_films(tmp_path: Path, rfilter: str) -> None:
     renderer = load(tmp_path, rfilter)
-    films = [renderer.image(renderer.start, seed=k, spp=2048).reshape(-1, 3)[PIXELS] for k in range(16)]
+    films = [renderer.image(renderer.start, seed=k, spp=512).reshape(-1, 3)[PIXELS] for k in range(16)]
     pictures = [some(renderer, PIXELS, seed=100 + k, spp=16) for k in range(64)]
     assert pictures[0].shape == (len(PIXELS), 3)
-    # the film divides by the sum of its weights, a bias that 2048 samples do not show
+    # the film divides by the sum of its weights, a bias that 512 samples do not show
     (mean, variance), (expected, own) = (
         (np.mean(many, axis=0), np.var(many, axis=0, ddof=1) / len(many)) for many in (pictures, films)
     )
