@@ -231,6 +231,7 @@ FIT = {
     "Picture {}": "Image {}",
     "Starting": "Démarrage",
     "Cancelling": "Annulation",
+    "Checking the values": "Vérification des valeurs",
     "Exploring · {}": "Recherche · {}",
     "Exploring · {} · {} left": "Recherche · {} · reste {}",
     "Refining · {}": "Affinage · {}",
