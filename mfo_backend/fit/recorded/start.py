@@ -58,8 +58,7 @@ def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
     with course.stage("scan") as stage:
         recording, edges = _first_recording(setting)
         groups = _groups(recording)
-        if not recording.thinned:
-            stage.picture = recording.preview
+        stage.picture = None if recording.thinned else recording.preview  # others have no picture for first guesses
         lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
         few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         scales = best_scales(setting, recording)
