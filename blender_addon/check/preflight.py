@@ -9,6 +9,7 @@ import bpy
 
 from .checks import IGNORED, STOPS, TO_CHOOSE, Finding, quick_check
 
+_WITH_PANELS = {("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")}  # areas and their regions
 DELAY = 0.25  # seconds between a change and its check, so that a drag costs four checks a second at most
 
 findings: tuple[Finding, ...] = ()  # what the panel lists
@@ -106,11 +107,12 @@ def _run() -> None:
 
 
 def redraw() -> None:
-    """Have every place drawn again that shows the panels."""
+    """Have every place drawn again that shows the panels, and no view of the scene, which may take long."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in ("VIEW_3D", "PROPERTIES"):
-                area.tag_redraw()
+            for region in area.regions:
+                if (area.type, region.type) in _WITH_PANELS:
+                    region.tag_redraw()
 
 
 def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:

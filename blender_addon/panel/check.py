@@ -47,7 +47,7 @@ class Check:
                 _draw_finding(body, context, finding)
         layout.operator(
             "mfo.check",
-            text="Check Everything Again" if preflight.is_thorough else "Check Everything",
+            text="Check All Again" if preflight.is_thorough else "Check Everything",
             icon="VIEWZOOM",
         )
 

@@ -7,7 +7,7 @@ import bpy
 
 from ..result.shown_result import VERDICT_ICONS
 from ..translations import CONTEXT
-from .layout import is_narrow
+from .layout import is_narrow, pair
 
 
 class MFO_UL_history(bpy.types.UIList):
@@ -54,6 +54,7 @@ class History:
         layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
         layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
         row = layout.row(align=True)
-        row.operator("mfo.apply_past", text="Restore", icon="LOOP_BACK")
-        row.operator("mfo.show_past", text="Show", icon="IMAGE_DATA")
+        buttons = pair(row, context)
+        buttons.operator("mfo.apply_past", text="Restore", icon="LOOP_BACK")
+        buttons.operator("mfo.show_past", text="Show", icon="IMAGE_DATA")
         row.operator("mfo.remove_past", text="", icon="TRASH")

@@ -11,6 +11,7 @@ from ..result import previews
 from ..sentences.translated import translated
 
 _LABELS = {
+    "current": "Preliminary",
     "cycles": "In Cycles",
     "cycles_difference": "Difference",
     "engine": "Own Engine",
@@ -18,6 +19,7 @@ _LABELS = {
 }
 _SHORT = {
     "reference": "Goal",
+    "current": "Current",
     "cycles_difference": "Error",
     "engine": "Own",
     "engine_difference": "Error",

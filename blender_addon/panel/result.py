@@ -74,7 +74,7 @@ def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: b
     box = layout.box()
     grid = box.column(align=True)
     name, start, result = _cells(grid, has_start)
-    name.operator("mfo.copy_values", text="Copy Values", icon="COPYDOWN", emboss=False)
+    name.operator("mfo.copy_values", text="Copy", icon="COPYDOWN", emboss=False)
     if start is not None:
         start.label(text="Start")
     result.label(text="Result")

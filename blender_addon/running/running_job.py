@@ -32,7 +32,7 @@ from ..versions import is_modal_operator_running
 from . import fit_queue, notice
 from .fit_queue import PreparedFit
 
-TICK = 0.15  # seconds between two looks at the process
+TICK = 0.1  # seconds between two looks at the process
 PATIENCE = 60  # looks at a modal operator before a result goes into its history without an undo step
 _FIRST_STAGES = ("scan", "start")  # they look for a place to begin; every other stage refines
 _FIRST_GUESS = 0.05  # share from which on the time left is more than a guess
@@ -207,6 +207,9 @@ def _handle(job: RunningJob, event: Event) -> None:
             if not job.process.cancelling:
                 runtime.progress_text = progress_text(event)
             runtime.detail = f"{event['stage']} · step {event['iteration']} · error {float(event['best']):.3g}"
+        elif event["event"] == "stage_end":
+            if not (job.process.cancelling or _looks_for_a_start(event)):  # another stage may follow, and will say so
+                runtime.progress_text = "Checking the values"
         elif event["event"] == "preview":
             _show_preview(job, "current", event["path"])
             if "difference" in event:
@@ -224,11 +227,15 @@ def _show_preview(job: RunningJob, name: str, relative: str) -> None:
 
 def progress_text(event: Event) -> str:
     """What is done, percent and time left of a progress event, short enough for a progress bar."""
-    text = f"{'Exploring' if event['stage'] in _FIRST_STAGES else 'Refining'} · {event['fraction']:.0%}"
+    text = f"{'Exploring' if _looks_for_a_start(event) else 'Refining'} · {event['fraction']:.0%}"
     left = event.get("remaining_seconds")
     if left is None or float(event["fraction"]) < _FIRST_GUESS:
         return text
     return f"{text} · {_duration(float(left))} left"
+
+
+def _looks_for_a_start(event: Event) -> bool:
+    return event["stage"].rpartition(": ")[2] in _FIRST_STAGES  # of several materials, after the name of one
 
 
 def _finish(job: RunningJob, outcome: Outcome) -> None:

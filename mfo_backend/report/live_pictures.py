@@ -8,11 +8,11 @@ import numpy as np
 from ..metrics.display.tone_mapping import View
 from ..metrics.flip.block_means import block_means, full_blocks
 from ..metrics.flip.flip_error import flip_error
+from ..types.event import PREVIEW_SIDE
 from ..types.image import Encoding, Image, Pixels
 from .difference_map import magma_counted
 from .picture import displayed, png_bytes
 
-LARGEST_SIDE = 256  # pixels; a panel shows no more
 LARGEST_MAP = 128  # FLIP of this many takes a fifth of that of a 256x256 picture
 
 
@@ -26,8 +26,8 @@ class LivePictures:
         self._counts = None if reference.counts is None else full_blocks(reference.counts, side)
 
     def current(self, pixels: Pixels) -> bytes:
-        """The picture under the view, LARGEST_SIDE wide or high at most."""
-        return png_bytes(displayed(_small(Image(pixels, Encoding.LINEAR), LARGEST_SIDE), self._view))
+        """The picture under the view, PREVIEW_SIDE wide or high at most."""
+        return png_bytes(displayed(_small(Image(pixels, Encoding.LINEAR), PREVIEW_SIDE), self._view))
 
     def difference(self, pixels: Pixels) -> bytes:
         """The FLIP map of pictures averaged to LARGEST_MAP; for the eye, its mean is not the FLIP of the picture."""

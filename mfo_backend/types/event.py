@@ -12,6 +12,8 @@ from typing import ClassVar
 from .image import Pixels
 from .result import FitResult
 
+PREVIEW_SIDE = 256  # pixels along a side at most of what is shown of a preview; a panel shows no more
+
 
 @dataclass(frozen=True)
 class Started:

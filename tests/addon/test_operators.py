@@ -227,12 +227,17 @@ def test_values_are_copied_as_text(scene: SimpleNamespace) -> None:
 
 
 def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.running import running_job
+
     monkeypatch.setattr("blender_addon.process.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
     monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
     assert fit(scene, wait=False) == {"FINISHED"}
     assert not scene.bpy.ops.mfo.fit.poll()
     step_until(scene, lambda: runtime(scene).fraction > 0)
     assert runtime(scene).progress_text.startswith("Refining · ")
+    for stage, said in (("Floor: start", "Refining · "), ("refine", "Checking the values")):
+        running_job._handle(running_job.current, {"event": "stage_end", "stage": stage})
+        assert runtime(scene).progress_text.startswith(said)
     assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
     assert not scene.bpy.ops.mfo.cancel.poll()
     step_until(scene, lambda: runtime(scene).state != "CANCELLING")

@@ -10,7 +10,8 @@ import pytest
 from PIL import Image as Pillow
 
 from mfo_backend.metrics.display.tone_mapping import DisplayView
-from mfo_backend.report.live_pictures import LARGEST_MAP, LARGEST_SIDE, LivePictures
+from mfo_backend.report.live_pictures import LARGEST_MAP, LivePictures
+from mfo_backend.types.event import PREVIEW_SIDE
 from mfo_backend.types.image import Encoding, Image
 
 
@@ -22,7 +23,7 @@ def opened(png: bytes) -> np.ndarray:
 def test_sizes(size: tuple[int, int]) -> None:
     pixels = np.full((*size, 3), 0.25, np.float32)
     live = LivePictures(Image(pixels, Encoding.LINEAR), DisplayView())
-    for png, largest in ((live.current(pixels), LARGEST_SIDE), (live.difference(pixels), LARGEST_MAP)):
+    for png, largest in ((live.current(pixels), PREVIEW_SIDE), (live.difference(pixels), LARGEST_MAP)):
         shown = opened(png)
         thin = -(-max(size) // largest) > min(size)  # nothing to average over
         assert max(shown.shape[:2]) <= (max(size) if thin else largest)

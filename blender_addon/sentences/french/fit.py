@@ -230,6 +230,7 @@ FIT = {
     "Picture {}": "Image {}",
     "Starting": "Démarrage",
     "Cancelling": "Annulation",
+    "Checking the values": "Vérification des valeurs",
     "Exploring · {}": "Recherche · {}",
     "Exploring · {} · {} left": "Recherche · {} · reste {}",
     "Refining · {}": "Affinage · {}",

@@ -239,6 +239,7 @@ PANEL = {
     "Start": "Départ",
     "Result": "Résultat",
     "Current": "Actuel",
+    "Preliminary": "Provisoire",
     "Difference": "Différence",
     "Goal": "But",
     "Error": "Erreur",

@@ -230,6 +230,7 @@ FIT = {
     "Picture {}": "Bild {}",
     "Starting": "Beginnt",
     "Cancelling": "Wird abgebrochen",
+    "Checking the values": "Werte werden geprüft",
     "Exploring · {}": "Suchen · {}",
     "Exploring · {} · {} left": "Suchen · {} · noch {}",
     "Refining · {}": "Verfeinern · {}",

@@ -239,6 +239,7 @@ PANEL = {
     "Start": "Anfang",
     "Result": "Ergebnis",
     "Current": "Jetzt",
+    "Preliminary": "Vorläufig",
     "Difference": "Unterschied",
     "Goal": "Ziel",
     "Error": "Fehler",

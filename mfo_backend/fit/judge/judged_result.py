@@ -17,7 +17,7 @@ from ...types.result import FitResult, PictureResult
 from ...types.status import Status
 from ...types.verdict import Verdict
 from ..result.outcome import START_KEPT
-from .verdict import is_worse, judge, worst_judgement
+from .verdict import difference_of, is_worse, judge, worst_judgement
 
 MOVED = 1e-6  # relative to a value and to 1: float32 from file to file
 
@@ -40,8 +40,13 @@ def judged_result(
     has left something out. Where the picture is a sheet of several, `judge_all` says what the result is in each of
     them. Under a verdict of `different` the status says so too, and no value is called determined.
     """
-    may_be_worse = judge_all is None or result.errors["flip"][1] > result.errors["flip"][0]
-    if may_be_worse and _has_moved(result) and is_worse(reference, start, end, mask, view):
+    judgement = found = None
+    if judge_all is None:
+        judgement = judge(reference, end, mask, view, noted=noted, others=others)
+        found = None if judgement is None else judgement.target
+    elif result.errors["flip"][1] > result.errors["flip"][0]:
+        found = difference_of(reference, end, mask, view)
+    if _has_moved(result) and is_worse(reference, start, found, mask, view):
         errors = {name: (before, before) for name, (before, _) in result.errors.items()}
         result = replace(
             result, recovered=dict(result.initial), errors=errors, certainty={}, weak_combinations=(),
@@ -49,9 +54,9 @@ def judged_result(
             message=f"{result.status.sentence} {START_KEPT}",
         )  # fmt: skip
         end = start
-    if judge_all is None:
-        judgement = judge(reference, end, mask, view, noted=noted, others=others)
-    else:
+        if judge_all is None:
+            judgement = judge(reference, end, mask, view, noted=noted, others=others)
+    if judge_all is not None:
         result = replace(result, pictures=judge_all(end))
         judgement = worst_judgement(result.pictures)
         said = result.contradiction

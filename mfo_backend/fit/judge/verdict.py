@@ -49,7 +49,7 @@ def judge(
     """
     side = block_side(mask)
     target = _light_means(reference, result, view, mask, side)
-    inside = block_sums(mask[..., None].astype(np.float64), side)[..., 0] > 0.5 * side**2
+    inside = _inside(mask, side)
     difference = beyond_noise(*target, inside)
     if difference is None:
         return None
@@ -82,14 +82,23 @@ def worst_judgement(pictures: tuple[PictureResult, ...]) -> Judgement | None:
     return replace(found, picture=next(picture.label for picture in pictures if picture.judgement is found))
 
 
-def is_worse(reference: Image, start: Pixels, result: Pixels, mask: Mask, view: View) -> bool:
-    """Whether a result's picture is visibly farther from the reference than that of the start."""
+def difference_of(reference: Image, picture: Pixels, mask: Mask, view: View) -> Difference | None:
+    """How far a scene-linear picture (height, width, 3) is from the reference; None for few pixels of the `mask`."""
     side = block_side(mask)
-    inside = block_sums(mask[..., None].astype(np.float64), side)[..., 0] > 0.5 * side**2
-    before, after = (
-        beyond_noise(*_light_means(reference, picture, view, mask, side), inside) for picture in (start, result)
-    )
-    return before is not None and after is not None and after.visible > before.visible + WORSE
+    return beyond_noise(*_light_means(reference, picture, view, mask, side), _inside(mask, side))
+
+
+def is_worse(reference: Image, start: Pixels, result: Difference | None, mask: Mask, view: View) -> bool:
+    """Whether a `result` that is so far from the reference is visibly farther than the start's picture."""
+    if result is None or result.visible <= WORSE:  # nothing is nearer than that
+        return False
+    before = difference_of(reference, start, mask, view)
+    return before is not None and result.visible > before.visible + WORSE
+
+
+def _inside(mask: Mask, side: int) -> Mask:
+    """Blocks of `side` pixels that are mostly in the mask."""
+    return block_sums(mask[..., None].astype(np.float64), side)[..., 0] > 0.5 * side**2
 
 
 def _mean_flip(first: NDArray[np.float64], second: NDArray[np.float64], mask: Mask) -> float:

@@ -19,6 +19,7 @@ from ...render.camera.widened_mask import widened
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Vector
 from ...render.sheet.sheet_renderer import SheetRenderer
+from ...types.event import PREVIEW_SIDE
 from ...types.image import Encoding, Image, Pixels
 from ..random_streams import Stream
 from ..result.outcome import Candidate
@@ -184,6 +185,22 @@ class Verification:
             picture.whole = True
         self._add([picture], self._shown)
         return picture.end()
+
+    def glance(self, vector: Vector, *, elsewhere: Pixels) -> Pixels:
+        """A quick picture of a vector over another one `elsewhere`, scene-linear (height, width, 3).
+
+        It has the first samples of half a picture, in one pixel of every block that a preview shows as one, so that its
+        cost does not grow with the frame.
+        """
+        height, width = self._mask.shape
+        row, column = np.divmod(self._looked_at, width)
+        side = -(-max(height, width) // PREVIEW_SIDE)
+        blocks, of_block = np.unique(row // side * width + column // side, return_index=True, return_inverse=True)[1:]
+        seed = Stream.PREVIEW.seed(self._seed)
+        seen = self._renderer.pixels_later(vector, self._looked_at[blocks], seed=seed, spp=self._begun)()
+        picture = elsewhere.astype(np.float32)
+        picture.reshape(-1, 3)[self._looked_at] = seen[of_block]
+        return picture
 
     def _within(self, start: GrowingPicture, vector: Vector, later: Callable[[], _Halves]) -> GrowingPicture:
         whole = not len(self._around)

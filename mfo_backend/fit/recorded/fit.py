@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +137,8 @@ class RecordedRoute:
             If no start gives finite numbers on the recorded paths.
         """
         task, scene, renderer = self._task, self._scene, self._renderer
-        course = Course(renderer, self.stages, task.listener, task.should_stop, task.began)
+        glance = partial(self.verification.glance, elsewhere=task.light) if self._alone else None
+        course = Course(renderer, self.stages, task.listener, task.should_stop, task.began, glance)
         setting = Setting.of(scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped)
         started = (
             start_from_nothing(setting, _censored(log_residual, task))

@@ -58,14 +58,15 @@ def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
     with course.stage("scan") as stage:
         recording, edges = _first_recording(setting)
         groups = _groups(recording)
-        stage.picture = None if recording.thinned else recording.preview
+        stage.picture = None if recording.thinned else recording.preview  # others have no picture for first guesses
         lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
         few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         scales = best_scales(setting, recording)
         starts = _starts(setting, few, stage, scales[0])
         stage.vector = starts[0] if starts else None
     with course.stage("start") as stage:
-        stage.picture = None if recording.thinned else recording.preview
+        if not recording.thinned:
+            stage.picture = recording.preview
         lanes = plan.start_lanes if setting.sampled else plan.exact_start_lanes
         more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         users = [placed(setting.user, scale) for scale in scales]
@@ -74,6 +75,7 @@ def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
         if not np.isfinite(basins[0].equations.cost):
             raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
         stage.vector = basins[0].x
+        course.show(stage, stage.vector)  # near the result, and what makes sure of it takes as long again
     return Started(None if setting.sampled else recording, tuple(basin.x for basin in basins), edges)
 
 

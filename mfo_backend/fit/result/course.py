@@ -71,7 +71,7 @@ class Course:
         self.should_stop = should_stop
         self.reports: list[StageReport] = []
         self._renderer, self._listener, self._began = renderer, listener, began
-        self._told = self._shown = -np.inf
+        self._told, self._shown = -np.inf, began
         self._best = BestSoFar(renderer, listener, began)
         self._picture = picture
 
@@ -132,12 +132,15 @@ class Course:
 
     def _show(self, stage: Stage, now: float) -> None:
         """Tell a preview of the stage's best, where that is new."""
-        if self._shown == -np.inf:
-            self._shown = self._began
-        if stage.picture is None or stage.best is None or now - self._shown < PREVIEW_SECONDS:
+        if stage.best is not None and now - self._shown >= PREVIEW_SECONDS:
+            self.show(stage, stage.best)
+
+    def show(self, stage: Stage, x: Vector) -> None:
+        """Tell a preview of `x`, the best so far, however long ago the last one was."""
+        if stage.picture is None:
             return
         with self._renderer.counter.uncounted():  # how many previews there are depends on the clock
-            self._listener(Preview(stage.picture(stage.best)))
+            self._listener(Preview(stage.picture(x)))
         stage.best, self._shown = None, time.monotonic()
 
     def reached(self, stage: Stage, x: Vector, loss: float) -> None:

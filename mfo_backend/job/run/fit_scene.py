@@ -44,8 +44,11 @@ if TYPE_CHECKING:
 # imported where they are needed, as `mfo --help` needs none of them
 _OF_EVERY_FIT = (
     *("...fit.recover_material", "...render.pictures.renderer"),
+    *("...fit.pictures.one_sheet", "...render.pictures.pixel_pictures", "...render.transport.direct_light"),
     *("...render.paths.recorded_scene", "...render.paths.traced_paths"),
-    *("scipy.ndimage", "scipy.optimize", "PIL.Image", "PIL.ImageDraw", "PIL.ImageFont"),
+    *("...render.lamps.lamp_plugins", "...render.lamps.changed_light"),
+    *("...material.plugins.projective_texture", "...material.plugins.leaf_radiance"),
+    *("scipy.ndimage", "scipy.optimize", "PIL.Image", "PIL.ImageDraw", "PIL.ImageFont", "OpenEXR"),
 )
 _WITHOUT_LIGHT_PATHS = (
     "Left out of the fit with the model 'mitsuba_principled': Cycles' Filter Glossy, clamping of indirect light and "

@@ -13,7 +13,8 @@ the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of 
 for the mesh's own.
 
 A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter of radiance emission_color *
-emission_strength, which asks `emission_share` what alpha, sheen and coat leave of it. The tangent is that of Mitsuba's shading frame, dp/du of the UV map.
+emission_strength, which asks `emission_share` what alpha, sheen and coat leave of it. The tangent is that of Mitsuba's
+shading frame, dp/du of the UV map.
 """
 
 from __future__ import annotations

@@ -58,11 +58,14 @@ class CyclesPath(RBIntegrator):
         active: Any = True,
         before: tuple[Any, Any] | None = None,
         met: Any = None,
+        every_lamp: bool = False,
         **_: Any,
     ) -> tuple[Any, Any, list[Any], Any]:
         """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it.
 
-        What `ray` has `met`, if that is known, is not looked for again, and its emission is left out.
+        What `ray` has `met`, if that is known, is not looked for again, and its emission is left out. In a scene whose
+        lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
+        drawn; it has no derivatives.
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
@@ -124,15 +127,20 @@ class CyclesPath(RBIntegrator):
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
             goes_on = active & si.is_valid() & (left > 1)
-            ds, light, _ = sample_light(scene, shadows, si, sampler.next_2d(), goes_on, None, passages)
-            lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            if dr.hint(terminator.bends, mode="scalar"):
-                light *= terminator.bend(si, si.to_local(ds.d), lit)
-            with dr.resume_grad(when=not primal):
-                value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
-                weight = dr.detach(share(alone(ds), ds.pdf, chance))
-                direct = dr.select(lit, throughput * value * light * weight, 0)
+            on_light = sampler.next_2d()
+            if dr.hint(every_lamp, mode="scalar"):
+                direct = throughput * of_lamps(scene, shadows, si, on_light, goes_on, bounce == 0, passages)
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
+            else:
+                ds, light, _ = sample_light(scene, shadows, si, on_light, goes_on, None, passages)
+                lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+                if dr.hint(terminator.bends, mode="scalar"):
+                    light *= terminator.bend(si, si.to_local(ds.d), lit)
+                with dr.resume_grad(when=not primal):
+                    value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+                    weight = dr.detach(share(alone(ds), ds.pdf, chance))
+                    direct = dr.select(lit, throughput * value * light * weight, 0)
+                    direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
 
             bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
             if dr.hint(terminator.bends, mode="scalar"):
@@ -177,6 +185,36 @@ class CyclesPath(RBIntegrator):
                 met = scene.ray_intersect_preliminary(ray, active=active)
 
         return radiance if primal else change, valid, [], radiance
+
+
+@dr.syntax
+def of_lamps(
+    scene: mi.Scene,
+    shadows: ShadowRays,
+    si: mi.SurfaceInteraction3f,
+    on_light: mi.Point2f,
+    active: mi.Bool,
+    of_all: mi.Bool,
+    passages: mi.UInt32,
+) -> mi.Color3f:
+    """Light that a surface sends back, of lamps without extent: of all of them, or elsewhere of one that is drawn."""
+    lamps, context, bsdf = scene.emitters_dr(), mi.BSDFContext(), si.bsdf()
+    number, weight, _ = scene.sample_emitter(on_light.x, active)
+    number, weight = dr.select(of_all, 0, number), dr.select(of_all, 1, weight)
+    end = dr.select(of_all, dr.opaque(mi.UInt32, dr.width(lamps)), number + 1)
+    total = mi.Color3f(0)
+    active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+    while dr.hint(active & (number < end), label="lamps"):
+        lamp = dr.gather(mi.EmitterPtr, lamps, number, active)
+        ds, light = lamp.sample_direction(si, on_light, active)
+        lit = active & (ds.pdf > 0)
+        light *= weight * shadows.passed(si, ds, lit, None, passages).through
+        if dr.hint(shadows.terminator.bends, mode="scalar"):
+            light *= shadows.terminator.bend(si, si.to_local(ds.d), lit)
+        value, _ = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+        total += dr.select(lit, value * light, 0)
+        number += 1
+    return total
 
 
 def seen_world(texture: Any, direction: Any, active: Any = True) -> Any:

@@ -6,7 +6,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from mfo_backend.fit.judge import verdict
+from mfo_backend.fit.judge.beyond_noise import beyond_noise
 from mfo_backend.fit.judge.judged_result import judged_result
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.certainty import Certainty, Level
@@ -78,6 +81,20 @@ def test_nothing_is_determined_where_the_picture_is_not_matched():
 
 def test_a_cancelled_fit_stays_cancelled():
     assert judged(0.3, 0.005, 0.05, result(Status.CANCELLED))[0].status is Status.CANCELLED
+
+
+@pytest.mark.parametrize(("end", "pictures"), [(0.3, 1), (0.305, 1), (0.1, 3)])
+def test_each_picture_is_compared_once(monkeypatch, end, pictures):
+    """That of the start only where the result could be farther; where it is, its verdict is the start's."""
+    compared = []
+
+    def counted(*given):
+        compared.append(given)
+        return beyond_noise(*given)
+
+    monkeypatch.setattr(verdict, "beyond_noise", counted)
+    judged(0.3, 0.29, end)
+    assert len(compared) == pictures
 
 
 def test_what_is_worse_than_the_start_is_not_the_result():

@@ -8,7 +8,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from mfo_backend.fit.judge.beyond_noise import beyond_noise
-from mfo_backend.fit.judge.verdict import is_worse, judge
+from mfo_backend.fit.judge.verdict import difference_of, is_worse, judge
 from mfo_backend.metrics.display.colour import srgb_from_linear
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.metrics.flip.ldr_flip import flip_map
@@ -184,9 +184,14 @@ def test_a_background_that_was_cut_out_says_nothing():
 def test_worse_than_the_start_is_what_looks_farther_from_the_reference():
     reference = Image(noisy(scene(), 0.1, 0), Encoding.LINEAR)
     near, far = noisy(scene(ball=0.58), 0.05, 1), noisy(scene(ball=0.4), 0.05, 2)
-    assert is_worse(reference, near, far, MASK, VIEW)
-    assert not is_worse(reference, far, near, MASK, VIEW)
-    assert not is_worse(reference, near, noisy(scene(ball=0.58), 0.15, 3), MASK, VIEW)
+
+    def worse(start, result):
+        return is_worse(reference, start, difference_of(reference, result, MASK, VIEW), MASK, VIEW)
+
+    assert worse(near, far)
+    assert not worse(far, near)
+    assert not worse(near, noisy(scene(ball=0.58), 0.15, 3))
+    assert difference_of(reference, far, MASK, VIEW) == judge(reference, far, MASK, VIEW).target
 
 
 def test_what_does_not_count_has_no_part_in_the_verdict():

@@ -125,6 +125,25 @@ def test_no_more_samples_than_asked_for(most):
     assert samples_of(renderer, 0.4) == 2 * max(most // 2, 1)
 
 
+@pytest.mark.parametrize(("side", "block"), [(32, 1), (600, 3)])
+def test_a_glance_has_a_start_of_one_pixel_of_every_block(side, block):
+    renderer, mask = Renderer(), np.zeros((side, side), bool)
+    mask[6:18, 6:18] = True
+    check = verification(renderer, 0.4, shape=(side, side, 3), mask=mask)
+    picture = check.glance(np.array([0.8]), elsewhere=np.full((side, side, 3), 0.1, np.float32))
+    looked_at = widened(mask, BLURRED)
+    (_, _, spp, count), *others = renderer.taken
+    assert others == []
+    check.begin(np.array([0.8]))
+    assert spp == renderer.taken[-1][2]  # by a kernel that there is anyway
+    assert np.all(picture[~looked_at] == np.float32(0.1))
+    np.testing.assert_allclose(picture[looked_at], 0.8, atol=5 * NOISE / np.sqrt(spp))
+    rows = np.unique(np.nonzero(looked_at)[0] // block)
+    assert len(rows) ** 2 - 4 * BLURRED**2 <= count <= len(rows) ** 2  # its corners are round
+    inside = picture[6:18, 6:18].reshape(12 // block, block, 12 // block, block, 3)
+    assert np.all(inside == inside[:, :1, :, :1])
+
+
 def test_a_request_to_stop_ends_it():
     renderer = Renderer()
     start, end = found(renderer, 0.4, 0.4, [0.4001], should_stop=lambda: True)

@@ -164,6 +164,22 @@ def test_previews_come_at_most_once_a_second_and_show_the_fit(tmp_path):
     assert previews[0].image[0, 0, 0] == 0.0
 
 
+@pytest.mark.parametrize("size", [32, 256])  # recorded whole, and in part of the pixels
+def test_the_first_picture_comes_with_the_end_of_the_search(tmp_path, size):
+    renderer = load(tmp_path, POINT, size=size)
+    reference = renderer.image(renderer.table.pack(TRUTHS[0]), seed=5, spp=64)
+    _, events = fit(renderer, reference)
+    ends = {e.stage: at for at, e in enumerate(events) if isinstance(e, StageEnd)}
+    shown = [e.image for e in events[ends["scan"] : ends["start"]] if isinstance(e, Preview)]
+    mask = renderer.target_mask()
+    assert (
+        relative_rms(shown[-1], reference, mask)
+        < 0.1
+        < relative_rms(renderer.image(renderer.start, seed=1, spp=16), reference, mask)
+    )
+    np.testing.assert_array_equal(shown[-1][0, 0], reference[0, 0])  # background, of which a look knows nothing
+
+
 def test_a_start_without_finite_numbers_is_left_out(tmp_path, monkeypatch):
     from mfo_backend.render.paths.recorded_jacobian import RecordedJacobian
 

@@ -86,3 +86,20 @@ def test_a_job_has_the_same_bits_cold_and_after_a_wait(tmp_path: Path) -> None:
         result = without_times(json.loads((job / "result.json").read_text()))
         found.append((result, (job / "pictures" / "result.exr").read_bytes()))
     assert found[0] == found[1]
+
+
+def test_what_every_fit_loads_is_loaded_before_the_job_comes(tmp_path: Path) -> None:
+    job = write_job(tmp_path, light=POINT, power=1.0, preset="balanced")
+    program = (
+        "import sys; from pathlib import Path\n"
+        "from mfo_backend.job.output.progress import EventWriter\n"
+        "from mfo_backend.job.run.fit_scene import load_everything\n"
+        "from mfo_backend.job.run.run_job import run_job\n"
+        "from mfo_backend.job.run.stop import StopSignal\n"
+        "load_everything(); loaded = set(sys.modules); run_job(Path(sys.argv[1]), EventWriter(), StopSignal())\n"
+        "roots = ('mfo_backend', 'mitsuba', 'drjit', 'scipy', 'OpenEXR')\n"
+        "print(*sorted(name for name in set(sys.modules) - loaded if name.split('.')[0] in roots))"
+    )
+    found = subprocess.run([sys.executable, "-c", program, str(job)], capture_output=True, text=True, cwd=ROOT)
+    assert (job / "result.json").is_file(), found.stderr
+    assert found.stdout.split() == []

@@ -12,7 +12,7 @@ import pytest
 
 from mfo_backend.render.pictures.renderer import load_renderer
 from mfo_backend.types.light_paths import LightPaths
-from tests.render.scenes import AREA, FLOOR, POINT, SKY, write_scene
+from tests.render.scenes import AREA, FLOOR, LAMPS, POINT, SKY, SUN_AND_SPOT, write_scene
 
 MATERIALS = {
     "target_bsdf": {
@@ -84,6 +84,33 @@ def test_a_clamp_bounds_what_arrives_over_other_surfaces_alone(tmp_path):
     expected = direct.image(direct.start, seed=0, spp=512).mean()
     assert pictures["clamped"].mean() == pytest.approx(expected, rel=0.01)  # noise of both
     assert pictures["free"].mean() > 1.1 * expected
+
+
+SHADOWLESS = LAMPS["sharp spot"].replace("</emitter>", '<boolean name="shadow" value="false"/></emitter>')
+LONE = SUN_AND_SPOT.replace("20, 20, 20", "60, 50, 20")
+
+
+@pytest.mark.parametrize(
+    ("lights", "quieter"),
+    [(LONE, 10.0), (LONE + POINT + SHADOWLESS + FLOOR, 2.0)],
+    ids=["no other surface", "over a floor"],
+)
+def test_pixels_have_the_light_of_every_lamp_without_extent(tmp_path, monkeypatch, lights, quieter):
+    """The oracle is the picture of all pixels, whose samples draw one of the lamps each."""
+    from mfo_backend.render.pictures import pixel_pictures
+
+    expected = load(tmp_path, ALL, lights)
+    expected = np.array([expected.image(expected.start, seed=k, spp=1024).reshape(-1, 3) for k in range(8)])
+    noise = {}
+    for most in (8, 1):
+        monkeypatch.setattr(pixel_pictures, "MOST_SUMMED", most)
+        renderer = load(tmp_path, ALL, lights)
+        found = np.array([renderer.pixels_later(renderer.start, np.arange(256), seed=k, spp=4)() for k in range(64)])
+        variance = found.var(axis=0) / len(found) + expected.var(axis=0) / len(expected)
+        away = (found.mean(axis=0) - expected.mean(axis=0)) / np.sqrt(variance + (1e-3 * expected.mean()) ** 2)
+        assert np.sqrt(np.square(away).mean()) < 1.25  # Student's, as in tests/render/pictures/test_pixel_pictures.py
+        noise[most] = found.var(axis=0).mean()
+    assert quieter * noise[8] < noise[1]
 
 
 def test_recorded_paths_hold_the_same_light(tmp_path):
