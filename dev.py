@@ -234,7 +234,7 @@ def test(arguments: list[str]) -> int:
     python = str(venv_program("python"))
     # Two at a time: a test compiles kernels or starts a Blender on one core for about as long as it renders on all.
     # Neighbours share fixtures and kernels, so each process takes its half in order, and one that has none left takes
-    # half of what the other has, seven times in a run.
+    # half of what the other has.
     two_at_a_time = ["-n", "2", "--dist", "worksteal"]
     if arguments[:1] == ["--quick"]:
         arguments = [*QUICK, *two_at_a_time, *arguments[1:]]
