@@ -12,7 +12,12 @@ from ...types.errors import BadInputError
 
 # registered from Python
 OURS = (
-    *("blender_principled", "blender_point", "blender_spot", "blender_sharp_spot", "blender_area", "blender_sun"),
+    "blender_principled",
+    "blender_point",
+    "blender_spot",
+    "blender_sharp_spot",
+    "blender_area",
+    "blender_sun",
     "blender_glow",
 )
 
