@@ -27,7 +27,8 @@ def graphs(scene: int, size: int) -> BlenderRow:
 
     import blender_addon
 
-    from ..graphs.measure import LIGHTS, is_wrong, row
+    from ..graphs.head import LIGHTS
+    from ..graphs.measure import is_wrong, row
     from ..graphs.values import FITTED
 
     if not hasattr(bpy.types.Material, "mfo"):

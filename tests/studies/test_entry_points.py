@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,36 @@ def test_a_study_says_what_it_can(said: dict[str, list], path: Path) -> None:
     source = "".join(file.read_text("utf-8") for file in path.parent.glob("*.py"))
     assert any(f"python -m {name}" in line for line in usage)
     assert all(f'"{option}"' in source for option in re.findall(r"--[a-z][a-z-]*", "".join(usage)))
+
+
+def _relative_imports() -> Iterator[tuple[Path, Path, str]]:
+    """File, imported file or folder, and name of every relative import of the studies, also inside of functions."""
+    for path in sorted((ROOT / "studies").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                place = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+                yield from ((path, place, alias.name) for alias in node.names)
+
+
+def _bound_in(module: Path) -> set[str]:
+    """What a module binds at its top."""
+    names: set[str] = set()
+    for node in ast.parse(module.read_text("utf-8")).body:
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names |= {alias.asname or alias.name for alias in node.names}
+        names |= {each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)}
+    return names
+
+
+def test_what_studies_import_from_each_other_is_there() -> None:
+    """Type checks leave them out, and a study that fails makes rows of errors."""
+    missing = []
+    for path, place, name in _relative_imports():
+        module = place.with_suffix(".py")
+        found = name in _bound_in(module) if module.is_file() else (place / f"{name}.py").is_file()
+        found = found or (place / name / "__init__.py").is_file()
+        found = found or ((place / "__init__.py").is_file() and name in _bound_in(place / "__init__.py"))
+        missing += [] if found else [f"{path.relative_to(ROOT)}: {place.name}.{name}"]
+    assert missing == []
