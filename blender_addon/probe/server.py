@@ -114,13 +114,12 @@ def _watch_parent(pid: int, folder: Path) -> None:
 
 def _run() -> None:
     words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
-    if not __package__:  # run by a Blender program as a script: come back as a module of the package
+    if not __package__:  # run by a Blender program as a script
         sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-        from blender_addon.probe import server
+    # as a module of the package: errors of this script's own copy of it are others than those that commands raise
+    from blender_addon.probe import server
 
-        code = server.main(words)
-    else:
-        code = main(words)
+    code = server.main(words)
     import bpy
 
     shutil.rmtree(bpy.app.tempdir, ignore_errors=True)  # what Blender's own end would remove
