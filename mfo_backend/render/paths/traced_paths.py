@@ -184,7 +184,7 @@ class TracedPaths:
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
             si = seen_side(scene.ray_intersect(ray, active))
-            active = active & ~mi.Bool(self._shadows.ends(si, s["passages"]))
+            last = mi.Bool(self._shadows.ends(si, s["passages"]))  # its own light still counts
             blur = self._blur(s)
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
@@ -209,7 +209,7 @@ class TracedPaths:
                 shine = self._lamps.met(ray, si, active, density=likely, camera=straight, sent_from=sent_from)
                 shine *= self._clamp(beta[0] * shine, depth >= 2)
                 total = [t + b * shine for t, b in zip(total, beta, strict=True)]
-            active = active & si.is_valid() & (s["left"] > 1)
+            active = active & si.is_valid() & (s["left"] > 1) & ~last
             # light sampled from here
             ds, value, times = sample_light(
                 scene, self._shadows, si, rng.pair(2 + 3 * depth), active,

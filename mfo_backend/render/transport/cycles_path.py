@@ -103,7 +103,7 @@ class CyclesPath(RBIntegrator):
                 behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
                 si[skip] = behind
             valid |= (bounce == 0) & si.is_valid()
-            active &= ~mi.Bool(shadows.ends(si, passages))
+            last = mi.Bool(shadows.ends(si, passages))  # its own light still counts
             si = seen_side(si)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), 0)
             bsdf = si.bsdf(ray)
@@ -126,7 +126,7 @@ class CyclesPath(RBIntegrator):
                 shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight, sent_from=sent_from)
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
-            goes_on = active & si.is_valid() & (left > 1)
+            goes_on = active & si.is_valid() & (left > 1) & ~last
             on_light = sampler.next_2d()
             if dr.hint(every_lamp, mode="scalar"):
                 direct = throughput * of_lamps(scene, shadows, si, on_light, goes_on, bounce == 0, passages)

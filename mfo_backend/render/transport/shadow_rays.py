@@ -78,7 +78,10 @@ class ShadowRays:
         return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most)
 
     def ends(self, si: mi.SurfaceInteraction3f, passages: mi.UInt32) -> mi.Bool | bool:
-        """Whether a path that has gone straight through as many surfaces as it may has met a further one."""
+        """Whether a path that has gone straight through as many surfaces as it may has met a further one.
+
+        As in Cycles that one still shows its own light, and sends none on.
+        """
         if not self.lets_through:
             return False
         return si.is_valid() & (passages > 0) & (passages >= dr.opaque(mi.UInt32, self.most))
