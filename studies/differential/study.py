@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from ..parity.cycles_parity import render_job
 from .compare import Difference, Picture, compare
 from .random_scene import PLAIN_WORDS, WORDS, Rig, build, drawn
 
@@ -57,7 +58,7 @@ def try_scene(settings: Sequence[str], seed: int, folder: Path, *, size: int, sa
         report = export_job(bpy.context, rig.target, job, reference=folder / "cycles_1.exr", fit={})
     except ExportError as refusal:
         return Outcome(tuple(settings), str(refusal), (), None)
-    ours = _ours(job, samples)
+    ours = render_job(job, 2 * samples, "specular_ior_level")
     return Outcome(tuple(settings), "", report.notes, compare(ours, theirs))
 
 
@@ -102,29 +103,6 @@ def _cycles(rig: Rig, folder: Path, seed: int) -> Picture:
         bpy.ops.render.render(write_still=True)
     channels: Any = OpenEXR.File(str(path)).channels()
     return np.asarray(next(iter(channels.values())).pixels[:, :, :3], np.float64)
-
-
-def _ours(job: Path, samples: int) -> tuple[Picture, Picture]:
-    from mfo_backend.job.folder.job_folder import JobFolder
-    from mfo_backend.job.folder.request import read_request
-    from mfo_backend.job.run.job_scene import request_materials
-    from mfo_backend.render.machine.llvm import configure_llvm, needs_llvm
-    from mfo_backend.render.pictures.renderer import load_renderer
-
-    if needs_llvm():
-        configure_llvm()
-    folder = JobFolder.open(job)
-    request = read_request(folder)
-    renderer = load_renderer(
-        job / request.scene,
-        request.target.shape_id,
-        model="blender_principled",
-        parameters=["specular_ior_level"],
-        materials=request_materials(folder, request),
-        light_paths=request.light_paths,
-    )
-    first, second = (renderer.image(renderer.start, seed=seed, spp=samples).astype(np.float64) for seed in (11, 12))
-    return first, second
 
 
 @contextlib.contextmanager

@@ -72,8 +72,8 @@ def _blocks(picture: Array) -> Array:
     return picture.reshape(height, BLOCK, width, BLOCK, 3).mean(axis=(1, 3), dtype=np.float64)
 
 
-def render_job(job: Path, spp: int) -> tuple[Array, Array]:
-    """Two renders of a job's scene with Blender's model, half of `spp` each."""
+def render_job(job: Path, spp: int, free: str = "base_color") -> tuple[Array, Array]:
+    """Two renders of a job's scene with Blender's model, half of `spp` each; one value is `free`, without a texture."""
     from mfo_backend.job.folder.job_folder import JobFolder
     from mfo_backend.job.folder.request import read_request
     from mfo_backend.job.run.job_scene import request_materials
@@ -88,7 +88,7 @@ def render_job(job: Path, spp: int) -> tuple[Array, Array]:
         job / request.scene,
         request.target.shape_id,
         model="blender_principled",
-        parameters=["base_color"],
+        parameters=[free],
         materials=request_materials(folder, request),
         light_paths=request.light_paths,
     )

@@ -96,7 +96,18 @@ def approximated(material: Material) -> list[str]:
         found.append(f"Subsurface is fitted as diffuse: no light travels below the surface.{weight}")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
+    above = {name for leaf in (material, *material.leaves) if material.is_mixed for name in _above_emission(leaf)}
+    if above:
+        found.append(f"the emission is not dimmed by {', '.join(sorted(above))}, as it is in Cycles.")
     return found
+
+
+def _above_emission(leaf: Material) -> list[str]:
+    """The layers above what a leaf emits itself."""
+    if float(leaf.value("Emission Strength", 0.0)) == 0.0:
+        return []
+    layers = {"Alpha": 1.0, "Coat Weight": 0.0, "Sheen Weight": 0.0}
+    return [name for name, nothing in layers.items() if leaf.value(name, nothing) != nothing]
 
 
 def _transmits(material: Material) -> bool:
@@ -122,6 +133,12 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
         findings.note(
             f"Material '{material.name}': {', '.join(lost)} has no counterpart in Mitsuba's principled and is missing "
             "in a fit with the model mitsuba_principled."
+        )
+    above = [name for name in _above_emission(material) if name != "Alpha"]
+    if above and not (material.is_mixed or material.emission_is_dimmed):
+        findings.note(
+            f"Material '{material.name}': the emission is not dimmed by {', '.join(above)} in a fit with the model "
+            "mitsuba_principled."
         )
     for sentence in approximated(material):
         findings.note(f"Material '{material.name}': {sentence}")

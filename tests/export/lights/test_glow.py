@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
+from studies.parity.cycles_parity import render_job
+
 from ..scene.test_light_levels import tiles
 from ..scenes import add_camera, add_light, add_quad, diffuse_material, new_material
 
@@ -124,27 +126,7 @@ def test_layers_take_their_part_and_both_sides_shine(
     cycles.samples = 512
     expected = tiles(render_cycles())
     report = export(glowing if is_target else target, reference=tmp_path / "cycles.exr")
-    found = tiles(ours(report.folder))
+    found = tiles(np.mean(render_job(report.folder, 1024), axis=0))
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=CLOSE.get(layer, 0.005))
     np.testing.assert_allclose(found, expected, rtol=0.12, atol=0.02)
-    assert not [note for note in report.notes if "emission" in note]
-
-
-def ours(job: Any) -> np.ndarray:
-    """The picture of the job's scene by the fit's own renderer."""
-    from mfo_backend.job.folder.job_folder import JobFolder
-    from mfo_backend.job.folder.request import read_request
-    from mfo_backend.job.run.job_scene import request_materials
-    from mfo_backend.render.pictures.renderer import load_renderer
-
-    folder = JobFolder.open(job)
-    request = read_request(folder)
-    renderer = load_renderer(
-        job / request.scene,
-        request.target.shape_id,
-        model="blender_principled",
-        parameters=["specular_ior_level"],
-        materials=request_materials(folder, request),
-        light_paths=request.light_paths,
-    )
-    return renderer.image(renderer.start, seed=11, spp=1024)
+    assert not [note for note in report.notes if "emission" in note and "mitsuba_principled" not in note]
