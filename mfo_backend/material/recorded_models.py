@@ -9,11 +9,13 @@ from typing import Any, Protocol
 
 from ..types.errors import UnrecordableError
 from ..types.parameter import Parameter, ParameterTable, Value
+from .arrays import dual as dr
 from .arrays.grid_table import loaded_buffers
 from .cycles_model import CyclesModel
 from .mitsuba_principled import MitsubaPrincipled
-from .principled.blender_principled import BLENDER_5_0, blender_principled
+from .principled.blender_principled import BLENDER_5_0, blender_principled, evaluate
 from .principled.bumped_normals import BUMPED_NORMALS
+from .principled.layers import layer_stack
 from .principled.mix_values import MixValues, amount_of
 from .principled.needed_lobes import needed_lobes
 from .principled.principled_parameters import BLENDER_PRINCIPLED
@@ -98,6 +100,28 @@ class BlenderPrincipledModel:
         return loaded_buffers()
 
 
+class GlowingModel(BlenderPrincipledModel):
+    """Blender's Principled BSDF with its own light, which is what it sends to the view without a `wo`: (0, 0, 0).
+
+    The emission is 1 unless it is free: a recording has its radiance.
+    """
+
+    def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
+        """See `RecordedModel`."""
+        unit = {"emission_color": (1.0, 1.0, 1.0), "emission_strength": 1.0}
+        return super().values(given, free) | {name: value for name, value in unit.items() if name not in free}
+
+    def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
+        """See `RecordedModel`."""
+        lobes = needed_lobes(fixed, free)
+
+        def seen(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
+            layers = layer_stack(parameters, wi, lobes, self._cycles)
+            return dr.select(dr.dot(wo, wo) > 0, evaluate(layers, layers.to_frame(wo)), layers.emission)
+
+        return seen
+
+
 class MixedModel(BlenderPrincipledModel):
     """The leaves of a `closure_tree` that may change, opaque, with their weights; the fitted one is never left out.
 
@@ -163,8 +187,10 @@ def _number(weight: Any) -> float | None:
     return None if hasattr(weight, "eval_1") else float(weight[0])
 
 
-def recorded_model(name: str, bsdf: Any, mix: MixValues | None = None) -> RecordedModel:
+def recorded_model(name: str, bsdf: Any, mix: MixValues | None = None, *, glows: bool = False) -> RecordedModel:
     """The recorded version of model `name`, with the switches of the scene's `bsdf`, of which `mix` is free besides.
+
+    With `glows` it has its own light, too.
 
     Raises
     ------
@@ -176,5 +202,6 @@ def recorded_model(name: str, bsdf: Any, mix: MixValues | None = None) -> Record
     if mix is not None:
         return MixedModel(bsdf, mix)
     if name == "blender_principled":
-        return BlenderPrincipledModel(getattr(bsdf, "model", BLENDER_5_0))
+        kind = GlowingModel if glows else BlenderPrincipledModel
+        return kind(getattr(bsdf, "model", BLENDER_5_0))
     raise UnrecordableError(f"Material model {name!r} has no recorded-path version.")

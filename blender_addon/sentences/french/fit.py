@@ -103,7 +103,6 @@ FIT = {
     "The stages on whole light paths know no losses of the user's choice.": "Les étapes sur des chemins de lumière entiers ne connaissent pas de mesures au choix de l'utilisateur.",
     "So the preset 'paper' was used instead of {}.": "Donc le préréglage 'paper' a été utilisé au lieu de {}.",
     "So whole light paths were traced, by the stages {}.": "Donc des chemins de lumière entiers ont été tracés, par les étapes {}.",
-    "Stages on whole light paths hold the emission as it is.": "Les étapes sur des chemins de lumière entiers gardent l'émission telle quelle.",
     "No start of the fit gives finite numbers on the recorded light paths.": "Aucun départ de l'ajustement ne donne des nombres finis sur les chemins de lumière enregistrés.",
     "The material has {} and recorded paths hold reflected light only.": "Le matériau a {} et les chemins enregistrés ne contiennent que de la lumière réfléchie.",
     "The target emits light and the integrator hides what does.": "L'objet émet de la lumière et l'intégrateur cache ce qui en émet.",

@@ -103,7 +103,6 @@ FIT = {
     "The stages on whole light paths know no losses of the user's choice.": "Die Stufen auf ganzen Lichtpfaden kennen keine selbst gewählten Fehlermaße.",
     "So the preset 'paper' was used instead of {}.": "Also wurde die Voreinstellung 'paper' statt {} verwendet.",
     "So whole light paths were traced, by the stages {}.": "Also wurden ganze Lichtpfade verfolgt, in den Stufen {}.",
-    "Stages on whole light paths hold the emission as it is.": "Stufen auf ganzen Lichtpfaden lassen das Leuchten, wie es ist.",
     "No start of the fit gives finite numbers on the recorded light paths.": "Kein Anfang der Anpassung gibt endliche Zahlen auf den aufgezeichneten Lichtpfaden.",
     "The material has {} and recorded paths hold reflected light only.": "Das Material hat {}, und aufgezeichnete Pfade enthalten nur zurückgeworfenes Licht.",
     "The target emits light and the integrator hides what does.": "Das Objekt leuchtet, und der Integrator verbirgt, was leuchtet.",

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.models.prepared_material import EMISSION
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...types.certainty import Certainty, Level
-from ...types.errors import NoNearerError, UnrecordableError
+from ...types.errors import NoNearerError
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..certainty.covariance import certainties, certainties_away
@@ -54,7 +53,7 @@ class TracedRoute:
     Raises
     ------
     UnrecordableError
-        If the model has no traced version, or the emission is to be fitted.
+        If the model has no traced version.
     BadInputError
         If one of the settings' losses is not defined for the reference.
     """
@@ -68,8 +67,6 @@ class TracedRoute:
     ) -> None:
         from ...render.paths.traced_paths import TracedPaths
 
-        if EMISSION in renderer.table.names:
-            raise UnrecordableError("Stages on whole light paths hold the emission as it is.")
         settings, encoding = task.settings, task.reference.encoding
         self._task, self._renderer, self._plan, self._begin = task, renderer, plan, begin
         self._paths = TracedPaths(renderer)

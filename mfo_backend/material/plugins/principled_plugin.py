@@ -28,7 +28,7 @@ import mitsuba as mi
 from ...types.errors import SetupError
 from ...types.parameter import Value
 from ..cycles_model import cycles_model
-from ..principled.blender_principled import emitted, evaluate
+from ..principled.blender_principled import evaluate
 from ..principled.bumped_normals import valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
@@ -138,10 +138,9 @@ class BlenderPrincipled(mi.BSDF):
     def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
         """What alpha, sheen and coat leave of the surface's own light towards `si.wi`, perhaps to a light sample."""
         own = {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
-        values = self.values_at(si, active) | own
         if sampled:
-            return mi.Color3f(sampled_emission(values, si.wi, self.lobes))
-        return mi.Color3f(emitted(values, si.wi, self.lobes, self.model))
+            return mi.Color3f(sampled_emission(self.values_at(si, active) | own, si.wi, self.lobes))
+        return mi.Color3f(self._layers(si, active, **own).layers.emission)
 
     def picture_of(self, name: str) -> Any:
         """The texture of a parameter or a direction that has one."""
@@ -205,8 +204,8 @@ class BlenderPrincipled(mi.BSDF):
         own = {"geometric_normal": geometric, "own_tangent": mi.Vector3f(si.sh_frame.s)}
         return normals | axes | {name: frame.to_local(direction) for name, direction in own.items()}
 
-    def _layers(self, si: mi.SurfaceInteraction3f, active: Any) -> _Surface:
-        values, wi, frame = self.values_at(si, active), si.wi, None
+    def _layers(self, si: mi.SurfaceInteraction3f, active: Any, **instead: Any) -> _Surface:
+        values, wi, frame = self.values_at(si, active) | instead, si.wi, None
         if self.directions:
             frame, wi, normals = self.bumped_frame(si, active)
             values |= normals

@@ -44,11 +44,6 @@ def blender_principled(
     return evaluate(layers, layers.to_frame(wo))
 
 
-def emitted(parameters: Mapping[str, Any], wi: Any, lobes: Lobes = ALL_LOBES, model: CyclesModel = BLENDER_5_0) -> Any:
-    """Radiance emitted towards `wi`, RGB, dimmed by alpha, sheen and coat above the emitting layer."""
-    return layer_stack(parameters, wi, lobes, model).emission
-
-
 def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     """f_r |cos| of the stack for light from `wo` in the frame of the layers; `reachable_only` as in `refracted`."""
     if layers.normals is not None:

@@ -50,7 +50,8 @@ class RecordSettings:
     hold all that see the target, nothing is missed. With `highlights` more rays start where lights of no extent are
     mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples of the same
     directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need no other
-    kernels than a recording with it. With `free_emission` the target's own emission is no part of the constant picture.
+    kernels than a recording with it. With `glows` the target's own light is no part of the constant picture but a lane
+    without direction for each camera ray. Where the emission is free, a colour of 1 has the radiance `unit_emission`.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -70,7 +71,8 @@ class RecordSettings:
     samples: int = 1
     alike: bool = False
     direct_samples: int = 0
-    free_emission: bool = False
+    glows: bool = False
+    unit_emission: float | None = None
     sensor: Any = None  # a camera that the scene lacks
 
 
@@ -129,8 +131,8 @@ def record_paths(
         position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.free_emission else None
-        glowing = shape.emitter().share(si) * filter_weight if settings.free_emission else None
+        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.glows else None
+        radiance = _unlayered(shape, settings, si) if settings.glows else None
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
@@ -155,6 +157,9 @@ def record_paths(
         pixels = len(rays.pixel)
         hits = _Hits(si, position, filter_weight, held, pixels, shape.bsdf() if settings.mixed else None, own, coat)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
+        if radiance is not None:
+            nowhere = dr.zeros(mi.Vector3f, dr.width(position))
+            exact.append(_lit(hits, nowhere, radiance * filter_weight, mi.Bool(True))())
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
             lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
@@ -167,12 +172,16 @@ def record_paths(
         if glow is not None:
             add_radiance(constant, rays.pixel[np.array(position)], glow)
         merged = merged_lanes(lanes, settings.samples, settings.held, rays, covered, coverage, constant)
-        if glowing is not None:
-            own = add_radiance(np.zeros_like(constant), rays.pixel[np.array(position)], glowing)
-            merged = replace(merged, own_emission=own)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged
+
+
+def _unlayered(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.Color3f:
+    """What the target's emission sends out below all layers, of a colour of 1 where that is free."""
+    if settings.unit_emission is not None:
+        return dr.full(mi.Color3f, settings.unit_emission, dr.width(si))
+    return mi.Color3f(shape.emitter().radiance.eval(si))
 
 
 def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:

@@ -154,7 +154,7 @@ class RecordedPaths:
     Attributes
     ----------
     wi, wo
-        Unit directions to the camera and to the light in the shading frame.
+        Unit directions to the camera and to the light in the shading frame; the target's own light has none, (0, 0, 0).
     weight
         Incident radiance x visibility x multiple importance weight / density x pixel filter, linear Rec.709.
     pixel, tile
@@ -166,10 +166,8 @@ class RecordedPaths:
         Share of each covered pixel's filter weight that lies on the target.
     constant
         What does not depend on the target's BSDF at the first hit, (height, width, 3): background and other objects
-        seen in covered pixels, the target's own emission unless that is free, of a mix what its held materials show; 0
+        seen in covered pixels, the target's own light unless lanes have it, of a mix what its held materials show; 0
         elsewhere.
-    own_emission
-        The picture of the target's own emission of radiance 1, (height, width, 3), where that is free.
     constant_difference
         Half the difference of two samples of `constant`; None where it has no noise of the light.
     held
@@ -185,7 +183,6 @@ class RecordedPaths:
     coverage: NDArray[np.float32]
     constant: Pixels
     held: Mapping[str, Any] = field(default_factory=dict)
-    own_emission: Pixels | None = None
     constant_difference: Pixels | None = None
 
     @property

@@ -89,7 +89,10 @@ class RecordedScene:
         self.renderer = renderer
         self._covered, self._part, self._counts = covered, part, counts
         self._taken = 0  # bytes for the rays of the largest recording so far
-        self.model = recorded_model(renderer.model, renderer.shape.bsdf(), renderer.mix)
+        self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
+        layered = renderer.shape.is_emitter() and getattr(renderer.shape.emitter(), "layered", False)
+        self._glows = layered and not self._mixed and renderer.model == "blender_principled"
+        self.model = recorded_model(renderer.model, renderer.shape.bsdf(), renderer.mix, glows=self._glows)
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
@@ -99,7 +102,6 @@ class RecordedScene:
         self._varying, self._evaluated = (each and varying(each) for each in (renderer.graph, self.graph))
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._evaluated)
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
-        self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
         if self._mixed and not renderer.shape.bsdf().is_opaque:
             raise UnrecordableError("The material is mixed with one that lets light through.")
 
@@ -180,7 +182,8 @@ class RecordedScene:
             pixels=pixels,
             highlights=highlights,
             samples=samples,
-            free_emission=EMISSION in self.renderer.table.names,
+            glows=self._glows,
+            unit_emission=self.renderer.factors.get(EMISSION),
         )
         self.renderer.counter.add(1.0)
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
@@ -215,7 +218,8 @@ class RecordedScene:
             bumped=self._bumped,
             light_paths=self.renderer.light_paths,
             samples=2 if self.needs.sampled else 1,
-            free_emission=EMISSION in self.renderer.table.names,
+            glows=self._glows,
+            unit_emission=self.renderer.factors.get(EMISSION),
             pixels=pixels,
             sensor=sensor,
         )
@@ -274,14 +278,14 @@ class RecordedScene:
 
         It remembers two: solutions are compared in pairs.
         """
-        constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
+        constant = groups.average(paths.constant)
         apart = paths.constant_difference
         difference = None if apart is None else groups.average(apart)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.counter.add(cost)
-            return glow(vector, TwoSamples.of(self._image(vector, lanes, groups), constant, difference))
+            return TwoSamples.of(self._image(vector, lanes, groups), constant, difference)
 
         return RecordedImage(at, 2)
 
@@ -306,7 +310,7 @@ class RecordedScene:
 
     def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
         """The function from a vector to image and Jacobian of the groups, background included."""
-        constant, glow = groups.average(paths.constant), self._own_emission(paths, groups)
+        constant = groups.average(paths.constant)
         apart = paths.constant_difference
         difference = None if apart is None else groups.average(apart)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
@@ -315,30 +319,9 @@ class RecordedScene:
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             samples = self.jacobian(vector, lanes(), groups)
             self.renderer.counter.add(cost)
-            return glow(vector, TwoSamples.of(samples, constant, difference))
+            return TwoSamples.of(samples, constant, difference)
 
         return RecordedImage(at, recalled)
-
-    def _own_emission(
-        self, paths: RecordedPaths, groups: LaneGroups
-    ) -> Callable[[NDArray[np.float64], TwoSamples], TwoSamples]:
-        """What adds the target's own light at a vector to its picture and derivatives, where the emission is free.
-
-        The light that it throws on other surfaces, and they on it, is that of the material it was recorded for.
-        """
-        if paths.own_emission is None:
-            return lambda vector, samples: samples
-        entries = self.renderer.table.slice_of(EMISSION)
-        unit = groups.average(paths.own_emission) * np.float32(self.renderer.factors[EMISSION])
-
-        def added(vector: NDArray[np.float64], samples: TwoSamples) -> TwoSamples:
-            samples.mean[:, :, 0] += unit * vector[entries].astype(np.float32)
-            if samples.mean.shape[2] > 1:
-                for channel, entry in enumerate(range(entries.start, entries.stop)):
-                    samples.mean[:, channel, 1 + entry] += unit[:, channel]
-            return samples
-
-        return added
 
     def _share(self, groups: LaneGroups) -> float:
         """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""

@@ -31,6 +31,7 @@ from ...material.principled.lobe_sampling import NAMES, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
 from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
+from ..models.prepared_material import EMISSION
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from ..transport.cycles_path import seen_world
@@ -89,6 +90,9 @@ class TracedPaths:
         names = () if self._tree is not None else self.table.names
         through = self._shadows.lets_through and "alpha" in names
         self._alpha_entry = (self.table.slice_of("alpha").start,) if through else None
+        glow = renderer.shape.emitter() if renderer.shape.is_emitter() and self._tree is None else None
+        # the target's own light: the layers that are fitted dim it
+        self._glow = glow if getattr(glow, "layered", False) else None
         self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
         self.lanes = 0
 
@@ -199,8 +203,12 @@ class TracedPaths:
             if self._camera_world is not None:
                 behind_all = straight & active & ~si.is_valid()
                 emission = dr.select(behind_all, seen_world(self._camera_world, s["ray"].d, behind_all), emission)
-            emission *= seen
-            emission = dr.select(active, emission, 0.0)
+            met, own = active & si.is_valid(), mi.Bool(False)
+            if self._glow is not None:
+                own = met & (emitter == mi.EmitterPtr(self._glow))
+                # light samples leave it to the rays that meet it
+                seen = dr.select(own, 1.0, seen)
+            emission = dr.select(active & ~own, emission * seen, 0.0)
             emission *= self._clamp(beta[0] * emission, depth >= 2)
             total = [t + b * emission for t, b in zip(total, beta, strict=True)]
             if self._lamps:
@@ -217,11 +225,21 @@ class TracedPaths:
             )  # fmt: skip
             wo = si.to_local(ds.d)
             lit = active & (ds.pdf > 0.0)
+            if self._glow is not None:
+                lit &= ds.emitter != mi.EmitterPtr(self._glow)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
-            on = active & (si.bsdf() == mi.BSDFPtr(self._bsdf)) if self._others else active
-            f_light, pdf_light, f_next, pdf_next, local, kind = self._at_target(
-                si, wo, u1, u2, on, theta, offset, directions
+            ours = si.bsdf() == mi.BSDFPtr(self._bsdf) if self._others else mi.Bool(True)
+            on = active & ours
+            at_hit = on if self._glow is None else met & ours
+            f_light, pdf_light, f_next, pdf_next, local, kind, glow = self._at_target(
+                si, wo, u1, u2, at_hit, on, theta, offset, directions
             )
+            if self._glow is not None:
+                glow = [dr.select(own, c, 0.0) for c in glow]
+                kept = self._clamp(beta[0] * glow[0], depth >= 2)
+                total[0] += beta[0] * glow[0] * kept
+                for k in range(directions):
+                    total[1 + k] += (beta[1 + k] * glow[0] + beta[0] * glow[1 + k]) * kept
             if self._others:
                 off = active & ~on
                 context = mi.BSDFContext()
@@ -315,13 +333,16 @@ class TracedPaths:
         least = dr.select(counts & (density > 0.0), dr.minimum(state["least"], density), state["least"])
         return {"least": least, "bounces": bounces, "left": dr.select(done, dr.minimum(left, 1), left)}
 
-    def _at_target(self, si, wo, u1, u2, on, theta, offset, directions):
-        """Value and derivatives of the BSDF towards `wo` and towards a direction drawn from it, with densities."""
+    def _at_target(self, si, wo, u1, u2, met, on, theta, offset, directions):
+        """Value and derivatives of the BSDF towards `wo` and towards a direction drawn from it, with densities, where
+        paths go `on`; last those of the surface's own light, wherever they have `met` it."""
         plugin = self._plugin
-        entries = [dr.gather(mi.Float, theta, offset + k, on) for k in range(self.table.length)]
+        entries = [dr.gather(mi.Float, theta, offset + k, met) for k in range(self.table.length)]
         if directions:
             dr.enable_grad(*entries)
-        parameters: dict[str, Any] = plugin.values_at(si, on)
+        parameters: dict[str, Any] = plugin.values_at(si, met)
+        if self._glow is not None:
+            parameters |= {EMISSION: mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
         iterator = iter(entries)
         for p in self.table:
             parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
@@ -367,16 +388,24 @@ class TracedPaths:
             kind = dr.select(null, mi.UInt32(+mi.BSDFFlags.Null), kind)
             drawn = dr.select(null, -layers.wi, drawn)
         pdf_next = dr.select(valid & on, pdf_next, 0.0)
-        light, following = [dr.detach(f_light)], [dr.detach(f_next)]
+        results = [f_light, f_next]
+        if self._glow is not None:
+            results.append(self._radiance(si, met) * mi.Color3f(layers.emission))
+        columns = [[dr.detach(result)] for result in results]
         for entry in self._tangents.entries[:directions]:
             for k in entry:
                 dr.set_grad(entries[k], 1.0)
                 dr.enqueue(dr.ADMode.Forward, entries[k])
             dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
-            light.append(mi.Color3f(dr.grad(f_light)))
-            following.append(mi.Color3f(dr.grad(f_next)))
-            dr.clear_grad(f_light)
-            dr.clear_grad(f_next)
-        light = [dr.select(on, c, 0.0) for c in light]
-        following = [dr.select(on, c, 0.0) for c in following]
-        return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), kind
+            for column, result in zip(columns, results, strict=True):
+                column.append(mi.Color3f(dr.grad(result)))
+                dr.clear_grad(result)
+        light, following = ([dr.select(on, c, 0.0) for c in column] for column in columns[:2])
+        glow = columns[2] if self._glow is not None else []
+        return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), kind, glow
+
+    def _radiance(self, si, met) -> mi.Color3f:
+        """What the target's emission sends out below all layers, of a colour of 1 where that is free."""
+        if EMISSION in self.table.names:
+            return mi.Color3f(dr.opaque(mi.Float, self.renderer.factors[EMISSION]))
+        return mi.Color3f(self._glow.radiance.eval(si, met))

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from ...types.errors import BadInputError
 from ...types.image import Pixels
 from ..models.joined_graph import JoinedGraph
-from ..models.prepared_material import EMISSION
 from ..paths.recorded_image import RecordedImage
 from ..paths.recorded_paths import LaneGroups, RecordedPaths
 from ..paths.recorded_scene import MOST_LANES, RecordedScene, SceneNeeds
@@ -92,24 +91,16 @@ class RecordedSheet:
         for number, scene, part in zip(self._numbers, self._scenes, self._parts, strict=True):
             own = grid if isinstance(grid, int) else self.renderer.sheet.cut(grid, number)
             try:
-                recorded = scene.record(
+                parts[number] = scene.record(
                     vector, grid=own, seed=(seed + number * _SCENES_APART) % 2**32, near=near, samples=samples,
                     enough=part * enough, needs=self.needs,
                 )  # fmt: skip
             except BadInputError as error:
                 raise BadInputError(f"Picture {self.renderer.sheet.labels[number]}: {error}") from error
-            parts[number] = self._of_first(recorded, number)
         if self.graph is not None:
             begins = self.graph.begins(vector[len(vector) - self.graph.table.length :])
             parts = {n: _on_rows(paths, begin) for (n, paths), begin in zip(parts.items(), begins, strict=True)}
         return joined(parts, self.renderer.sheet)
-
-    def _of_first(self, paths: RecordedPaths, number: int) -> RecordedPaths:
-        """A recording whose free emission is that of the first picture, as the exposure of films may differ."""
-        if paths.own_emission is None:
-            return paths
-        own, first = (r.factors[EMISSION] for r in (self.renderer.renderers[number], self.first.renderer))
-        return replace(paths, own_emission=paths.own_emission * np.float32(own / first))
 
     def finest_grid(self, samples: int, lanes: float) -> int:
         """See `RecordedScene.finest_grid`."""
@@ -155,7 +146,6 @@ def joined(recorded: Mapping[int, RecordedPaths], sheet: ContactSheet) -> Record
             total += int(first[-1]) - int(first[0])
         begins.append(np.concatenate([*row, [total]]))
     weights = (paths.weight * dr.opaque(mi.Float, sheet.gains[number]) for number, paths in recorded.items())
-    glows = {n: paths.own_emission for n, paths in recorded.items() if paths.own_emission is not None}
     merge = partial(_merged, ranges=ranges, total=total)
     tiles = np.cumsum([0, *(int(paths.tile.max(initial=-1)) + 1 for paths in parts)])
     return RecordedPaths(
@@ -167,7 +157,6 @@ def joined(recorded: Mapping[int, RecordedPaths], sheet: ContactSheet) -> Record
         first=np.stack(begins),
         coverage=np.concatenate([paths.coverage for paths in parts]),
         constant=_on_sheet({number: paths.constant for number, paths in recorded.items()}, sheet),
-        own_emission=_on_sheet(glows, sheet) if glows else None,
         held={name: merge([paths.held[name] for paths in parts]) for name in parts[0].held},
     )
 

@@ -10,7 +10,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mfo_backend.material.principled.blender_principled import blender_principled, emitted
+from mfo_backend.material.principled.blender_principled import BLENDER_5_0, blender_principled
+from mfo_backend.material.principled.layers import layer_stack
+from mfo_backend.material.principled.needed_lobes import ALL_LOBES
 from mfo_backend.material.principled.principled_parameters import BLENDER_PRINCIPLED
 from mfo_backend.types.errors import BadInputError
 
@@ -137,11 +139,15 @@ def test_rough_glass_in_a_uniform_world(angle: int, expected: tuple[float, float
 
 def test_emission_is_dimmed_by_what_lies_above() -> None:
     base = {"emission_color": (1.0, 0.5, 0.2), "emission_strength": 2.0}
-    plain = np.array(emitted(base, mi.Vector3f(*unit(30, 0)))).ravel()
+
+    def emitted(values: dict) -> np.ndarray:
+        return np.array(layer_stack(values, mi.Vector3f(*unit(30, 0)), ALL_LOBES, BLENDER_5_0).emission).ravel()
+
+    plain = emitted(base)
     np.testing.assert_allclose(plain, (2.0, 1.0, 0.4), rtol=1e-6)
-    half = np.array(emitted({**base, "alpha": 0.5}, mi.Vector3f(*unit(30, 0)))).ravel()
+    half = emitted({**base, "alpha": 0.5})
     np.testing.assert_allclose(half, plain / 2, rtol=1e-6)
-    covered = np.array(emitted({**base, "coat_weight": 1.0}, mi.Vector3f(*unit(30, 0)))).ravel()
+    covered = emitted({**base, "coat_weight": 1.0})
     # 1 minus the albedo of a smooth layer of index 1.5, 4 to 5 %
     assert np.all((covered / plain > 0.94) & (covered / plain < 0.97))
 

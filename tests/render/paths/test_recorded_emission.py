@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from mfo_backend.render.pictures.renderer import load_renderer
 from tests.render.scenes import POINT, write_scene
 
 GLOW = '<emitter type="area"><rgb name="radiance" value="0.3, 0.2, 0.1"/></emitter>'
+LAYERED_GLOW = GLOW.replace("area", "blender_glow").replace(
+    "</emitter>", '<boolean name="layered" value="true"/></emitter>'
+)
 
 
 def test_the_targets_own_light_is_part_of_the_constant_picture(tmp_path):
@@ -27,6 +31,50 @@ def test_the_targets_own_light_is_part_of_the_constant_picture(tmp_path):
     error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
     assert error < 0.02  # `path` picks one of two lights: 1.6 % in a tile of 4096 samples
     assert got.min() > 0.09  # nothing is darker than the glow
+
+
+LAYERS = ["sheen_weight", "sheen_tint", "coat_weight", "coat_roughness", "coat_ior", "coat_tint", "emission_color"]
+
+
+def glowing_scene(tmp_path, strength, names):
+    sockets = {
+        "Emission Color": {"value": [0.5, 0.4, 0.2], "linked": False},
+        "Emission Strength": {"value": strength, "linked": False},
+        "Coat Roughness": {"value": 0.3, "linked": False},
+    }
+    materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": sockets, "film_exposure": 1.5}}
+    path = write_scene(tmp_path, POINT, shape=LAYERED_GLOW)
+    # of meshes, as exported targets are: from its own surface Mitsuba's sphere is sampled wrongly
+    path.write_text(path.read_text("utf-8").replace('type="sphere"', 'type="cube"'), "utf-8")
+    renderer = load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    return renderer, RecordedScene(renderer, int(renderer.target_mask().sum()))
+
+
+@pytest.mark.parametrize("free", [LAYERS, LAYERS[:-1]], ids=["emission free", "emission held"])
+def test_layers_dim_the_glow_in_picture_and_derivatives(tmp_path, free):
+    renderer, scene = glowing_scene(tmp_path, 2.0, ["base_color", *free])
+    table = renderer.table
+    recorded_for = table.pack({"base_color": 0.2, "emission_color": 0.9} if "emission_color" in free else {})
+    paths = scene.record(recorded_for, grid=10, seed=3, near=False)
+    groups = paths.tile_groups(paths.interior)
+    values = {
+        "base_color": (0.2, 0.1, 0.1), "sheen_weight": 0.5, "sheen_tint": (0.9, 0.5, 0.2), "coat_weight": 0.7,
+        "coat_roughness": 0.4, "coat_ior": 1.7, "coat_tint": (0.9, 0.7, 0.4), "emission_color": (0.5, 0.4, 0.2),
+    }  # fmt: skip
+    x = table.pack({name: value for name, value in values.items() if name in table.names})
+    evaluate = scene.evaluator(paths, groups)
+    got = evaluate(x)
+    expected = groups.average(renderer.image(x, seed=7, spp=256))
+    error = np.sqrt(np.mean((got[:, :, 0] - expected) ** 2) / np.mean(expected**2))
+    assert error < 0.01
+    assert got[:, :, 0].mean() < 0.9 * 2.0 * 1.5 * np.mean([0.5, 0.4, 0.2])  # most of it is the glow, which is dimmed
+    step = 1e-3
+    for k in range(table.length):
+        beside = np.eye(table.length)[k] * step
+        slope = (evaluate(x + beside)[:, :, 0] - evaluate(x - beside)[:, :, 0]) / (2 * step)
+        np.testing.assert_allclose(got[:, :, 1 + k], slope, atol=2e-3 * max(np.abs(slope).max(), 1.0))
 
 
 def test_free_emission_is_linear_in_picture_and_derivatives(tmp_path):

@@ -80,6 +80,41 @@ def test_alpha_has_the_slope_of_the_light_that_passes(tmp_path):
     np.testing.assert_allclose(column, (up - down).mean(axis=0) / 0.06, rtol=0.03, atol=0.003)
 
 
+def test_a_targets_own_light_is_dimmed_in_picture_and_derivatives(tmp_path):
+    """A cut-out, coated ball that glows, on a floor that it lights."""
+    sockets = {
+        "Emission Color": {"value": [0.5, 0.4, 0.2], "linked": False},
+        "Emission Strength": {"value": 1.5, "linked": False},
+        "Coat Tint": {"value": [0.9, 0.5, 0.3], "linked": False},
+    }
+    materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": sockets}}
+    glow = (
+        '<emitter type="blender_glow"><rgb name="radiance" value="0"/><boolean name="layered" value="true"/></emitter>'
+    )
+    path = write_scene(tmp_path, SKY + FLOOR, shape=glow, size=16, depth=8)
+    # of meshes, as exported targets are: from its own surface Mitsuba's sphere is sampled wrongly
+    path.write_text(path.read_text("utf-8").replace('type="sphere" id="target"', 'type="cube" id="target"'), "utf-8")
+    names = ["base_color", "coat_weight", "sheen_weight", "alpha", "emission_color"]
+    renderer = load_renderer(
+        path, "target", model="blender_principled", parameters=names, materials=materials, light_paths=LightPaths()
+    )
+    from mfo_backend.render.paths.traced_paths import TracedPaths
+
+    paths, pixels = TracedPaths(renderer), np.arange(256)
+    values = {"base_color": (0.6, 0.3, 0.2), "coat_weight": 0.8, "sheen_weight": 0.3, "alpha": 0.6}
+    x = renderer.table.pack({**values, "emission_color": (0.4, 0.5, 0.6)})
+    got = paths.images(x[None], pixels, seed=1, samples=1024, jacobian=False)[0, :, :, 0]
+    expected = renderer.image(x, seed=7, spp=4096).reshape(-1, 3)
+    on_target = renderer.target_mask().ravel()
+    for part in (on_target, ~on_target):
+        np.testing.assert_allclose(got[part].mean(axis=0), expected[part].mean(axis=0), rtol=0.01)
+    columns = paths.images(x[None], pixels, seed=1, samples=1024, jacobian=True)[0].mean(axis=0)[:, 1:]
+    for k in range(renderer.table.length):
+        h = 0.03 * np.eye(len(x))[k]
+        down, up = paths.images(np.stack([x - h, x + h]), pixels, seed=1, samples=1024, jacobian=False)[..., 0]
+        np.testing.assert_allclose(columns[:, k], (up - down).mean(axis=0) / 0.06, rtol=0.03, atol=0.003)
+
+
 def test_the_weight_of_clear_glass_has_derivatives_without_spikes(glass):
     renderer, paths, pixels = glass
     # hardly any diffuse lobe is left, and the derivative is mostly what it would add
