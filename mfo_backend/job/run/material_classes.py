@@ -28,10 +28,8 @@ from ...types.verdict import Cause, Judgement, Verdict
 GLASS = {"Transmission Weight": 1.0, "Metallic": 0.0, "Alpha": 1.0, "Roughness": 0.1, "Base Color": [0.9, 0.9, 0.9]}
 CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
 OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
-# Layers above the emission are off: recordings have no derivative of how they dim it
-GLOWING = OPAQUE | {"Coat Weight": 0.0, "Sheen Weight": 0.0, "Emission Color": [0.5, 0.5, 0.5]}
+GLOWING = OPAQUE | {"Emission Color": [0.5, 0.5, 0.5]}
 _OF_GLASS = ("transmission_weight", "ior")
-_ABOVE_EMISSION = tuple(name for name in BLENDER_PRINCIPLED.names if name.startswith(("coat_", "sheen_")))
 # A glow adds to every pixel, so none is darker but by noise; of the median of the target, which may be clipped
 MOST_GLOW = 2.0
 _AROUND = (Cause.LIGHT, Cause.SURROUNDINGS, Cause.PICTURE)  # where the surroundings differ
@@ -87,7 +85,7 @@ _CLASSES = (
 
 def _glowing(strength: float) -> MaterialClass:
     sockets = GLOWING | {"Emission Strength": strength}
-    return MaterialClass("glowing", sockets, ("emission_color",), (*_OF_GLASS, *_ABOVE_EMISSION), glows=True)
+    return MaterialClass("glowing", sockets, ("emission_color",), _OF_GLASS, glows=True)
 
 
 def brightest_glow(reference: Image, view: View, target: NDArray[np.bool_]) -> float:
@@ -97,19 +95,21 @@ def brightest_glow(reference: Image, view: View, target: NDArray[np.bool_]) -> f
 
 
 def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClass]:
-    """The classes that a material, as in request.json, is not of and may be changed to; none where links decide, or of
-    a mix of shaders.
+    """The classes that a material, as in request.json, may be changed to; none where links decide, or of a mix of
+    shaders.
 
-    The one that glows comes first, for its fit is the quickest; its emission is at most of the radiance `glow`.
+    Its own comes first if that changes more than a fit of `all` does. Then comes the one that glows, for its fit is the
+    quickest; its emission is at most of the radiance `glow`.
     """
     sockets = material["sockets"]
     if material.get("leaves"):
         return []
     own = _class_of(sockets)
-    classes = (_glowing(glow), *_CLASSES) if glow > 0.0 else _CLASSES
+    classes = sorted((_glowing(glow), *_CLASSES) if glow > 0.0 else _CLASSES, key=lambda other: other.name != own)
     return [
         other for other in classes
-        if other.name != own and not any(sockets.get(name, {}).get("linked") for name in other.sockets)
+        if (other.name != own or other.also)
+        and not any(sockets.get(name, {}).get("linked") for name in other.sockets)
     ]  # fmt: skip
 
 
