@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...bake.bake_cache import cache_folder
 from ...bake.baker import BakeError, Baker
-from ...bake.panorama import LEAST_WIDTH, MOST_WIDTH
+from ...bake.panorama import ALIKE, LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
 from ...probe.client import Probe
 from ...probe.light_path import OF_CAMERA
@@ -213,13 +213,19 @@ class SceneBakes:
             for index, sun in enumerate(answer["suns"])
         ]
         camera = picture(answer["camera"]) if "camera" in answer else None
-        data.world = replace(data.world, color=np.ones(3), pixels=light, lookup=None, camera_pixels=camera)
+        # Cycles sends no light samples to a world without a place to aim at, so what casts no shadow blocks its light
+        color, pixels = (light[0, 0].astype(np.float64), None) if _is_uniform(light) else (np.ones(3), light)
+        data.world = replace(data.world, color=color, pixels=pixels, lookup=None, camera_pixels=camera)
         data.lights += suns
         other = [name for name in answer["paths"] if name not in OF_CAMERA]
         if other:
             findings.note(
                 f"World '{world.name}' asks Light Path for {', '.join(other)}: the fit takes it as diffuse rays see it."
             )
+
+
+def _is_uniform(radiance: NDArray[np.float32]) -> bool:
+    return bool(np.ptp(radiance.reshape(-1, 3), axis=0).max() <= ALIKE * float(radiance.mean()))
 
 
 def _texels(camera: Camera, mesh: TriangleMesh) -> int:

@@ -4,7 +4,8 @@
 A shadow ray goes on through surfaces that are cut out by alpha, and loses what they do not let through. It sees no
 obstacle on the way to a lamp that casts no shadows (its property `shadow`), and a shape whose attribute
 `SHADOW_TRANSMISSION` is 1 is none; where that is 0 the shape blocks light whatever its alpha. Rays that a material has
-sent out see all of these as they are. Choose the variant before importing this.
+sent out see all of these as they are, and so does the light of a uniform world, to which Cycles sends no shadow rays
+(scene/light.cpp, `test_enabled_lights`). Choose the variant before importing this.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -24,6 +25,7 @@ from ...material.arrays.own_memory import own_memory
 from .smooth_facets import ShadowTerminator, shape_number, shape_table
 
 SHADOW_TRANSMISSION = "shadow_transmission"
+UNIFORM = "ConstantBackgroundEmitter"  # Mitsuba's class of the plugin `constant`
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class ShadowRays:
         self.terminator = ShadowTerminator.of(scene)
         self._scene = scene
         self._shadowless = [e for e in scene.emitters() if not getattr(e, "shadow", True)]
+        self._uniform = [e for e in scene.emitters() if e.class_name() == UNIFORM]
         self._marked = marked = [s for s in scene.shapes() if np.any(s.has_attribute(SHADOW_TRANSMISSION))]
         # of each shape: 1 more than what it lets through, or 0 where its material says it
         values = [1.0 + shape_number(s, SHADOW_TRANSMISSION) for s in marked]
@@ -75,7 +78,10 @@ class ShadowRays:
             return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0))
         made, limit = mi.UInt32(passages), dr.opaque(mi.UInt32, self.most)
         most = dr.select(limit > made, limit - made, 0)
-        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most)
+        asked = mi.Bool(True)
+        for world in self._uniform:
+            asked &= ds.emitter != mi.EmitterPtr(world)
+        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most, asked)
 
     def ends(self, si: mi.SurfaceInteraction3f, passages: mi.UInt32) -> mi.Bool | bool:
         """Whether a path that has gone straight through as many surfaces as it may has met a further one.
@@ -87,7 +93,10 @@ class ShadowRays:
         return si.is_valid() & (passages > 0) & (passages >= dr.opaque(mi.UInt32, self.most))
 
     @dr.syntax
-    def _followed(self, ray: mi.Ray3f, end: mi.Point3f, active: mi.Bool, of: mi.BSDFPtr, most: mi.UInt32) -> Passed:
+    def _followed(
+        self, ray: mi.Ray3f, end: mi.Point3f, active: mi.Bool, of: mi.BSDFPtr, most: mi.UInt32, asked: mi.Bool
+    ) -> Passed:
+        """What is left behind all surfaces on a ray; they are `asked` for marks or are as materials say."""
         scene, marks = self._scene, self._marks
         through, alpha, times, met = mi.Color3f(1), mi.Bool(False), mi.UInt32(0), mi.UInt32(0)
         while dr.hint(active, label="shadow rays"):
@@ -97,7 +106,7 @@ class ShadowRays:
             share = mi.Color3f(bsdf.eval_null_transmission(si, active))
             own = active & (bsdf == of)
             number = dr.reinterpret_array(mi.UInt32, si.shape)
-            known = active & (number < dr.opaque(mi.UInt32, dr.width(marks)))
+            known = active & asked & (number < dr.opaque(mi.UInt32, dr.width(marks)))
             mark = dr.gather(mi.Float, marks, number, known)
             marked = known & (mark > 0)
             own &= ~marked

@@ -155,6 +155,37 @@ def test_world_of_other_nodes_is_rendered_into_panoramas(scene: Any, export: Any
     np.testing.assert_allclose(light[1::2], 0.5 * towards + 0.5, atol=0.004)
 
 
+def test_a_uniform_world_of_other_nodes_is_one_colour(
+    scene: Any, export: Any, render_cycles: Any
+) -> None:
+    """Cycles sends light samples to a varying world alone: they pass a ball that casts no shadows, other light not."""
+    from .test_light_levels import floor, tiles
+    from .test_light_paths import picture_of, scene_reference
+
+    tree, background = world_nodes(scene)
+    group = bpy.data.node_groups.new("Inside", "ShaderNodeTree")
+    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    color, output = group.nodes.new("ShaderNodeRGB"), group.nodes.new("NodeGroupOutput")
+    color.outputs[0].default_value = (0.8, 0.5, 0.1, 1.0)
+    group.links.new(color.outputs[0], output.inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    tree.links.new(node.outputs[0], background.inputs["Color"])
+    scene.cycles.samples = 256
+    target = floor()
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.3, location=(0.6, 0.6, 0.3))
+    ball = bpy.context.object
+    ball.data.materials.append(new_material("Ball"))
+    ball.visible_shadow = False
+    expected = render_cycles()
+    report = export(target, reference=scene_reference(expected))
+    assert not list((report.folder / "textures").iterdir())
+    print(report.notes)
+    expected, found = tiles(expected), tiles(picture_of(report))
+    assert expected.min() < 0.8 * expected.max()  # the ball takes light from the floor
+    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.005)
+
+
 @pytest.mark.parametrize(
     ("coordinate", "is_said"), [("Window", True), ("Camera", True), ("Generated", False), ("transform", True)]
 )
