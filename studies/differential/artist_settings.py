@@ -274,6 +274,7 @@ def _stack(rig: Rig, draw: Draw) -> None:
     """Clear panes before the ball, as many as light passes or more."""
     rig.scene.cycles.transparent_max_bounces = int(draw.integers(0, 5))
     pane = rig.floor.copy()
+    pane.modifiers.clear()  # panes with the same particles would have faces in one plane
     pane.data = rig.floor.data.copy()
     material = rig.floor.data.materials[0].copy()
     pane.data.materials[0] = material

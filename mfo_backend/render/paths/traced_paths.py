@@ -217,14 +217,17 @@ class TracedPaths:
                 shine = self._lamps.met(ray, si, active, density=likely, camera=straight, sent_from=sent_from)
                 shine *= self._clamp(beta[0] * shine, depth >= 2)
                 total = [t + b * shine for t, b in zip(total, beta, strict=True)]
-            active = active & si.is_valid() & (s["left"] > 1) & ~last
+            active = active & si.is_valid() & ~last
+            scatters = active & (s["left"] > 1)
+            # behind its last bounce a path still goes straight on
+            active = active if self._shadows.lets_through else scatters
             # light sampled from here
             ds, value, times = sample_light(
-                scene, self._shadows, si, rng.pair(2 + 3 * depth), active,
+                scene, self._shadows, si, rng.pair(2 + 3 * depth), scatters,
                 None if alpha is None else self._bsdf, s["passages"],
             )  # fmt: skip
             wo = si.to_local(ds.d)
-            lit = active & (ds.pdf > 0.0)
+            lit = scatters & (ds.pdf > 0.0)
             if self._glow is not None:
                 lit &= ds.emitter != mi.EmitterPtr(self._glow)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
@@ -263,7 +266,8 @@ class TracedPaths:
                 total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight * left_over
                 if self._tangents.entries[k] == self._alpha_entry:
                     total[1 + k] += beta[0] * f_light[0] * weight * slope
-            usable = active & (pdf_next > 0.0)
+            is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
+            usable = active & (pdf_next > 0.0) & (scatters | ~is_bounce)
             inverse = dr.select(usable, dr.rcp(dr.maximum(pdf_next, 1e-30)), 0.0)
             new = [beta[0] * f_next[0] * inverse]
             for k in range(directions):
@@ -272,7 +276,6 @@ class TracedPaths:
             strongest = reduce(dr.maximum, (dr.max(dr.abs(c)) for c in new))
             active = usable & (strongest > 1e-5)
             # what goes straight through is still on its way from where it was sent out
-            is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
             passages = s["passages"] + dr.select(is_bounce, mi.UInt32(0), 1)
             counts = is_bounce | (not self._shadows.lets_through)
             after = {

@@ -126,14 +126,17 @@ class CyclesPath(RBIntegrator):
                 shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight, sent_from=sent_from)
                 shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
 
-            goes_on = active & si.is_valid() & (left > 1) & ~last
+            goes_on = active & si.is_valid() & ~last
+            scatters = goes_on & (left > 1)
+            # behind its last bounce a path still goes straight on
+            goes_on = goes_on if shadows.lets_through else scatters
             on_light = sampler.next_2d()
             if dr.hint(every_lamp, mode="scalar"):
-                direct = throughput * of_lamps(scene, shadows, si, on_light, goes_on, bounce == 0, passages)
+                direct = throughput * of_lamps(scene, shadows, si, on_light, scatters, bounce == 0, passages)
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
             else:
-                ds, light, _ = sample_light(scene, shadows, si, on_light, goes_on, None, passages)
-                lit = goes_on & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+                ds, light, _ = sample_light(scene, shadows, si, on_light, scatters, None, passages)
+                lit = scatters & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 if dr.hint(terminator.bends, mode="scalar"):
                     light *= terminator.bend(si, si.to_local(ds.d), lit)
                 with dr.resume_grad(when=not primal):
@@ -146,7 +149,8 @@ class CyclesPath(RBIntegrator):
             if dr.hint(terminator.bends, mode="scalar"):
                 ratio *= terminator.bend(si, bs.wo, goes_on)
             onward = si.spawn_ray(si.to_world(bs.wo))
-            goes_on &= dr.any(throughput * ratio != 0)
+            is_straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            goes_on &= dr.any(throughput * ratio != 0) & (scatters | is_straight)
 
             if dr.hint(primal, mode="scalar"):
                 radiance += shown + direct
@@ -161,7 +165,7 @@ class CyclesPath(RBIntegrator):
                         change += dr.forward_to(out)
 
             # a straight passage is no bounce of any kind
-            counts = goes_on & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            counts = goes_on & ~is_straight
             is_through = (bs.sampled_type & TRANSMITS) != 0
             is_diffuse = ((bs.sampled_type & DIFFUSE) != 0) & ~is_through
             diffuse[counts & is_diffuse] += 1
