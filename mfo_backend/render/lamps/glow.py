@@ -2,7 +2,8 @@
 """The light of a surface as Blender's have it: from both sides of every face.
 
 Mitsuba's `area` shines on one side. A second mesh for the other would be a surface of its own, at which glass refracts
-the wrong way. Choose the variant before importing this.
+the wrong way. Densities of light samples go by the faces' own normals, so what asks for one has to give it those.
+Choose the variant before importing this.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -12,10 +13,13 @@ the wrong way. Choose the variant before importing this.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+
+from .face_points import FacePoints
 
 
 class Glow(mi.Emitter):
@@ -51,7 +55,9 @@ class Glow(mi.Emitter):
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
     ) -> tuple[mi.DirectionSample3f, mi.Color3f]:
         """See `mi.Emitter`."""
-        ds = self.get_shape().sample_direction(it, sample, active)
+        points = self._points
+        aim = self.get_shape().sample_direction if points is None else points.sample
+        ds = aim(it, sample, active)
         ds.emitter = mi.EmitterPtr(self)
         active = active & (ds.pdf > 0.0)
         return ds, dr.select(active, self.eval_direction(it, ds, active) / ds.pdf, 0.0)
@@ -65,6 +71,12 @@ class Glow(mi.Emitter):
         si = mi.SurfaceInteraction3f(ds, it.wavelengths)
         si.wi = si.to_local(-ds.d)
         return dr.select(active, self.radiance.eval(si, active) * self.share(si, active, sampled=True), 0.0)
+
+    @cached_property
+    def _points(self) -> FacePoints | None:
+        """Points of a mesh with bent normals; Mitsuba has those of all other shapes."""
+        shape: Any = self.get_shape()
+        return FacePoints.of(shape) if isinstance(shape, mi.Mesh) and shape.has_vertex_normals() else None
 
     def to_string(self) -> str:
         """See `mi.Object`."""

@@ -323,6 +323,7 @@ def _sampled_lights(
     emitter = far.emitter(scene, valid)
     emission = emitter.eval(far, valid)
     ds = mi.DirectionSample3f(scene, far, si)
+    ds.n = far.n  # not the bent one
     light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
     weight = emission / (light_density + density)
     if lamps:

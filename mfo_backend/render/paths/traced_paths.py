@@ -194,6 +194,7 @@ class TracedPaths:
                 si.duv_dx = mi.Point2f(blur, 0.0)
             emitter = si.emitter(scene, active)
             ds = mi.DirectionSample3f(scene, si, s["before"])
+            ds.n = si.n  # not the bent one
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
             seen = dr.select(s["delta"], 1.0, self._share(s["density"], light))
             straight = depth == s["passages"]

@@ -110,6 +110,7 @@ class CyclesPath(RBIntegrator):
 
             # light that the last direction meets
             ds = mi.DirectionSample3f(scene, si, previous)
+            ds.n = si.n  # not the bent one
             beyond = active & (left < self.max_depth) if known else active
             seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)

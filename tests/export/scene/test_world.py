@@ -155,9 +155,7 @@ def test_world_of_other_nodes_is_rendered_into_panoramas(scene: Any, export: Any
     np.testing.assert_allclose(light[1::2], 0.5 * towards + 0.5, atol=0.004)
 
 
-def test_a_uniform_world_of_other_nodes_is_one_colour(
-    scene: Any, export: Any, render_cycles: Any
-) -> None:
+def test_a_uniform_world_of_other_nodes_is_one_colour(scene: Any, export: Any, render_cycles: Any) -> None:
     """Cycles sends light samples to a varying world alone: they pass a ball that casts no shadows, other light not."""
     from .test_light_levels import floor, tiles
     from .test_light_paths import picture_of, scene_reference

@@ -10,7 +10,8 @@ import pytest
 
 from mfo_backend.render.machine.variant import load_variant
 
-PANEL = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 0.0}}
+PANEL_BSDF = {"bsdf": {"type": "diffuse", "reflectance": 0.0}}
+PANEL = {"type": "rectangle", **PANEL_BSDF}
 COLOURS = np.linspace(0.1, 1.0, 2 * 3 * 3).reshape(2, 3, 3)
 
 
@@ -21,8 +22,10 @@ def mi():
 
     from mfo_backend.material.plugins import principled_plugin
     from mfo_backend.render.lamps import lamp_plugins
+    from mfo_backend.render.transport import cycles_path
 
     lamp_plugins.register()
+    cycles_path.register()
     principled_plugin.register()
     return mitsuba
 
@@ -86,3 +89,37 @@ def test_layers_above_take_their_part_where_they_are_asked(mi):
             shares.append(met)
         np.testing.assert_allclose(shares[0], 1.0, rtol=1e-6)
         assert np.all((shares[1] >= least - 1e-6) & (shares[1] <= most + 1e-6))
+
+
+def test_bent_normals_do_not_change_what_a_surface_sends_out(mi, tmp_path):
+    """A roof over a floor that has one normal for both of its sides: Mitsuba's light samples take it for flat."""
+    roof = mi.Mesh("roof", vertex_count=6, face_count=4, has_vertex_normals=True)
+    parameters = mi.traverse(roof)
+    corners = [
+        [-0.4, -0.4, 1.0],
+        [0.4, -0.4, 1.0],
+        [0.4, 0.0, 1.6],
+        [-0.4, 0.0, 1.6],
+        [-0.4, 0.4, 1.0],
+        [0.4, 0.4, 1.0],
+    ]
+    parameters["vertex_positions"] = np.ravel(corners).astype(np.float32)
+    parameters["faces"] = np.array([0, 1, 2, 0, 2, 3, 3, 2, 5, 3, 5, 4], np.uint32)
+    parameters.update()
+    roof.recompute_vertex_normals()
+    roof.write_ply(str(tmp_path / "roof.ply"))
+    look = mi.ScalarTransform4f().look_at(origin=[0, -4, 0.6], target=[0, 0, 0.5], up=[0, 0, 1])
+    film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+
+    def seen(**of_mesh):
+        glow = {"type": "blender_glow", "radiance": RGB}
+        scene = {
+            "type": "scene", "integrator": {"type": "cycles_path", "max_depth": 2},
+            "sensor": {"type": "perspective", "fov": 40, "to_world": look, "film": film},
+            "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(2), "bsdf": {"type": "diffuse"}},
+            "roof": {"type": "ply", "filename": str(tmp_path / "roof.ply"), "emitter": glow, **PANEL_BSDF, **of_mesh},
+        }  # fmt: skip
+        return np.array(mi.render(mi.load_dict(scene, parallel=False), spp=1024, seed=1))[10:]  # the floor alone
+
+    expected, got = seen(face_normals=True), seen()
+    np.testing.assert_allclose(got.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.01)
