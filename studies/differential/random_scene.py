@@ -312,5 +312,6 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("bump correction", _uncorrected, ("Bump Map Correction",)),
 )  # fmt: skip
 SETTINGS += ARTIST_SETTINGS
-PLAIN_WORDS = ("smooth over few faces",)  # of what the plain scene has at times
+# of what the plain scene has at times, and of what two settings make together
+PLAIN_WORDS = ("smooth over few faces", "casts no shadows")
 WORDS = {setting.name: setting.words for setting in SETTINGS}
