@@ -49,6 +49,17 @@ def test_the_last_surface_that_may_be_met_shows_its_own_light(mitsuba: Any, tmp_
     assert abs(outcome.difference.level) < 0.01
 
 
+def test_a_path_goes_straight_on_behind_its_last_bounce(mitsuba: Any, tmp_path: Path) -> None:
+    """A floor without bounces around a box that is cut out, in a uniform world: 0.4 % of all light was missing."""
+    from studies.differential.study import try_scene
+
+    outcome = try_scene(("max bounces", "box cut-out"), 40242, tmp_path, size=32, samples=256)
+    assert bpy.context.scene.cycles.max_bounces == 0
+    assert outcome.difference is not None
+    assert not outcome.difference.is_failure
+    assert abs(outcome.difference.level) < 0.0015
+
+
 def test_a_glowing_object_without_shadow_is_named(tmp_path: Path) -> None:
     from blender_addon.export.job import check_export
     from studies.differential.random_scene import build
