@@ -26,7 +26,7 @@ from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..transport.even_points import even_points
 from ..transport.shadow_rays import ShadowRays
-from ..transport.smooth_facets import seen_side
+from ..transport.smooth_facets import leaves_on, seen_side
 from ..transport.traced_radiance import traced_radiance
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .proposal import DefensiveProposal
@@ -316,7 +316,7 @@ def _sampled_lights(
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat)
     density = proposal.density(si.wi, wo, hits.coat)
-    valid = front & (wo.z > 0.0) & (density > 0.0)
+    valid = front & (wo.z > 0.0) & (density > 0.0) & leaves_on(si, wo, False)
     ray = si.spawn_ray(si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)

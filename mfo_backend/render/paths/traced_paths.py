@@ -37,7 +37,7 @@ from ..pictures.pass_counter import with_derivatives
 from ..transport.cycles_path import seen_world
 from ..transport.path_random import PathRandom
 from ..transport.shadow_rays import ShadowRays, left_of, sample_light
-from ..transport.smooth_facets import seen_side
+from ..transport.smooth_facets import leaves_on, seen_side
 from .tangents import Tangents
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
@@ -268,7 +268,8 @@ class TracedPaths:
                 if self._tangents.entries[k] == self._alpha_entry:
                     total[1 + k] += beta[0] * f_light[0] * weight * slope
             is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
-            usable = active & (pdf_next > 0.0) & (scatters | ~is_bounce)
+            usable = active & (pdf_next > 0.0)
+            usable &= ~is_bounce | (scatters & leaves_on(si, local, (kind & _TRANSMITS) != 0))
             inverse = dr.select(usable, dr.rcp(dr.maximum(pdf_next, 1e-30)), 0.0)
             new = [beta[0] * f_next[0] * inverse]
             for k in range(directions):

@@ -23,7 +23,7 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .shadow_rays import ShadowRays, sample_light
-from .smooth_facets import seen_side
+from .smooth_facets import leaves_on, seen_side
 
 PLUGIN_NAME = "cycles_path"
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
@@ -151,7 +151,9 @@ class CyclesPath(RBIntegrator):
                 ratio *= terminator.bend(si, bs.wo, goes_on)
             onward = si.spawn_ray(si.to_world(bs.wo))
             is_straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
-            goes_on &= dr.any(throughput * ratio != 0) & (scatters | is_straight)
+            is_through = (bs.sampled_type & TRANSMITS) != 0
+            goes_on &= dr.any(throughput * ratio != 0)
+            goes_on &= is_straight | (scatters & leaves_on(si, bs.wo, is_through))
 
             if dr.hint(primal, mode="scalar"):
                 radiance += shown + direct
@@ -167,7 +169,6 @@ class CyclesPath(RBIntegrator):
 
             # a straight passage is no bounce of any kind
             counts = goes_on & ~is_straight
-            is_through = (bs.sampled_type & TRANSMITS) != 0
             is_diffuse = ((bs.sampled_type & DIFFUSE) != 0) & ~is_through
             diffuse[counts & is_diffuse] += 1
             glossy[counts & ~is_diffuse & ~is_through] += 1

@@ -133,6 +133,16 @@ def seen_side(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     return si
 
 
+def leaves_on(si: mi.SurfaceInteraction3f, wo: mi.Vector3f, through: mi.Bool | bool) -> mi.Bool:
+    """Whether a sampled direction `wo` (shading frame) is on the side of the facet that its lobe sends light to.
+
+    Cycles drops samples that bent normals send to the other side, and evaluates light samples there all the same
+    (kernel/closure/bsdf_microfacet.h).
+    """
+    seen, sent = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, si.to_world(wo))
+    return ((seen * sent) < 0.0) == through
+
+
 def _barycentric(v: list[mi.Vector3f], p: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float]:
     """Weights of the corners `v` at the point `p` of their triangle."""
     a, b, c = v[1] - v[0], v[2] - v[0], p - v[0]
