@@ -41,6 +41,18 @@ def passed(*keeps: float | None) -> np.ndarray:
     return np.array(light).ravel() / np.array(free).ravel()
 
 
+@pytest.mark.parametrize(("bsdf", "lets"), [("diffuse", False), ("null", True)])
+def test_only_what_light_passes_is_followed_surface_by_surface(bsdf, lets) -> None:
+    from mfo_backend.render.transport import cycles_path
+    from mfo_backend.render.transport.shadow_rays import ShadowRays
+
+    cycles_path.register()
+    sheet = {"type": "rectangle", "bsdf": {"type": bsdf}}
+    scene = {"type": "scene", "integrator": {"type": "cycles_path"}, "lamp": LAMP, "sheet": sheet}
+    shadows = ShadowRays(mi.load_dict(scene))
+    assert (shadows.lets_through, shadows.plain) == (lets, not lets)
+
+
 @pytest.mark.parametrize(
     ("keeps", "left"),
     [
