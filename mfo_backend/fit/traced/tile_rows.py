@@ -96,7 +96,7 @@ class TileRows:
         return (sums / self._count[:, None].astype(np.float32)).reshape(len(self), *table.shape[1:])
 
     def rows(self, table: Rows) -> Rows:
-        """Weighted residual and derivatives (3 t, 1 + k) of pixels (p, 3, 1 + k), 0 for a clipped tile bright enough."""
+        """Weighted residual and derivatives (3 t, 1 + k) of pixels (p, 3, 1 + k), 0 for clipped tiles as bright."""
         tiles = self.means(table)
         tiles[..., 0] -= self.reference
         tiles[self.clipped & (tiles[..., 0] >= 0.0)] = 0.0
