@@ -23,10 +23,6 @@ class UnreadableImageError(Exception):
     """The pixels cannot be had; the message is the end of a sentence that starts with the image's name."""
 
 
-class MissingImageError(UnreadableImageError):
-    """The file of the pixels is missing."""
-
-
 @contextmanager
 def without_pixels() -> Iterator[None]:
     """Within it `read_pixels` refuses what it always refuses and gives one grey pixel for the rest, at once."""
@@ -75,7 +71,7 @@ def read_encoded(image: bpy.types.Image) -> NDArray[np.float32]:
         raise UnreadableImageError("is an EXR file of several layers; only single pictures are supported")
     width, height = image.size
     if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)):
-        raise MissingImageError("has no pixels (is its file missing? use File > External Data > Find Missing Files)")
+        raise UnreadableImageError("has no pixels (is its file missing? use File > External Data > Find Missing Files)")
     _refuse_colour_space(image)
     if _only_looking:
         return np.full((1, 1, 4), 0.5, dtype=np.float32)

@@ -29,7 +29,6 @@ from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
 from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, WITHOUT_SPECULAR, inputs_of, only_nearest
 from ..nodes.shader_graph import (
-    MissingPictureError,
     UnsupportedNodeError,
     plain_value,
     read_socket,
@@ -343,9 +342,7 @@ def _read(name: str, place: Place, material: str, is_target: bool, findings: Fin
     except UnsupportedNodeError as problem:
         if is_target:
             _refuse(name, place, material, findings, is_copied=True)
-        if isinstance(problem, MissingPictureError) and not is_target:
-            findings.error(f"{name} of material '{material}' is magenta in Cycles: it is linked to {problem}.")
-        elif not is_target:
+        else:
             findings.note(
                 f"{name} of material '{material}' is linked to {problem}, which cannot be exported; the "
                 "socket's own value is used."

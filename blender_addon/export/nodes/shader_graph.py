@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...versions import active_output
 from ..images.color_space import to_rec709
 from ..images.image_filter import filtered_pixels
-from ..images.image_pixels import MissingImageError, UnreadableImageError
+from ..images.image_pixels import UnreadableImageError
 from ..material_model import Socket, Texture
 
 MOST_NODES = 32  # between a picture and a socket, on all ways; Cycles evaluates what is larger
@@ -35,10 +35,6 @@ MATH = {
 
 class UnsupportedNodeError(Exception):
     """A node tree holds something that is not exported; the message names it, as part of a sentence."""
-
-
-class MissingPictureError(UnsupportedNodeError):
-    """A picture whose file is missing, for which Cycles shows magenta."""
 
 
 class Links:
@@ -241,8 +237,6 @@ def _image(node: bpy.types.Node, output: str) -> Texture:
         )
     try:
         pixels = filtered_pixels(node.image, node.interpolation, wrap, alpha_read=_is_read(node.outputs["Alpha"]))
-    except MissingImageError as problem:
-        raise MissingPictureError(f"the image '{node.image.name}' that {problem}") from None
     except UnreadableImageError as problem:
         raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     chosen = pixels[:, :, 3:4] if output == "Alpha" else pixels[:, :, :3]

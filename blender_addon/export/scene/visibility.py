@@ -80,9 +80,8 @@ def _first_hit(
         origin, direction = point - forward * (forward @ (point - world[:3, 3])), forward
     else:
         origin, direction = world[:3, 3], point - world[:3, 3]
-    unit = direction / np.linalg.norm(direction)
-    start = origin + unit * data.camera.clip_start / max(float(unit @ forward), 1e-6)
-    hit, _, _, face, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(unit))
+    start = origin + direction * (data.camera.clip_start / float(direction @ forward))
+    hit, _, _, face, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
     return (item if hit else None), face
 
 

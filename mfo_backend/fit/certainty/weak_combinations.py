@@ -32,8 +32,6 @@ def weak_combinations(
     """
     names = [name for name in table.names if name not in held and certainty[name].level is not Level.NOT_VISIBLE]
     entries = [i for name in names for i in range(*table.slice_of(name).indices(table.length))]
-    if len(names) < 2:
-        return ()
     # what is held does not vary: the others' covariance given its value
     precision = np.linalg.inv(spread + LEAST_VARIANCE * np.eye(len(spread)))[np.ix_(entries, entries)]
     variances, directions = np.linalg.eigh(np.linalg.inv(precision))

@@ -89,21 +89,20 @@ def run_stages(
     *,
     listener: Listener,
     should_stop: Callable[[], bool],
-    clock: Callable[[], float] = time.monotonic,
     began: float | None = None,
 ) -> StagesOutcome:
     """The stages: minimise the losses one after another, each from the best x of the one before.
 
-    `began` is the time on `clock` at which the fit began.
+    `began` is the fit's begin on the monotonic clock, now where it is not given.
     """
-    began = clock() if began is None else began
+    began = time.monotonic() if began is None else began
     candidates, reports, status = [start], [], Status.CONVERGED
     adam = _new_adam(renderer, settings)
     best = BestSoFar(renderer, listener, began)
     for index, loss in enumerate(losses):
         if not settings.keep_optimizer_state:
             adam = _new_adam(renderer, settings)
-        log = StageLog(renderer, loss.name, index, len(losses), listener, clock, began, best)
+        log = StageLog(renderer, loss.name, index, len(losses), listener, began, best)
         outcome = run_stage(
             renderer,
             loss.value_and_gradient,

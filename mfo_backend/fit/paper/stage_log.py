@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,13 +41,12 @@ class StageLog:
         index: int,
         count: int,
         listener: Listener,
-        clock: Callable[[], float],
         began: float,
         best: BestSoFar,
     ) -> None:
         self._renderer, self._name, self._index, self._count = renderer, name, index, count
-        self._listener, self._clock, self._began, self._best = listener, clock, began, best
-        self._entered = clock()
+        self._listener, self._began, self._best = listener, began, best
+        self._entered = time.monotonic()
         self._previewed = -np.inf
         self._unseen: Pixels | None = None
         self._fraction = 0.0
@@ -55,7 +54,7 @@ class StageLog:
 
     def __call__(self, step: Step) -> None:
         """Tell what one evaluated iterate says."""
-        now = self._clock()
+        now = time.monotonic()
         done = step.iteration / (step.iteration + step.more)
         self._fraction = max(self._fraction, (self._index + done) / self._count)
         in_stage = now - self._entered
@@ -90,7 +89,7 @@ class StageLog:
         self, status: Status, vector: NDArray[np.float64], loss_start: float, loss_best: float, *, iterations: int
     ) -> StageReport:
         """Tell the stage's end; `vector` holds its best values."""
-        self._best.tell(self._clock(), at_once=True)
+        self._best.tell(time.monotonic(), at_once=True)
         self._listener(StageEnd(self._name, status.value, status.sentence, iterations, loss_start, loss_best))
         return StageReport(
             name=self._name,
@@ -98,7 +97,7 @@ class StageLog:
             loss_start=loss_start,
             loss_best=loss_best,
             iterations=iterations,
-            seconds=self._clock() - self._entered,
+            seconds=time.monotonic() - self._entered,
             values=self._renderer.table.unpack(vector),
             curve=tuple(self._curve),
         )

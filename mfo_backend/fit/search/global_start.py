@@ -44,7 +44,6 @@ def scan(
     residuals: Callable[[Vector], NormalEquations],
     table: ParameterTable,
     scanned: Sequence[str],
-    evaluations: int = 4,
 ) -> list[ScanNode]:
     """All nodes of the scanned values, best first.
 
@@ -62,7 +61,7 @@ def scan(
             for name, value in {**hold, **dict(zip(held, values, strict=True))}.items():
                 part = table.slice_of(name)
                 start[part] = lower[part] = upper[part] = value
-            limits = SolveLimits(evaluations=evaluations, cost_change=1e-3, damping=1e-3)
+            limits = SolveLimits(evaluations=4, cost_change=1e-3, damping=1e-3)
             try:
                 solution = solve_bounded(residuals, start, lower, upper, limits)
             except ValueError:  # no finite numbers there: the node comes last

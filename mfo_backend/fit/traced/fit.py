@@ -58,17 +58,11 @@ class TracedRoute:
         If one of the settings' losses is not defined for the reference.
     """
 
-    def __init__(
-        self,
-        task: FitTask,
-        renderer: MitsubaRenderer,
-        begin: Vector | None = None,
-        plan: TransmissionPlan = TransmissionPlan(),  # noqa: B008  frozen
-    ) -> None:
+    def __init__(self, task: FitTask, renderer: MitsubaRenderer, begin: Vector | None = None) -> None:
         from ...render.paths.traced_paths import TracedPaths
 
         settings, encoding = task.settings, task.reference.encoding
-        self._task, self._renderer, self._plan, self._begin = task, renderer, plan, begin
+        self._task, self._renderer, self._plan, self._begin = task, renderer, TransmissionPlan(), begin
         self._paths = TracedPaths(renderer)
         self._seen_residuals = finishing_residuals(settings, encoding, task.light, task.mask, task.view)
         own = STAGES if begin is None else STAGES[2:]

@@ -95,17 +95,11 @@ class TileRows:
         sums = np.add.reduceat(table.reshape(len(self.pixels), -1), self.first, axis=0)
         return (sums / self._count[:, None].astype(np.float32)).reshape(len(self), *table.shape[1:])
 
-    def rows(self, table: Rows, seen: Rows | None = None) -> Rows:
-        """Weighted residual and derivatives (3 t, 1 + k) of pixels (p, 3, 1 + k).
-
-        `seen` (t, 3), a better estimate of the picture, decides whether a clipped tile is bright enough.
-        """
+    def rows(self, table: Rows) -> Rows:
+        """Weighted residual and derivatives (3 t, 1 + k) of pixels (p, 3, 1 + k), 0 for clipped tiles as bright."""
         tiles = self.means(table)
-        if self.clipped.any():
-            bright = (tiles[..., 0] if seen is None else seen) >= self.reference
-            tiles = tiles * ~(self.clipped & bright)[..., None]
-            tiles[..., 0] = np.where(self.clipped & bright, self.reference, tiles[..., 0])
         tiles[..., 0] -= self.reference
+        tiles[self.clipped & (tiles[..., 0] >= 0.0)] = 0.0
         return (tiles * self.weight[..., None]).reshape(3 * len(self), -1)
 
 

@@ -163,8 +163,7 @@ class BlenderPrincipled(mi.BSDF):
         view: Any = si.to_world(si.wi)
         side: Any = dr.mulsign(mi.Float(1), si.wi.z)
         smooth: Any = mi.Vector3f(si.sh_frame.n) * side
-        geometric = mi.Vector3f(si.n)
-        geometric = dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
+        geometric = _towards(view, si)
         given = {name: mi.Vector3f(texture.eval(si, active)) for name, texture in self.directions.items()}
 
         def normal(name: str, instead: mi.Vector3f) -> mi.Vector3f:
@@ -197,9 +196,7 @@ class BlenderPrincipled(mi.BSDF):
         """The normals of `bumped_frame`, the axes of its frame in the world, and in that frame the mesh's geometric
         normal, on the side of the view, and its own tangent."""
         frame, _, normals = self.bumped_frame(si, active)
-        view: Any = si.to_world(si.wi)
-        geometric = mi.Vector3f(si.n)
-        geometric = dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
+        geometric = _towards(si.to_world(si.wi), si)
         axes = {"frame_s": mi.Vector3f(frame.s), "frame_t": mi.Vector3f(frame.t), "frame_n": mi.Vector3f(frame.n)}
         own = {"geometric_normal": geometric, "own_tangent": mi.Vector3f(si.sh_frame.s)}
         return normals | axes | {name: frame.to_local(direction) for name, direction in own.items()}
@@ -295,6 +292,12 @@ class BlenderPrincipled(mi.BSDF):
         """Short description."""
         shown = ", ".join(f"{name}={getattr(self, name)}" for name in self.given)
         return f"BlenderPrincipled[{shown}]"
+
+
+def _towards(view: mi.Vector3f, si: mi.SurfaceInteraction3f) -> mi.Vector3f:
+    """The mesh's geometric normal on the side of the view."""
+    geometric = mi.Vector3f(si.n)
+    return dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
 
 
 def register() -> None:

@@ -321,6 +321,20 @@ def test_picture_files_of_a_saved_blend(scene: Any, export: Any, tmp_path: Any) 
     np.testing.assert_allclose(magenta["value"], (1.0, 0.0, 1.0), atol=1e-4)
 
 
+@pytest.mark.parametrize("socket", ["Base Color", "Subsurface Radius"])
+def test_a_missing_picture_keeps_no_target_from_a_fit(scene: Any, socket: str) -> None:
+    """Whether the model has the socket or not."""
+    world_color(scene, 1.0)
+    material = new_material("Target")
+    node = image_node(material, bpy.data.images.new("gone.png", 4, 4))
+    node.image.source, node.image.filepath = "FILE", "//gone.png"
+    material.node_tree.links.new(node.outputs["Color"], principled(material).inputs[socket])
+    add_camera("ORTHO", ortho_scale=2.0)
+    errors, notes = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
+    assert errors == []
+    assert [note for note in notes if "the image 'gone.png' of the node 'Image Texture' is missing" in note]
+
+
 def test_no_socket_is_dropped_in_silence(scene: Any) -> None:
     """Each is a parameter of the model, or a sentence; every link that is not exported is one, too."""
     assert silent_sockets() == []

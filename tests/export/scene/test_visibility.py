@@ -63,6 +63,20 @@ def test_a_gap_in_what_hides_it_is_found(faces: int, lit: Any, export: Any) -> N
         export(target)
 
 
+@pytest.mark.parametrize("kind", ["ORTHO", "PERSP"])
+@pytest.mark.parametrize(("clip_start", "is_seen"), [(0.9, False), (1.1, True)])
+def test_what_the_camera_clips_hides_nothing(kind: str, clip_start: float, is_seen: bool, lit: Any, export) -> None:
+    """A lid a metre before the camera, which looks past the target's middle."""
+    lit.data.type, lit.data.clip_start, lit.location.x = kind, clip_start, 0.3
+    target = add_quad("Target", 1.0, 0.0, new_material("Paint"))
+    add_quad("Lid", 3.0, 4.0, new_material("Lid"))
+    if is_seen:
+        export(target)
+    else:
+        with pytest.raises(ExportError, match="hidden behind 'Lid'"):
+            export(target)
+
+
 def test_an_object_may_hide_its_own_slot(lit: Any, export: Any) -> None:
     """A small square of another material below a large one of the same object."""
     corners = [(x * s, y * s, z) for s, z in ((0.2, 0.0), (0.5, 1.0)) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]

@@ -9,7 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.alike.exchanges import F0_OF_LEVEL, best_basin, metal_exchanged, metal_rivals, moved, width_rivals
+from mfo_backend.fit.alike.exchanges import (
+    F0_OF_LEVEL,
+    best_basin,
+    metal_exchanged,
+    metal_rivals,
+    moved,
+    taken_for,
+    width_rivals,
+)
 from mfo_backend.fit.squares.residuals import normal_equations
 from mfo_backend.render.paths.recorded_image import TwoSamples
 from mfo_backend.solve.bounded_least_squares import SolveLimits, solve_bounded
@@ -111,6 +119,15 @@ def test_a_flat_lobe_that_stands_for_a_metals_share_is_found_out():
 
 def test_where_nothing_is_flat_no_flat_lobe_stands_for_anything():
     assert list(moved(vector(FLAT, base_color=0.5, flatness=0.001, metallic=0.0), FLAT)) == []
+
+
+@pytest.mark.parametrize(("metallic", "other"), [(0.1, 0.98), (0.45, 0.98), (0.55, 0.02), (0.9, 0.02)])
+def test_where_light_is_sampled_a_metal_is_first_taken_for_a_dielectric(metallic, other):
+    x = vector(PLAIN, base_color=0.3, metallic=metallic, roughness=0.4, specular=0.5)
+    (taken,) = taken_for(x, PLAIN)
+    np.testing.assert_allclose(taken, [0.3, 0.3, 0.3, other, 0.4, 0.5])
+    dark, brighter = taken_for(vector(FLAT, base_color=0.5, flatness=0.6, metallic=0.0), FLAT)
+    np.testing.assert_allclose([dark, brighter], [[0.5, 0.6, 0.98], [0.5, 0.0, 0.5]])
 
 
 @pytest.mark.parametrize("metallic", [0.3, 0.9])

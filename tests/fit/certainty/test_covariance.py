@@ -97,6 +97,15 @@ def test_an_exact_fit_still_has_the_error_of_the_model():
     assert (sd > 0.02).all()
 
 
+def test_the_unit_of_the_residuals_does_not_matter():
+    random = np.random.default_rng(7)
+    jacobian = random.normal(size=(100, 3, 4)) * [1.0, 0.5, 2.0, 0.01]
+    rows = with_residual(jacobian, random.uniform(0.5, 1.0, (100, 3)))
+    found = covariance(rows, None, TABLE, 0.05)
+    for unit in (1e-3, 1e3):
+        np.testing.assert_allclose(covariance(unit * rows, None, TABLE, unit * 0.05), found, rtol=1e-9, atol=1e-15)
+
+
 def test_the_levels_have_the_stated_limits():
     levels = certainties(np.array([0.01, 0.019, 0.01, 0.299]), TABLE)
     assert (levels["colour"].level, levels["width"].level) == (Level.DETERMINED, Level.WEAK)

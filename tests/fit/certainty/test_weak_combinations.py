@@ -52,6 +52,13 @@ def test_says_nothing_of_sure_single_held_and_invisible_values():
     assert combinations(along([0, 0, 0, 1, 0, 0], 0.1)) == ()
     assert combinations(along([0, 0, 0, 1, -1, 0], 0.1), held=("coat_weight",)) == ()
     assert combinations(along([0, 0, 0, 1, -1, 0], 0.9)) == ()  # both not visible
+    assert combinations(along([1, -1, 0, 0, 0, 0], 0.1), held=TABLE.names[1:]) == ()  # one colour alone
+    assert combinations(along([0, 0, 0, 1, -1, 0], 0.1), held=TABLE.names) == ()
+
+
+def test_two_values_are_enough():
+    (weak,) = combinations(along([0, 0, 0, 1, -1, 0], 0.1), held=("base_color", "metallic"))
+    assert set(weak.parameters) == {"roughness", "coat_weight"}
 
 
 def test_channels_that_move_as_one_are_no_trouble():

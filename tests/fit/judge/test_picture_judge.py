@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mfo_backend.fit.judge.minimise_flip import minimise_flip
+from mfo_backend.fit.judge.minimise_flip import EVALUATIONS, minimise_flip
 from mfo_backend.fit.judge.picture_judge import PictureJudge, _MaskedBlur
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.display.tone_mapping import DisplayView
@@ -131,6 +131,23 @@ def test_flip_is_lowered_inside_the_box_and_never_raised():
     assert told[0] == pytest.approx(measure.value(picture(start)[0]))
     assert value == min(told) < 0.5 * told[0]
     assert np.all((x >= lower) & (x <= upper))
+
+
+def test_flip_is_asked_a_limited_number_of_times():
+    """Of the valley of H. Rosenbrock (1960), which takes far more steps."""
+    told = []
+
+    class Valley:
+        def value_and_gradient(self, image):
+            x, y = image
+            slope = np.array([-400.0 * x * (y - x**2) - 2.0 * (1.0 - x), 200.0 * (y - x**2)])
+            return 100.0 * (y - x**2) ** 2 + (1.0 - x) ** 2, slope
+
+    start, box = np.array([-1.2, 1.0]), (np.full(2, -2.0), np.full(2, 2.0))
+    options = {"on_value": lambda x, value: told.append((tuple(x), value)), "should_stop": lambda: False}
+    x, value = minimise_flip(Valley(), lambda x: (x, lambda gradient: gradient), start, *box, **options)
+    assert len(told) == EVALUATIONS
+    assert (tuple(x), value) == min(told, key=lambda seen: seen[1])
 
 
 def test_flip_stage_survives_numbers_that_are_not_finite():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from mfo_backend.fit.judge.beyond_noise import beyond_noise
+from mfo_backend.fit.judge.beyond_noise import APART, NEXT, beyond_noise
 from mfo_backend.fit.judge.verdict import difference_of, is_worse, judge
 from mfo_backend.metrics.display.colour import srgb_from_linear
 from mfo_backend.metrics.display.tone_mapping import DisplayView
@@ -71,6 +71,17 @@ def test_what_neighbours_share_is_found_in_noise_of_any_size():
         found = beyond_noise(noisy(level, share, 1), noisy(np.full_like(level, other), share, 2), MASK)
         assert found.shared == pytest.approx(apart, rel=0.02 + 2.0 * share)
         assert found.shared_at_least <= found.shared
+
+
+@pytest.mark.parametrize("lags", [APART, NEXT], ids=["apart", "next"])
+def test_pictures_that_are_mirrored_share_as_much(lags):
+    """Of a difference in stripes along one diagonal."""
+    reference = scene()
+    result = reference * (1.0 + 0.3 * ((ROWS + COLUMNS) % 7 < 2))[..., None]
+    found = beyond_noise(reference, result, MASK, lags)
+    mirrored = beyond_noise(reference[:, ::-1], result[:, ::-1], MASK[:, ::-1], lags)
+    assert mirrored.shared == pytest.approx(found.shared, rel=1e-3)
+    assert mirrored.fine_at_least == pytest.approx(found.fine_at_least, rel=1e-3)
 
 
 def of_few_samples(picture, samples, seed):

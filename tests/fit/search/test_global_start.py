@@ -128,6 +128,25 @@ def test_starts_stay_inside_narrow_limits():
     np.testing.assert_allclose(starts, [[0.5, 0.2], [0.5, 0.4]])  # roughness, metallic
 
 
+def test_starts_are_in_the_middle_of_the_box_but_for_what_they_hold():
+    table = ParameterTable((*TABLE, Parameter("ior", 1, 1.0, 2.0, 1.2)))
+    starts, scanned = [], []
+
+    def solve(start):
+        starts.append(start)
+        return Solution(start, NormalEquations(1.0, np.zeros(6), np.eye(6)), (1.0,), True)
+
+    def flat(x):
+        scanned.append(x)
+        return NormalEquations(1.0, np.zeros(6), np.eye(6))
+
+    agreeing_ends(solve, table, SCANNED, 1.02)
+    scan(flat, table, SCANNED)
+    assert len(scanned) >= 16  # eight widths of dielectrics and of metals
+    for start in (*starts, *scanned):
+        np.testing.assert_allclose(start[[0, 1, 2, 5]], [0.5, 0.5, 0.5, 1.5])
+
+
 def test_the_scan_finds_the_lower_basin():
     nodes = scan(squares(two_basins), TABLE, SCANNED)
     assert [node.cost for node in nodes] == sorted(node.cost for node in nodes)

@@ -72,6 +72,14 @@ def test_a_start_that_solves_it_ends_the_race():
     assert both.evaluations == first.evaluations
 
 
+@pytest.mark.parametrize(("share", "ends"), [(0.9, True), (1.1, False)])
+def test_the_race_ends_below_the_root_mean_square_of_a_solved_problem(share, ends):
+    first, both = (Valleys(0.5 * (share * PLAN.solved_rms) ** 2) for _ in range(2))
+    first.race(0.4)
+    both.race(0.4, -0.5)
+    assert (both.evaluations == first.evaluations) is ends
+
+
 def test_an_unfinished_trial_goes_on():
     hurried = replace(PLAN, trial_evaluations=2)
     (best,) = Valleys(1e-4).race(2.9, plan=hurried)

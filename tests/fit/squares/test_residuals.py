@@ -86,6 +86,13 @@ def test_the_relative_residual_is_unbiased_under_noise_of_the_reference():
     assert log_values.mean() > 0.05  # which is why it is used
 
 
+def test_a_relative_residual_is_relative_to_the_image_and_a_tenth_of_the_mean_reference():
+    reference = np.array([[0.1, 0.2, 0.6]], np.float32)  # of the mean 0.3
+    values, slope = RelativeResidual(reference)(np.array([[0.17, 0.07, 0.6]], np.float32))
+    np.testing.assert_allclose(values, [[0.07 / 0.2, -0.13 / 0.1, 0.0]], rtol=1e-5)
+    np.testing.assert_allclose(slope, [[1.0 / 0.2, 1.0 / 0.1, 1.0 / 0.63]], rtol=1e-5)
+
+
 def test_weighted_residual_has_its_slope_and_bounds_what_one_outlier_counts():
     weight = np.full(REFERENCE.shape, 5.0)
     residual = WeightedResidual(REFERENCE, weight)

@@ -13,6 +13,8 @@ import pytest
 
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.job.folder.job_folder import JobFolder
+from mfo_backend.job.folder.material_request import MOST_LEAVES
+from mfo_backend.job.folder.mix_request import MOST_FACTORS, MOST_WAYS
 from mfo_backend.job.folder.request import read_request, request_from_json, request_to_json
 from mfo_backend.job.folder.view_request import ViewTable
 from mfo_backend.metrics.display.tone_mapping import DisplayView
@@ -199,6 +201,25 @@ def test_a_wrong_mix_is_one_sentence(request_data: dict, path: str, value: objec
     assert_one_sentence(caught.value)
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "most", "entry"),
+    [
+        ("leaves", MOST_LEAVES, {"name": "Diffuse", "sockets": {}}),
+        ("factors", MOST_FACTORS, {"name": "Mix/Factor {}", "value": 0.5}),
+        ("ways", MOST_WAYS, {"share": 1.0}),
+    ],
+)
+def test_a_mix_is_as_large_as_its_limit(request_data: dict, key: str, most: int, entry: dict) -> None:
+    def read(count: int) -> Any:
+        entries = [{k: v.format(n) if isinstance(v, str) else v for k, v in entry.items()} for n in range(count)]
+        request_data["materials"] = {"glaze": {"name": "Glaze", "sockets": {}, key: entries}}
+        return request_from_json(request_data).materials["glaze"]
+
+    assert len(getattr(read(most), key)) == most
+    with pytest.raises(BadInputError, match=f"a list of at most {most}"):
+        read(most + 1)
 
 
 @pytest.mark.parametrize("data", [None, [], "x", 3])

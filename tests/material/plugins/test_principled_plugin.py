@@ -80,6 +80,17 @@ def test_changing_a_weight_brings_its_lobe_back() -> None:
     np.testing.assert_allclose(value, (0.358997, 0.246803, 0.201926), rtol=1e-5)
 
 
+def test_changed_values_are_no_literals_of_a_kernel() -> None:
+    """Each value of a fit would be a kernel of its own."""
+    bsdf = mi.load_dict({"type": "blender_principled", "base_color": COLOUR})
+    params = mi.traverse(bsdf)
+    for name, value in (("roughness", mi.Float(0.3)), ("coat_weight", mi.Float(1.0)), ("base_color", mi.Color3f(0.4))):
+        params[name] = value
+    params.update()
+    assert [getattr(bsdf, name).state for name in ("roughness", "coat_weight")] == [dr.VarState.Evaluated] * 2
+    assert bsdf.base_color.x.state == dr.VarState.Evaluated
+
+
 def test_textures_are_read_at_the_point() -> None:
     data = np.full((4, 4, 1), 0.2, np.float32)
     data[:2, :2] = 0.7

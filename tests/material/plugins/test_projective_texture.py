@@ -85,3 +85,5 @@ def test_a_bump_is_mirrored_on_the_side_that_the_camera_does_not_see(tmp_path: P
         frame, _, normals = bsdf.bumped_frame(seen_along((0.2, 0.1, z)), mi.Bool(True))
         found = np.array(frame.to_world(normals["bumped_normal"])).ravel()
         np.testing.assert_allclose(found, (0.6, 0.0, 0.8 * z), atol=1e-6)
+        mesh = bsdf.directions_at(seen_along((0.2, 0.1, z)), mi.Bool(True))["geometric_normal"]
+        np.testing.assert_allclose(np.array(frame.to_world(mesh)).ravel(), (0.0, 0.0, z), atol=1e-6)

@@ -20,9 +20,9 @@ AS_CYCLES = LightPaths(
 )
 
 
-def traced(folder, light_paths=None):
+def traced(folder, light_paths=None, depth=8):
     materials = {"target_bsdf": {"name": "Glass", "distribution": "MULTI_GGX", "sockets": {}}}
-    path = write_scene(folder, SKY + FLOOR, size=16, depth=8)
+    path = write_scene(folder, SKY + FLOOR, size=16, depth=depth)
     renderer = load_renderer(
         path, "target", model="blender_principled", parameters=NAMES, materials=materials, light_paths=light_paths
     )
@@ -44,6 +44,11 @@ def test_the_picture_is_that_of_the_path_tracer(tmp_path, light_paths):
     expected = renderer.image(x, seed=7, spp=1024).reshape(-1, 3)[pixels]
     np.testing.assert_allclose(got.mean(axis=0), expected.mean(axis=0), rtol=0.01)  # 170 000 paths each
     assert np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2)) < 0.08  # noise of 1024 paths a pixel
+
+
+@pytest.mark.parametrize(("limit", "most"), [(-1, 32), (7, 7), (32, 32), (40, 32)])
+def test_paths_end_where_the_scene_says_and_after_32_surfaces(tmp_path, limit, most):
+    assert traced(tmp_path, depth=limit)[1]._depth == most
 
 
 def test_derivatives_are_those_of_the_mean_picture(glass):

@@ -1,12 +1,57 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which sampled directions leave on their own side of a facet with a bent normal. Oracle: the signs by hand."""
+"""Normals bent to the side that is seen, by what they are to do: a mirrored view just above the triangle. Directions that
+leave on their own side of it, by signs."""
 
 from __future__ import annotations
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from mfo_backend.render.machine.variant import load_variant
+
+VARIANT, COUNT = load_variant(), 2000
+
+
+@pytest.fixture(autouse=True)
+def _variant() -> None:
+    if mi.variant() != VARIANT:
+        mi.set_variant(VARIANT)
+
+
+def unit(z_from: float, seed: int) -> np.ndarray:
+    """Directions (3, COUNT) whose z is at least `z_from`."""
+    draw = np.random.default_rng(seed)
+    z, turn = draw.uniform(z_from, 1.0, COUNT), draw.uniform(0.0, 2.0 * np.pi, COUNT)
+    return np.stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z])
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["front", "back"])
+def test_the_mirrored_view_is_above_the_triangle(side: float) -> None:
+    from mfo_backend.render.transport.smooth_facets import seen_side
+
+    view, normal = side * unit(0.02, 1), unit(0.3, 2)
+    si = dr.zeros(mi.SurfaceInteraction3f, COUNT)
+    si.n = mi.Normal3f(0.0, 0.0, 1.0)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(*normal))
+    before = np.array(si.sh_frame.s)
+    si.wi = si.to_local(mi.Vector3f(*view))
+    found = seen_side(si)
+    s, t, n = (np.array(axis) for axis in (found.sh_frame.s, found.sh_frame.t, found.sh_frame.n))
+    least = np.minimum(0.9 * np.abs(view[2]), 0.01)
+    facing = side * normal
+    bent = side * (2.0 * (facing * view).sum(axis=0) * facing - view)[2] < least
+    assert 0.1 < bent.mean() < 0.9
+    np.testing.assert_array_equal(n[:, ~bent], normal.astype(np.float32)[:, ~bent])
+    mirrored = 2.0 * (n * view).sum(axis=0) * n - view
+    np.testing.assert_allclose(side * mirrored[2, bent], least[bent], atol=2e-4)
+    # a right-handed frame in which the view is the one there was, whose s is the old one without the normal's part
+    np.testing.assert_allclose(np.cross(n, s, axis=0), t, atol=1e-5)
+    np.testing.assert_allclose([(n * s).sum(axis=0), (s * s).sum(axis=0) - 1.0], 0.0, atol=1e-5)
+    along = before - n * (n * before).sum(axis=0)
+    np.testing.assert_allclose(s, along / np.linalg.norm(along, axis=0), atol=1e-3)
+    np.testing.assert_allclose(np.array(found.to_world(found.wi)), view, atol=1e-5)
 
 
 @pytest.mark.parametrize("flipped", [False, True], ids=["seen from outside", "its back is seen"])
@@ -16,10 +61,6 @@ from mfo_backend.render.machine.variant import load_variant
 )
 def test_a_direction_leaves_on_the_side_of_the_facet(degrees, through, leaves, flipped):
     """The shading normal is turned by 30 degrees from the facet's, so a lobe about it reaches 30 degrees below that."""
-    load_variant()
-    import drjit as dr
-    import mitsuba as mi
-
     from mfo_backend.render.transport.smooth_facets import leaves_on
 
     si = dr.zeros(mi.SurfaceInteraction3f)
