@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Normals bent to the side that is seen, by what they are to do: a mirrored view just above the triangle. Directions that
-leave on their own side of it, by signs."""
+"""Normals bent to the side that is seen: by what they are to do, a mirrored view just above the triangle.
+
+Directions that leave on their own side of a triangle: by signs.
+"""
 
 from __future__ import annotations
 
