@@ -8,7 +8,7 @@ import bpy
 from ..result import comparison, previews, shown_result
 from ..running import cycles_check
 from ..sentences.translated import translated
-from .layout import draw_messages, draw_numbers, draw_pictures, draw_sentence, pair
+from .layout import draw_messages, draw_numbers, draw_pictures, draw_sentence, buttons_side_by_side
 
 
 class Compare:
@@ -29,13 +29,13 @@ class Compare:
         draw_pictures(layout, context, ("reference", "start", "result"), clickable=True)
         _draw_each_picture(layout)
         column = layout.column(align=True)
-        row = pair(column, context)
+        row = buttons_side_by_side(column, context, "Side by Side", "Split")
         row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
         row.operator("mfo.show_pictures", text="Split", icon="ARROW_LEFTRIGHT").show = "split"
         if comparison.has_split():
             column.prop(runtime, "split", slider=True)
         _draw_cycles(layout, context, runtime)
-        row = pair(layout, context)
+        row = buttons_side_by_side(layout, context, "Report", "Load Result")
         row.operator("mfo.open_report", text="Report", icon="URL")
         row.operator("mfo.open_job", text="Load Result", icon="FILE_FOLDER")
         header, body = layout.panel("mfo_numbers", default_closed=True)

@@ -12,9 +12,11 @@ from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
 from ..sentences.translated import translated
 from ..translations import CONTEXT
-from .layout import draw_pictures, draw_sentence, letters
+from .layout import BOX, BUTTON, UNIT, draw_pictures, draw_sentence, fits, room
 
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
+
+_JOINT = " · "  # between what is done, how far it is and the time left
 
 
 class Run:
@@ -30,7 +32,7 @@ class Run:
         if running_job.current is not None:
             _draw_progress(layout, context)
         elif running_export.current is not None:
-            _draw_export(layout)
+            _draw_export(layout, context)
         _draw_buttons(layout, context)
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
@@ -44,7 +46,7 @@ class Run:
             body.prop(settings, "max_iterations")
         _draw_queue(layout, context)
         if has_trouble():
-            draw_setup(layout, width=letters(context))
+            draw_setup(layout, context, width=room(context) - BOX)
         _draw_end(layout, context)  # a result of an earlier day needs no backend
 
 
@@ -78,24 +80,30 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
 
 
-def _draw_export(layout: bpy.types.UILayout) -> None:
+def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What is waited for, how long already, and the way out."""
-    row = layout.row(align=True)
-    row.scale_y = 1.4
     seconds = running_export.seconds()
     share = seconds / (seconds + _USUAL_SECONDS)  # how long it takes is not known
     text = bpy.app.translations.pgettext_iface("Cycles prepares the scene")
-    row.progress(factor=share, type="BAR", text=f"{text} · {seconds:.0f} s")
+    _draw_bar(layout, context, share, f"{text} · {seconds:.0f} s")
+
+
+def _draw_bar(layout: bpy.types.UILayout, context: bpy.types.Context, share: float, text: str) -> None:
+    """How far it is, and the way out; what is done has a line of its own where it would cost the time left its room."""
+    done, joint, rest = text.partition(_JOINT)
+    if joint and not fits(context, room(context) - UNIT - BUTTON, text):
+        layout.label(text=done, translate=False)
+        text = rest
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    row.progress(factor=share, type="BAR", text=text)
     row.operator("mfo.cancel", text="", icon="X")
 
 
 def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     runtime = context.window_manager.mfo_runtime
     column = layout.column()
-    row = column.row(align=True)
-    row.scale_y = 1.4
-    row.progress(factor=runtime.fraction, type="BAR", text=translated(runtime.progress_text))
-    row.operator("mfo.cancel", text="", icon="X")
+    _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text))
     if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
         column.label(text=translated(f"Of material {runtime.material}"), icon="MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))

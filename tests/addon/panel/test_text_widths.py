@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: Apache-2.0
+"""No text of the panel is cut at the width that the sidebar has in a new Blender, nor at the least that is usual."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from ..test_operators import fit, runtime
+from .laid_out import AROUND, HEADER, SUB_HEADER, Cut, Layout
+
+DEFAULT, LEAST = 280, 220  # pixels at a scale of 1
+LANGUAGES = ("en_US", "de_DE", "fr_FR")
+PROGRESS = tuple(
+    f"{stage} · {share} · {left} left"
+    for stage in ("Exploring", "Refining")
+    for share in ("7%", "100%")
+    for left in ("5 s", "59 s", "12 min", "100 min")
+)
+FIXED_TEXTS = ("Starting", "Cancelling", "Checking the values")
+
+
+def in_language(language: str, text: str, context: str) -> str:
+    """A label as a Blender of this language would show it."""
+    from blender_addon.translations import CONTEXT, LANGUAGES
+
+    known = LANGUAGES.get(language, {})
+    return known.get((context, text), known.get((CONTEXT, text), text))
+
+
+class Words:
+    """A language of the interface, and how wide its texts are."""
+
+    def __init__(self, language: str, scale: float, context: Any) -> None:
+        self.language, self.scale, self.context = language, scale, context
+
+    def __call__(self, text: str, context: str) -> str:
+        return in_language(self.language, text, context)
+
+    def measure(self, text: str) -> float:
+        """In pixels at a scale of 1, as drawn at this one."""
+        import blf
+
+        blf.size(0, 11.0 * self.scale)
+        return blf.dimensions(0, text)[0] / self.scale
+
+
+def cut(scene: SimpleNamespace, language: str, width: float, scale: float) -> list[Cut]:
+    """What would be cut of all that the panels draw."""
+    from blender_addon.panel import _BODIES, reference
+
+    context = scene.bpy.context
+    narrow = SimpleNamespace(
+        scene=context.scene,
+        object=context.object,
+        view_layer=context.view_layer,
+        window_manager=context.window_manager,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=scale), addons=context.preferences.addons),
+        region=SimpleNamespace(width=width * scale),
+        selected_objects=[context.object],
+    )
+    words, found = Words(language, scale, narrow), []
+    for body in (reference.Reference, *_BODIES):
+        if hasattr(body, "poll") and not body.poll(narrow):
+            continue
+        panel: Any = SimpleNamespace(layout=Layout(words, "header"))
+        if hasattr(body, "draw_header"):
+            body.draw_header(panel, narrow)
+        else:
+            panel.layout.label(text=body.bl_label)
+        found += panel.layout.cut(width - AROUND - SUB_HEADER, words.measure)
+        panel.layout = Layout(words)
+        body.draw(panel, narrow)
+        found += panel.layout.cut(width - AROUND, words.measure)
+    return found
+
+
+State = Callable[[SimpleNamespace, pytest.MonkeyPatch], Iterator[None]]
+
+
+def with_problems(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.check import preflight
+
+    scene.bpy.context.scene.mfo.reference_path = scene.reference
+    scene.bpy.context.scene.render.use_border = True
+    scene.bpy.context.scene.camera = None
+    scene.bpy.context.scene.render.resolution_x = 1920
+    preflight.check_now(scene.bpy.context.scene, scene.bpy.context.view_layer)
+    yield
+
+
+def while_it_exports(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.running import running_export
+
+    patch.setattr(running_export, "current", object())
+    patch.setattr(running_export, "seconds", lambda: 188.0)
+    yield
+
+
+def while_it_runs(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.result import previews
+    from blender_addon.running import running_job
+
+    patch.setattr(running_job, "current", object())
+    patch.setattr(previews, "icon", lambda name: 1)
+    runtime(scene).material = "Glaze"
+    for text in (*PROGRESS, *FIXED_TEXTS):
+        runtime(scene).progress_text = text
+        yield
+
+
+def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.properties import SOCKET_ITEMS
+    from blender_addon.result import previews
+    from blender_addon.result.comparison import has_split
+    from blender_addon.running import cycles_check
+
+    fit(scene)
+    fit(scene)
+    names = [name for _, name, *_ in SOCKET_ITEMS] + ["Color Ramp/Stop 0", "Noise Texture/Scale", "Mix/Factor"]
+    shown = runtime(scene)
+    for i, name in enumerate(names):
+        row = shown.values.add()
+        row.name, row.start, row.result = name, "0.125", "-0.312"
+        row.sureness = 0.5 if i % 2 else -1.0
+    patch.setattr(previews, "icon", lambda name: int(not name.lstrip("-0").startswith(".")))
+    yield
+    shown.cycles_text, shown.cycles_flip = "FLIP in Cycles: 0.0234", 0.02
+    yield
+    scene.bpy.ops.mfo.apply()
+    for shows in (True, False):
+        scene.bpy.context.object.active_material.mfo.shows_original = shows
+        yield
+    kept = scene.bpy.context.object.active_material.mfo.history
+    kept[0].partial = True
+    yield
+
+
+def with_chosen_values(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.properties import MODEL_ITEMS, PARAMETER_ITEMS, SOCKET_ITEMS, toggle_bound
+
+    settings = scene.bpy.context.scene.mfo
+    settings.parameter_set = "chosen"
+    settings.sockets = {key for key, *_ in SOCKET_ITEMS}
+    for key, *_ in SOCKET_ITEMS:
+        toggle_bound(settings, key)
+    yield
+    tree = scene.bpy.data.materials["Glaze"].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], shader.inputs["Base Color"])
+    yield
+    for model, *_ in MODEL_ITEMS:
+        settings.model = model
+        yield
+
+
+def with_several_pictures(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    settings = scene.bpy.context.scene.mfo
+    settings.reference_path = scene.reference
+    scene.bpy.ops.mfo.add_picture()
+    settings.first_picture.part.left = 10.0
+    scene.bpy.ops.mfo.list_materials()
+    yield
+    for view in settings.bl_rna.properties["parameter_set"].enum_items:
+        settings.parameter_set = view.identifier
+        yield
+
+
+def with_the_backend(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.backend import backend_section, backend_state
+
+    for name in backend_section._TITLES:
+        state = backend_state.BackendState(
+            name, "The backend cannot run.", ["Mitsuba is not installed: install it again."], "/usr/bin/python3",
+            "Downloading packages", 0.4, ["Collecting mitsuba==3.9.1 (from -r requirements.txt)"], "log", True,
+        )  # fmt: skip
+        patch.setattr(backend_state, "current", state)
+        patch.setattr(backend_section, "has_trouble", lambda: True)
+        yield
+
+
+STATES = (
+    with_problems, while_it_exports, while_it_runs, with_a_result, with_chosen_values, with_several_pictures,
+    with_the_backend,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_text_is_cut(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, language: str, state: State) -> None:
+    from blender_addon.panel import history, layout, parameters, part, reference, result
+    from blender_addon.sentences import translated
+
+    monkeypatch.setattr(translated, "_language", lambda: language)
+    for drawing in (layout, history, parameters, part, reference, result):
+        monkeypatch.setattr(drawing, "word", lambda text, context="*": in_language(language, text, context))
+    found: dict[tuple[str, float], Cut] = {}
+    for _ in state(scene, monkeypatch):
+        for width in (DEFAULT, LEAST):
+            for scale in (1.0, 2.0):
+                found |= {(each.text, width): each for each in cut(scene, language, width, scale)}
+    assert not found, "\n".join(f"at {w}: {c.text!r} {c.width:.0f} > {c.room:.0f}" for (_, w), c in found.items())
