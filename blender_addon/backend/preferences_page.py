@@ -11,8 +11,8 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ..process import waiting_backend
 from ..process.backend_python import VARIABLE
-from . import backend_state
 from ..text_width import ui_scale
+from . import backend_state
 from .backend_section import draw_setup
 from .preferences import ADDON_ID, IDLE_MINUTES
 

@@ -9,7 +9,7 @@ from ..result.shown_result import VERDICT_ICONS
 from ..sentences.translated import word
 from ..text_width import text_width
 from ..translations import CONTEXT
-from .layout import ICON, UNIT, fits, room, buttons_side_by_side
+from .layout import ICON, UNIT, buttons_side_by_side, fits, room
 
 _AROUND = 26.0  # a list's margins and its bar, pixels at a scale of 1
 _GAP = 6.0  # after the date

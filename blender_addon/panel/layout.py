@@ -19,6 +19,7 @@ ICON = 23.0  # an icon before a text, with its margins
 BUTTON = 5.0  # margins of a button's text
 NUMBER = 60.0  # a number as 0.500 with its margins
 NAMED_NUMBER = 40.0  # margins and arrows of a number with its name, without both
+GAP = 8.0  # between the items of a row
 BOX = 10.0  # margins of a box
 _AROUND = 52.0  # margins of a panel and the tabs of the sidebar
 _LEAST_LINE = 60.0  # of a sentence, in a sidebar of no width
@@ -40,11 +41,16 @@ _SHORT = {
 }  # where the names have no room
 
 
-def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
-    """A sentence in the user's language over as many lines as the region needs; labels do not wrap."""
+def draw_sentence(
+    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str, *, taken: float = 0.0
+) -> None:
+    """A sentence in the user's language over as many lines as the region needs; labels do not wrap.
+
+    `taken`: width of what stands beside it.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
-    width = max(room(context) - BOX - ICON, _LEAST_LINE)
+    width = max(room(context) - taken - BOX - ICON, _LEAST_LINE)
     for i, line in enumerate(wrapped(context, translated(text), width)):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
@@ -118,9 +124,9 @@ def draw_numbers(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection
         return
     grid = layout.box().column(align=True)
     for name, *numbers in (("Error", "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
-        split = grid.split(factor=0.46)
+        split = grid.split(factor=0.4, align=True)
         split.label(text=translated(name))
-        columns = split.split(factor=0.5)
+        columns = split.split(factor=0.5, align=True)
         for number in numbers:
             columns.label(text=number)
 

@@ -29,8 +29,7 @@ class Parameters:
         """Say in the heading which values may change."""
         settings = context.scene.mfo
         named = settings.bl_rna.properties["parameter_set"].enum_items[settings.parameter_set].name
-        words = bpy.app.translations.pgettext_iface("Values to Fit")
-        self.layout.label(text=f"{words}: {bpy.app.translations.pgettext_iface(named)}")  # type: ignore[attr-defined]
+        self.layout.label(text=f"{word('Values to Fit')}: {word(named)}")  # type: ignore[attr-defined]
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:

@@ -17,9 +17,9 @@ def draw_part(
 ) -> None:
     """Draw the settings of one picture's part, counted from 1; a rectangle is drawn over the first one alone."""
     header, body = layout.panel(f"mfo_part_{number}", default_closed=True)
-    heading = "Part That Counts"
-    has_icon = not part.is_whole and fits(context, room(context) - _ARROW - 2 * UNIT - ICON, word(heading))
-    header.label(text=heading, icon="SELECT_SET" if has_icon else "NONE")
+    words = word("Part That Counts")
+    has_icon = not part.is_whole and fits(context, room(context) - _ARROW - 2 * UNIT - ICON, words)
+    header.label(text="Part That Counts", icon="SELECT_SET" if has_icon else "NONE")
     if not part.is_whole:
         header.operator("mfo.whole_picture", text="", icon="X", emboss=False).number = number
     if body is None:

@@ -111,14 +111,13 @@ def _draw_row(
     text, is_doubtful = row.name.rpartition("/")[2], row.certainty == "doubtful"
     cell = (room(context) - BOX) * (_NAME_OF_THREE if has_start else _NAME_OF_TWO)
     beside = fits(context, cell - (ICON if is_doubtful else BUTTON), word(text, "Operator"))
-    own = None if beside else grid.row()
+    line = None if beside else grid.row()
     name, start, result = _cells(grid, has_start)
-    if own is not None:
-        own.alignment = "LEFT"
+    if line is not None:
         name.label(text="")
-    (own or name).operator(
-        "mfo.copy_values", text=text, icon="ERROR" if is_doubtful else "NONE", emboss=False
-    ).name = row.name
+        name, name.alignment = line, "LEFT"
+    icon = "ERROR" if is_doubtful else "NONE"
+    name.operator("mfo.copy_values", text=text, icon=icon, emboss=False).name = row.name
     if start is not None:
         _draw_value(start, row.start, -1.0)
     _draw_value(result, row.result, row.sureness)

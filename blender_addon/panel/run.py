@@ -10,7 +10,7 @@ from ..operators.fit_options import selected_targets
 from ..result import previews, shown_result
 from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
-from ..sentences.translated import translated
+from ..sentences.translated import translated, word
 from ..translations import CONTEXT
 from .layout import BOX, BUTTON, UNIT, draw_pictures, draw_sentence, fits, room
 
@@ -84,7 +84,7 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     """What is waited for, how long already, and the way out."""
     seconds = running_export.seconds()
     share = seconds / (seconds + _USUAL_SECONDS)  # how long it takes is not known
-    text = bpy.app.translations.pgettext_iface("Cycles prepares the scene")
+    text = word("Cycles prepares the scene")
     _draw_bar(layout, context, share, f"{text} · {seconds:.0f} s")
 
 
@@ -105,7 +105,7 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     column = layout.column()
     _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text))
     if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
-        column.label(text=translated(f"Of material {runtime.material}"), icon="MATERIAL")
+        draw_sentence(column, context, f"Of material {runtime.material}", "MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:
         draw_pictures(column, context, shown)
@@ -115,8 +115,8 @@ def _draw_queue(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not fit_queue.waiting and not fit_queue.finished:
         return
     box = layout.box()
-    said = translated(f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended")
-    box.label(text=said, icon="SEQUENCE")
+    said = f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended"
+    draw_sentence(box, context, said, "SEQUENCE")
     for ended in fit_queue.finished:
         draw_sentence(box, context, f"{ended.material_name}: {ended.sentence}", ended.icon)
     for index, fit in enumerate(fit_queue.waiting):

@@ -55,8 +55,9 @@ def _of_call(node: ast.Call) -> Iterator[tuple[str, str]]:
         yield from _of_items(words.get("items"))
     elif name in _LABELLED:
         yield from _texts("Operator" if name in {"operator"} else "*", words.get("text"))
-    elif name == "pgettext_iface" and node.args:
-        yield from _texts("*", node.args[0])
+    elif name == "word":  # text and context
+        context = node.args[1].value if len(node.args) > 1 and isinstance(node.args[1], ast.Constant) else "*"
+        yield from _texts(str(context), node.args[0])
 
 
 def _of_items(node: ast.expr | None) -> Iterator[tuple[str, str]]:

@@ -2,8 +2,8 @@
 """A panel's layout as Blender makes it, as far as widths go: which texts it would cut at a width of the region.
 
 The shares follow Blender's own rules: an item of a row asks for ten units, an icon alone for one and no more, a row for
-the sum of its items, a column for the widest. What a text has of its share was measured in windows of Blender 5.2: texts
-of rising width in every kind of item, and the last that was drawn uncut.
+the sum of its items, a column for the widest. What a text has of its share was measured in windows of Blender 5.2:
+texts of rising width in every kind of item, and the last that was drawn uncut.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Layout:
     def template_icon(self, **_options: Any) -> None:
         self.items.append(Item((), 0.0))
 
-    def template_ID(self, *_given: Any, **_options: Any) -> None:  # noqa: N802
+    def template_ID(self, *_given: Any, **_options: Any) -> None:
         self.items.append(Item((), 0.0))
 
     def template_list(self, kind: str, _id: str, data: Any, name: str, active: Any, index: str, rows: int) -> None:
@@ -161,10 +161,12 @@ class Layout:
         margins += ICON - (BUTTON if icon and margins else 0.0) if icon else 0.0
         if icon and not text:
             self.items.append(Item((), 0.0, UNIT, fixed=True))
-        elif self.alignment != "EXPAND":
-            self.items.append(Item((shown,) if translate else (), margins, self.words.measure(shown) + margins + 5.0, True))
+            return
+        texts = (shown,) if translate else ()  # names are the artist's, and as long as they like
+        if self.alignment == "EXPAND":
+            self.items.append(Item(texts, margins))
         else:
-            self.items.append(Item((shown,) if translate else (), margins))
+            self.items.append(Item(texts, margins, self.words.measure(shown) + margins + BUTTON, fixed=True))
 
     @property
     def asked(self) -> float:
@@ -191,7 +193,8 @@ class Layout:
         room = width - self._gap * (count - 1)
         if self.kind == "split":
             first = self.factor or 1.0 / count
-            return [first * room, *([(1.0 - first) * room / (count - 1)] * (count - 1))] if count > 1 else [first * room]
+            others = (1.0 - first) * room / max(count - 1, 1)
+            return [first * room, *([others] * (count - 1))]
         held = [item.fixed for item in self.items]
         if all(held):
             wished = sum(item.asked for item in self.items)

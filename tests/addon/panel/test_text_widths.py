@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from ..test_operators import fit, runtime
-from .laid_out import AROUND, HEADER, SUB_HEADER, Cut, Layout
+from .laid_out import AROUND, SUB_HEADER, Cut, Layout
 
 DEFAULT, LEAST = 280, 220  # pixels at a scale of 1
 LANGUAGES = ("en_US", "de_DE", "fr_FR")
@@ -116,8 +116,6 @@ def while_it_runs(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
 def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
     from blender_addon.properties import SOCKET_ITEMS
     from blender_addon.result import previews
-    from blender_addon.result.comparison import has_split
-    from blender_addon.running import cycles_check
 
     fit(scene)
     fit(scene)
@@ -141,7 +139,7 @@ def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
 
 
 def with_chosen_values(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
-    from blender_addon.properties import MODEL_ITEMS, PARAMETER_ITEMS, SOCKET_ITEMS, toggle_bound
+    from blender_addon.properties import MODEL_ITEMS, SOCKET_ITEMS, toggle_bound
 
     settings = scene.bpy.context.scene.mfo
     settings.parameter_set = "chosen"
@@ -158,6 +156,37 @@ def with_chosen_values(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> It
     for model, *_ in MODEL_ITEMS:
         settings.model = model
         yield
+
+
+def with_a_queue(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.running import cycles_check, fit_queue, running_job
+
+    waits = fit_queue.PreparedFit(Path(), Path(), "Glaze", (), Path(), (), True)
+    patch.setattr(fit_queue, "waiting", [waits] * 12)
+    patch.setattr(fit_queue, "finished", [fit_queue.EndedFit("Glaze", "It was cancelled.", "INFO")] * 8)
+    yield
+    fit(scene)
+    patch.setattr(cycles_check, "is_running", lambda: True)
+    patch.setattr(running_job, "current", object())
+    for step in ("Rendering in Cycles", "Rendering in Eevee Next", "Rendering the reference", "Comparing"):
+        runtime(scene).cycles_text = f"{step}, sample 4095 of 4096"
+        yield
+
+
+def with_a_mix_and_motion(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    material = scene.bpy.data.materials["Glaze"]
+    tree = material.node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Roughness"].keyframe_insert("default_value", frame=1)
+    fit(scene)
+    yield
+    other, mix = tree.nodes.new("ShaderNodeBsdfPrincipled"), tree.nodes.new("ShaderNodeMixShader")
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    for index, source in ((1, shader), (2, other)):
+        tree.links.new(source.outputs[0], mix.inputs[index])
+    tree.links.new(mix.outputs[0], output.inputs[0])
+    scene.bpy.context.scene.mfo.parameter_set = "chosen"
+    yield
 
 
 def with_several_pictures(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -186,8 +215,8 @@ def with_the_backend(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Itera
 
 
 STATES = (
-    with_problems, while_it_exports, while_it_runs, with_a_result, with_chosen_values, with_several_pictures,
-    with_the_backend,
+    with_problems, while_it_exports, while_it_runs, with_a_result, with_chosen_values, with_a_queue,
+    with_a_mix_and_motion, with_several_pictures, with_the_backend,
 )  # fmt: skip
 
 
