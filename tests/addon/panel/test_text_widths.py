@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import ast
+import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from ..conftest import new_scene
+from ..shown_messages import ADDON, of_call
 from ..test_operators import fit, runtime
 from .laid_out import AROUND, SUB_HEADER, Cut, Layout
 
@@ -21,6 +25,8 @@ PROGRESS = tuple(
     for share in ("7%", "100%")
     for left in ("5 s", "59 s", "12 min", "100 min")
 )
+WITHIN = {"Cycles prepares the scene", "Values to Fit", "partial"}  # shown as part of a longer text, or as it is
+NOT_NOW = {"new node"}  # for a moment after a node was made
 FIXED_TEXTS = ("Starting", "Cancelling", "Checking the values")
 
 
@@ -61,7 +67,7 @@ def cut(scene: SimpleNamespace, language: str, width: float, scale: float) -> li
         window_manager=context.window_manager,
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=scale), addons=context.preferences.addons),
         region=SimpleNamespace(width=width * scale),
-        selected_objects=[context.object],
+        selected_objects=list(filter(None, [context.object])),
     )
     words, found = Words(language, scale, narrow), []
     for body in (reference.Reference, *_BODIES):
@@ -111,6 +117,29 @@ def while_it_runs(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
     for text in (*PROGRESS, *FIXED_TEXTS):
         runtime(scene).progress_text = text
         yield
+
+
+def with_questions(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.result import shown_result
+    from blender_addon.result.job_result import NextPicture
+
+    context = scene.bpy.context
+    context.scene.mfo.reference_path = scene.reference
+    context.scene.view_settings.view_transform = "AgX"
+    yield
+    scene.bpy.ops.mfo.check()
+    yield
+    fit(scene)
+    shown = runtime(scene)
+    shown.verdict, shown.asked = "different", shown.job_folder
+    for light in ("", "Light"):
+        picture = NextPicture("Another picture would tell more.", 60.0, (0.0, 0.0, 0.0), light=light)
+        shown_result.result = dataclasses.replace(shown_result.result, next_picture=picture)
+        yield
+    context.object.active_material = None
+    yield
+    scene.bpy.data.objects.remove(context.object)
+    yield
 
 
 def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -215,9 +244,30 @@ def with_the_backend(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Itera
 
 
 STATES = (
-    with_problems, while_it_exports, while_it_runs, with_a_result, with_chosen_values, with_a_queue,
+    with_problems, with_questions, while_it_exports, while_it_runs, with_a_result, with_chosen_values, with_a_queue,
     with_a_mix_and_motion, with_several_pictures, with_the_backend,
 )  # fmt: skip
+
+
+def test_the_states_show_every_label(addon: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A label that no state shows would be measured nowhere."""
+    shown: set[str] = set()
+    monkeypatch.setattr(Words, "__call__", lambda self, text, context: shown.add(text) or text)
+    for state in STATES:
+        folder = tmp_path / state.__name__
+        folder.mkdir()
+        with pytest.MonkeyPatch.context() as patch:
+            scene = new_scene(folder, patch)
+            for _ in state(scene, patch):
+                cut(scene, "en_US", DEFAULT, 1.0)
+    drawn = {path for path in (ADDON / "panel").glob("*.py") if path.name != "menu.py"}
+    assert _labels({*drawn, ADDON / "backend" / "backend_section.py"}) - shown == WITHIN | NOT_NOW
+
+
+def _labels(files: set[Path]) -> set[str]:
+    """Texts written out in calls that draw, of these files."""
+    calls = (node for path in files for node in ast.walk(ast.parse(path.read_text("utf-8"))))
+    return {text for node in calls if isinstance(node, ast.Call) for _, text in of_call(node) if text}
 
 
 @pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
