@@ -96,7 +96,8 @@ def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         layout.label(text="Select an object", icon="ERROR")
     else:
         material = obj.active_material
-        row = layout.row()
+        shown = material.name if material is not None else word("No material")
+        row = side_by_side(layout, context, obj.name, shown)
         row.label(text=obj.name, icon="OBJECT_DATA", translate=False)  # a name is nobody's to translate
         if material is None:
             row.label(text="No material", icon="ERROR")
