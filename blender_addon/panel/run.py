@@ -89,15 +89,15 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 
 
 def _draw_bar(layout: bpy.types.UILayout, context: bpy.types.Context, share: float, text: str) -> None:
-    """How far it is, and the way out; what is done has a line of its own where it would cost the time left its room."""
+    """How far it is, and the way out; what is done stands below where it would cost the time left its room."""
     done, joint, rest = text.partition(_JOINT)
-    if joint and not fits(context, room(context) - UNIT - BUTTON, text):
-        layout.label(text=done, translate=False)
-        text = rest
+    fitting = not joint or fits(context, room(context) - UNIT - BUTTON, text)
     row = layout.row(align=True)
     row.scale_y = 1.4
-    row.progress(factor=share, type="BAR", text=text)
+    row.progress(factor=share, type="BAR", text=text if fitting else rest)
     row.operator("mfo.cancel", text="", icon="X")
+    if not fitting:
+        layout.label(text=done, translate=False)
 
 
 def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -162,11 +162,10 @@ class Layout:
         if icon and not text:
             self.items.append(Item((), 0.0, UNIT, fixed=True))
             return
-        texts = (shown,) if translate else ()  # names are the artist's, and as long as they like
         if self.alignment == "EXPAND":
-            self.items.append(Item(texts, margins))
+            self.items.append(Item((shown,), margins))
         else:
-            self.items.append(Item(texts, margins, self.words.measure(shown) + margins + BUTTON, fixed=True))
+            self.items.append(Item((shown,), margins, self.words.measure(shown) + margins + BUTTON, fixed=True))
 
     @property
     def asked(self) -> float:

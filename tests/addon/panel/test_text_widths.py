@@ -19,15 +19,8 @@ from .laid_out import AROUND, SUB_HEADER, Cut, Layout
 
 DEFAULT, LEAST = 280, 220  # pixels at a scale of 1
 LANGUAGES = ("en_US", "de_DE", "fr_FR")
-PROGRESS = tuple(
-    f"{stage} · {share} · {left} left"
-    for stage in ("Exploring", "Refining")
-    for share in ("7%", "100%")
-    for left in ("5 s", "59 s", "12 min", "100 min")
-)
 WITHIN = {"Cycles prepares the scene", "Values to Fit", "partial"}  # shown as part of a longer text, or as it is
 NOT_NOW = {"new node"}  # for a moment after a node was made
-FIXED_TEXTS = ("Starting", "Cancelling", "Checking the values")
 
 
 def in_language(language: str, text: str, context: str) -> str:
@@ -114,8 +107,11 @@ def while_it_runs(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
     patch.setattr(running_job, "current", object())
     patch.setattr(previews, "icon", lambda name: 1)
     runtime(scene).material = "Glaze"
-    for text in (*PROGRESS, *FIXED_TEXTS):
-        runtime(scene).progress_text = text
+    said = ["Starting", "Cancelling", "Checking the values"]
+    for stage in (running_job._FIRST_STAGES[0], "flip-hdr"):
+        for share, left in ((0.01, None), (0.07, 59.0), (1.0, 3599.0)):
+            said.append(running_job.progress_text({"stage": stage, "fraction": share, "remaining_seconds": left}))
+    for runtime(scene).progress_text in said:
         yield
 
 
@@ -273,11 +269,11 @@ def _labels(files: set[Path]) -> set[str]:
 @pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_text_is_cut(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, language: str, state: State) -> None:
-    from blender_addon.panel import history, layout, parameters, part, reference, result
+    from blender_addon.panel import history, layout, parameters, part, reference, result, run
     from blender_addon.sentences import translated
 
     monkeypatch.setattr(translated, "_language", lambda: language)
-    for drawing in (layout, history, parameters, part, reference, result):
+    for drawing in (layout, history, parameters, part, reference, result, run):
         monkeypatch.setattr(drawing, "word", lambda text, context="*": in_language(language, text, context))
     found: dict[tuple[str, float], Cut] = {}
     for _ in state(scene, monkeypatch):
