@@ -61,9 +61,10 @@ def draw_setup(layout: bpy.types.UILayout, context: bpy.types.Context, *, width:
         row.scale_y = 1.2
         again = state.has_folder and state.name != "NOT_INSTALLED"  # the folder may hold a log alone
         row.operator("mfo.install_backend", text="Install Again" if again else "Install", icon="IMPORT")
-    row = box.row(align=True)
+    column = box.column(align=True)
     if state.python:
-        row.operator("mfo.test_backend", text="Test", icon="FILE_REFRESH")
+        column.operator("mfo.test_backend", text="Test", icon="FILE_REFRESH")
+    row = column.row(align=True)
     if state.has_folder:
         row.operator("mfo.remove_backend", text="Remove", icon="TRASH")
     if state.log_file:

@@ -15,12 +15,13 @@ from ..sentences.translated import translated, word
 from ..text_width import text_width, ui_scale, wrapped
 
 UNIT = 20.0  # height of a row and width of an icon's button
-ICON = 23.0  # an icon before a text, with its margins
+ICON = 25.0  # an icon before a text, with its margins
 BUTTON = 5.0  # margins of a button's text
 NUMBER = 60.0  # a number as 0.500 with its margins
 NAMED_NUMBER = 40.0  # margins and arrows of a number with its name, without both
 GAP = 8.0  # between the items of a row
-BOX = 10.0  # margins of a box
+LABEL = 3.0  # margins of a label
+BOX = 16.0  # margins of a box
 _AROUND = 52.0  # margins of a panel and the tabs of the sidebar
 _LEAST_LINE = 60.0  # of a sentence, in a sidebar of no width
 _LABELS = {
@@ -122,9 +123,9 @@ def draw_numbers(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection
     """Errors at the start and of the result."""
     if not rows:
         return
-    grid = layout.box().column(align=True)
+    grid = layout.column(align=True)  # a box would take the room of a narrow sidebar
     for name, *numbers in (("Error", "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
-        split = grid.split(factor=0.4, align=True)
+        split = grid.split(factor=0.37, align=True)
         split.label(text=translated(name))
         columns = split.split(factor=0.5, align=True)
         for number in numbers:

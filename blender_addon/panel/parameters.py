@@ -138,9 +138,9 @@ def _draw_node_value(
 ) -> None:
     """A box that unlocks the value, its name within the node, and the value itself."""
     is_chosen = value.name in settings.node_values
-    text, icon = value.name.rpartition("/")[2], "CHECKBOX_HLT" if is_chosen else "LOCKED"
-    box, number = _cells(layout, context, room(context) - BOX, word(text, "Operator"))
-    box.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen).name = value.name
+    text, icon = word(value.name.rpartition("/")[2]), "CHECKBOX_HLT" if is_chosen else "LOCKED"
+    box, number = _cells(layout, context, room(context) - BOX, text)
+    box.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen, translate=False).name = value.name
     if not is_there(tree, value.place):
         number.label(text="new node")
         return

@@ -14,7 +14,7 @@ from ..result.job_result import must_ask
 from ..sentences.translated import translated, word
 from .layout import BOX, BUTTON, ICON, draw_sentence, fits, room, side_by_side
 
-_ROOM_OF_THREE = 180.0  # pixels at a scale of 1 for name, start and result; a narrower sidebar has no start
+_NUMBER = "-0.123"  # which a narrow sidebar holds; where it does not hold three columns, it has no start
 _NAME_OF_TWO, _NAME_OF_THREE = 0.66, 0.52  # share of the name beside its values
 _KEPT = "not_visible"  # level of what stays as it was
 
@@ -73,7 +73,8 @@ def _draw_materials(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup
 def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: bpy.types.bpy_prop_collection) -> None:
     """Names, starts and results; what the picture does not show is one sentence."""
     kept = [row.name for row in rows if row.certainty == _KEPT]
-    has_start = room(context) >= _ROOM_OF_THREE
+    column = (room(context) - BOX) * (1.0 - _NAME_OF_THREE) / 2 - BUTTON
+    has_start = fits(context, column, word("Start"), word("Result"), _NUMBER)
     box = layout.box()
     grid = box.column(align=True)
     name, start, result = _cells(grid, has_start)
@@ -108,16 +109,16 @@ def _draw_row(
     grid: bpy.types.UILayout, context: bpy.types.Context, row: bpy.types.PropertyGroup, has_start: bool
 ) -> None:
     """One value; a name that its cell would cut has a line of its own."""
-    text, is_doubtful = row.name.rpartition("/")[2], row.certainty == "doubtful"
+    text, is_doubtful = word(row.name.rpartition("/")[2]), row.certainty == "doubtful"
     cell = (room(context) - BOX) * (_NAME_OF_THREE if has_start else _NAME_OF_TWO)
-    beside = fits(context, cell - (ICON if is_doubtful else BUTTON), word(text, "Operator"))
+    beside = fits(context, cell - (ICON if is_doubtful else BUTTON), text)
     line = None if beside else grid.row()
     name, start, result = _cells(grid, has_start)
     if line is not None:
         name.label(text="")
         name, name.alignment = line, "LEFT"
     icon = "ERROR" if is_doubtful else "NONE"
-    name.operator("mfo.copy_values", text=text, icon=icon, emboss=False).name = row.name
+    name.operator("mfo.copy_values", text=text, icon=icon, emboss=False, translate=False).name = row.name
     if start is not None:
         _draw_value(start, row.start, -1.0)
     _draw_value(result, row.result, row.sureness)

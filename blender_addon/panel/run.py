@@ -12,7 +12,7 @@ from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
 from ..sentences.translated import translated, word
 from ..translations import CONTEXT
-from .layout import BOX, BUTTON, UNIT, draw_pictures, draw_sentence, fits, room
+from .layout import BOX, BUTTON, LABEL, UNIT, draw_pictures, draw_sentence, fits, room
 
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
 
@@ -46,7 +46,7 @@ class Run:
             body.prop(settings, "max_iterations")
         _draw_queue(layout, context)
         if has_trouble():
-            draw_setup(layout, context, width=room(context) - BOX)
+            draw_setup(layout, context, width=room(context) - BOX - LABEL)
         _draw_end(layout, context)  # a result of an earlier day needs no backend
 
 

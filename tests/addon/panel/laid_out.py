@@ -16,12 +16,13 @@ from typing import Any
 UNIT = 20.0  # of all that follows: pixels at a scale of 1, an icon's width
 ASKED = 10 * UNIT  # by an item with a text, where the layout expands
 GAP = 8.0  # between items of a row or a split that are not aligned
-BOX = 10.0  # a box's margins
+LABEL = 3.0  # margins of a label
+BOX = 16.0  # a box's margins
 AROUND = 52.0  # a panel's margins and the tabs of the sidebar
 LIST = 26.0  # margins and bar of a list
 HEADER = 28.0  # the arrow of a panel's header
 SUB_HEADER = 12.0  # how much further in a sub-panel's header begins
-ICON = 23.0  # before a text
+ICON = 25.0  # before a text
 BUTTON = 5.0  # margins of a button's text
 NUMBER = 40.0  # margins and arrows of a number with its name
 LONE_NUMBER = 26.0  # the same without a name
@@ -101,7 +102,7 @@ class Layout:
             getattr(bpy.types, kind).draw_item(SimpleNamespace(), self.words.context, row, data, item, 0, active, index)
 
     def label(self, *, text: str = "", icon: str = "NONE", icon_value: int = 0, translate: bool = True) -> None:
-        self._text(text, "*", icon != "NONE" or icon_value > 0, 0.0, translate)
+        self._text(text, "*", icon != "NONE" or icon_value > 0, LABEL, translate)
 
     def progress(self, *, text: str, **_options: Any) -> None:
         self._text(text, "*", False, BUTTON, False)
@@ -158,7 +159,7 @@ class Layout:
 
     def _text(self, text: str, context: str, icon: bool, margins: float, translate: bool) -> None:
         shown = self.words(text, context) if translate else text
-        margins += ICON - (BUTTON if icon and margins else 0.0) if icon else 0.0
+        margins = ICON if icon else margins
         if icon and not text:
             self.items.append(Item((), 0.0, UNIT, fixed=True))
             return

@@ -17,7 +17,9 @@ from ..shown_messages import ADDON, of_call
 from ..test_operators import fit, runtime
 from .laid_out import AROUND, SUB_HEADER, Cut, Layout
 
-DEFAULT, LEAST = 280, 220  # pixels at a scale of 1
+DEFAULT = 280  # of a new Blender, pixels at a scale of 1
+WIDTHS = (DEFAULT, 262, 240, 220)
+SCALES = (1.0, 1.25, 2.0)  # of hinted letters the widths change by up to 7 %
 LANGUAGES = ("en_US", "de_DE", "fr_FR")
 WITHIN = {"Cycles prepares the scene", "Values to Fit", "partial"}  # shown as part of a longer text, or as it is
 NOT_NOW = {"new node"}  # for a moment after a node was made
@@ -150,7 +152,7 @@ def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
         row = shown.values.add()
         row.name, row.start, row.result = name, "0.125", "-0.312"
         row.sureness = 0.5 if i % 2 else -1.0
-    patch.setattr(previews, "icon", lambda name: int(not name.lstrip("-0").startswith(".")))
+    patch.setattr(previews, "icon", lambda name: int(name.startswith("#") or name.isidentifier()))
     yield
     shown.cycles_text, shown.cycles_flip = "FLIP in Cycles: 0.0234", 0.02
     yield
@@ -270,14 +272,16 @@ def _labels(files: set[Path]) -> set[str]:
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_text_is_cut(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, language: str, state: State) -> None:
     from blender_addon.panel import history, layout, parameters, part, reference, result, run
+    from blender_addon.result import previews
     from blender_addon.sentences import translated
 
     monkeypatch.setattr(translated, "_language", lambda: language)
+    monkeypatch.setattr(previews, "icon", lambda name: int(name.startswith("#")))  # colours have swatches
     for drawing in (layout, history, parameters, part, reference, result, run):
         monkeypatch.setattr(drawing, "word", lambda text, context="*": in_language(language, text, context))
     found: dict[tuple[str, float], Cut] = {}
     for _ in state(scene, monkeypatch):
-        for width in (DEFAULT, LEAST):
-            for scale in (1.0, 2.0):
+        for width in WIDTHS:
+            for scale in SCALES:
                 found |= {(each.text, width): each for each in cut(scene, language, width, scale)}
     assert not found, "\n".join(f"at {w}: {c.text!r} {c.width:.0f} > {c.room:.0f}" for (_, w), c in found.items())
