@@ -23,7 +23,7 @@ GAP = 8.0  # between the items of a row
 LABEL = 3.0  # margins of a label
 BOX = 16.0  # margins of a box
 _AROUND = 52.0  # margins of a panel and the tabs of the sidebar
-_LEAST_LINE = 60.0  # of a sentence, in a sidebar of no width
+_LEAST = 100.0  # of a panel in a region that has no width yet
 _LABELS = {
     "current": "Preliminary",
     "cycles": "In Cycles",
@@ -51,14 +51,14 @@ def draw_sentence(
     """
     column = layout.column(align=True)
     column.scale_y = 0.8
-    width = max(room(context) - taken - BOX - ICON, _LEAST_LINE)
+    width = room(context) - taken - BOX - ICON
     for i, line in enumerate(wrapped(context, translated(text), width)):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
 def room(context: bpy.types.Context) -> float:
     """Width of what a panel holds."""
-    return context.region.width / ui_scale(context) - _AROUND
+    return max(context.region.width / ui_scale(context) - _AROUND, _LEAST)
 
 
 def fits(context: bpy.types.Context, width: float, *texts: str) -> bool:

@@ -268,6 +268,12 @@ def _labels(files: set[Path]) -> set[str]:
     return {text for node in calls if isinstance(node, ast.Call) for _, text in of_call(node) if text}
 
 
+def test_a_region_without_width_is_drawn(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    for state in (with_a_result, with_the_backend, with_problems):
+        for _ in state(scene, monkeypatch):
+            assert cut(scene, "en_US", 1, 1.0)
+
+
 @pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_text_is_cut(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, language: str, state: State) -> None:
