@@ -11,9 +11,12 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ..process import waiting_backend
 from ..process.backend_python import VARIABLE
+from ..text_width import ui_scale
 from . import backend_state
 from .backend_section import draw_setup
 from .preferences import ADDON_ID, IDLE_MINUTES
+
+_AROUND, _LEAST_LINE = 140.0, 90.0  # margins of the page and the shortest line, pixels at a scale of 1
 
 
 def _look_again(_self: object, _context: bpy.types.Context) -> None:
@@ -67,8 +70,7 @@ class MFO_AP_preferences(bpy.types.AddonPreferences):
     def draw(self, context: bpy.types.Context) -> None:
         """The state of the backend, the paths, and a line where the variable wins over the first."""
         layout = self.layout
-        letters = int((context.region.width / context.preferences.system.ui_scale - 140) / 5.8)
-        draw_setup(layout, width=max(16, letters))
+        draw_setup(layout, context, width=max(context.region.width / ui_scale(context) - _AROUND, _LEAST_LINE))
         layout.use_property_split = True
         layout.prop(self, "base_python")
         layout.prop(self, "wheels")

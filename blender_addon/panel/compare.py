@@ -7,8 +7,7 @@ import bpy
 
 from ..result import comparison, previews, shown_result
 from ..running import cycles_check
-from ..sentences.translated import translated
-from .layout import draw_messages, draw_numbers, draw_pictures, draw_sentence, pair
+from .layout import GAP, UNIT, buttons_side_by_side, draw_messages, draw_numbers, draw_pictures, draw_sentence
 
 
 class Compare:
@@ -25,17 +24,17 @@ class Compare:
         """Draw pictures and buttons."""
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
         if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
-            layout.label(text=translated(f"Of material {runtime.material}"), icon="MATERIAL")
+            draw_sentence(layout, context, f"Of material {runtime.material}", "MATERIAL")
         draw_pictures(layout, context, ("reference", "start", "result"), clickable=True)
         _draw_each_picture(layout)
         column = layout.column(align=True)
-        row = pair(column, context)
+        row = buttons_side_by_side(column, context, "Side by Side", "Split")
         row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
         row.operator("mfo.show_pictures", text="Split", icon="ARROW_LEFTRIGHT").show = "split"
         if comparison.has_split():
             column.prop(runtime, "split", slider=True)
         _draw_cycles(layout, context, runtime)
-        row = pair(layout, context)
+        row = buttons_side_by_side(layout, context, "Report", "Load Result")
         row.operator("mfo.open_report", text="Report", icon="URL")
         row.operator("mfo.open_job", text="Load Result", icon="FILE_FOLDER")
         header, body = layout.panel("mfo_numbers", default_closed=True)
@@ -73,8 +72,8 @@ def _draw_details(layout: bpy.types.UILayout, context: bpy.types.Context, runtim
 def _draw_cycles(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
     column = layout.column()
     if cycles_check.is_running():
-        row = column.row(align=True)
-        row.label(text=translated(runtime.cycles_text), icon="RENDER_STILL")
+        row = column.row()
+        draw_sentence(row, context, runtime.cycles_text, "RENDER_STILL", taken=UNIT + GAP)
         row.operator("mfo.cancel_cycles", text="", icon="X")
         return
     column.operator("mfo.check_in_cycles", icon="RENDER_STILL")

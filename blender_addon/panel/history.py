@@ -6,8 +6,13 @@ from __future__ import annotations
 import bpy
 
 from ..result.shown_result import VERDICT_ICONS
+from ..sentences.translated import word
+from ..text_width import text_width
 from ..translations import CONTEXT
-from .layout import is_narrow, pair
+from .layout import ICON, UNIT, buttons_side_by_side, fits, room
+
+_AROUND = 26.0  # a list's margins and its bar, pixels at a scale of 1
+_GAP = 6.0  # after the date
 
 
 class MFO_UL_history(bpy.types.UIList):
@@ -27,14 +32,16 @@ class MFO_UL_history(bpy.types.UIList):
     ) -> None:
         """Draw one result; the one on the material has a full dot, one that looks the same a check mark."""
         applied = item.job_folder == data.job_folder and not data.shows_original
-        narrow = is_narrow(context)
-        split = layout.split(factor=0.82 if narrow else 0.62)  # a day and a time, a verdict and its number
-        split.label(text=item.name[5:16], icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
+        when = item.name[5:16]
         reached = f"{item.flip:.3f}" if item.flip >= 0.0 else ""
-        split.label(
-            text="" if narrow else "partial" if item.partial else reached,
-            icon=VERDICT_ICONS.get(item.verdict, "BLANK1"),
-        )
+        reached = word("partial") if item.partial else reached
+        width = room(context) - _AROUND
+        date = text_width(context, when) + ICON + _GAP
+        has_number = fits(context, width - date - ICON, word("partial"), "0.000")
+        split = layout.split(factor=min((date if has_number else width - ICON) / width, 1.0), align=True)
+        split.label(text=when, icon="RADIOBUT_ON" if applied else "RADIOBUT_OFF")
+        icon = VERDICT_ICONS.get(item.verdict, "BLANK1")
+        split.label(text=reached if has_number else "", icon=icon, translate=False)
 
 
 class History:
@@ -54,7 +61,7 @@ class History:
         layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
         layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
         row = layout.row(align=True)
-        buttons = pair(row, context)
+        buttons = buttons_side_by_side(row, context, "Restore", "Show", taken=UNIT)
         buttons.operator("mfo.apply_past", text="Restore", icon="LOOP_BACK")
         buttons.operator("mfo.show_past", text="Show", icon="IMAGE_DATA")
         row.operator("mfo.remove_past", text="", icon="TRASH")

@@ -1,15 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pieces the panels are made of: sentences that wrap and pictures with a name below."""
+"""Pieces the panels are made of: sentences that wrap, buttons beside or below each other, pictures with a name below.
+
+Blender cuts a text that is wider than its label or button, so what stands beside what is chosen by the texts' widths.
+All widths are in pixels at a scale of 1. What margins and icons take was measured in windows of Blender 5.2: texts of
+rising width in each kind of item, and the last that was not cut.
+"""
 
 from __future__ import annotations
-
-import textwrap
 
 import bpy
 
 from ..result import previews
-from ..sentences.translated import translated
+from ..sentences.translated import translated, word
+from ..text_width import text_width, ui_scale, wrapped
 
+UNIT = 20.0  # height of a row and width of an icon's button
+ICON = 25.0  # an icon before a text, with its margins
+BUTTON = 5.0  # margins of a button's text
+NUMBER = 60.0  # a number as 0.500 with its margins
+NAMED_NUMBER = 40.0  # margins and arrows of a number with its name, without both
+GAP = 8.0  # between the items of a row
+LABEL = 3.0  # margins of a label
+BOX = 16.0  # margins of a box
+_AROUND = 52.0  # margins of a panel and the tabs of the sidebar
+_LEAST = 100.0  # of a panel in a region that has no width yet
 _LABELS = {
     "current": "Preliminary",
     "cycles": "In Cycles",
@@ -20,36 +34,63 @@ _LABELS = {
 _SHORT = {
     "reference": "Goal",
     "current": "Current",
+    "difference": "Error",
+    "cycles": "Cycles",
     "cycles_difference": "Error",
     "engine": "Own",
     "engine_difference": "Error",
-}  # where three names have little room
-_LETTERS_OF_A_BOX = 3  # that its margins take; in a window a list of sockets' names was cut without them
-_LETTERS_OF_A_ROW = 27  # of a line that holds two buttons uncut; a narrower side bar has one below the other
+}  # where the names have no room
 
 
-def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str) -> None:
-    """A sentence in the user's language over as many lines as the region needs; labels do not wrap."""
+def draw_sentence(
+    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str, *, taken: float = 0.0
+) -> None:
+    """A sentence in the user's language over as many lines as the region needs; labels do not wrap.
+
+    `taken`: width of what stands beside it.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(translated(text), letters(context) - _LETTERS_OF_A_BOX) or [""]):
+    width = room(context) - taken - BOX - ICON
+    for i, line in enumerate(wrapped(context, translated(text), width)):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
-def letters(context: bpy.types.Context) -> int:
-    """How many letters a line of the region holds."""
-    scale = context.preferences.system.ui_scale
-    return max(16, int((context.region.width / scale - 80) / 5.8))  # 5.8 px is an average letter at scale 1
+def room(context: bpy.types.Context) -> float:
+    """Width of what a panel holds."""
+    return max(context.region.width / ui_scale(context) - _AROUND, _LEAST)
 
 
-def is_narrow(context: bpy.types.Context) -> bool:
-    """Whether two buttons beside each other would have their names cut."""
-    return letters(context) < _LETTERS_OF_A_ROW
+def fits(context: bpy.types.Context, width: float, *texts: str) -> bool:
+    """Whether each of the texts, as they are shown, has room in a width."""
+    return all(text_width(context, text) <= width for text in texts)
 
 
-def pair(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
-    """Where two buttons belong: beside each other, or below where there is no room."""
-    return layout.column(align=True) if is_narrow(context) else layout.row(align=True)
+def side_by_side(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    *texts: str,
+    margins: float = ICON,
+    taken: float = 0.0,
+) -> bpy.types.UILayout:
+    """Where items with these texts, as they are shown, belong: beside each other, or below where one would be cut.
+
+    `margins`: of each one's text, `taken`: by what else is in the line.
+    """
+    beside = fits(context, (room(context) - taken) / len(texts) - margins, *texts)
+    return layout.row(align=True) if beside else layout.column(align=True)
+
+
+def buttons_side_by_side(
+    layout: bpy.types.UILayout, context: bpy.types.Context, *names: str, taken: float = 0.0
+) -> bpy.types.UILayout:
+    """The same for buttons of operators with an icon, by their English names."""
+    return side_by_side(layout, context, *(word(name, "Operator") for name in names), taken=taken)
+
+
+def names_of(data: bpy.types.bpy_struct, choice: str) -> list[str]:
+    """Names of the items of an enumeration, as they are shown."""
+    return [word(item.name) for item in data.bl_rna.properties[choice].enum_items]
 
 
 def draw_pictures(
@@ -58,14 +99,13 @@ def draw_pictures(
     """Pictures side by side; with `clickable` their names are buttons that show them at full size."""
     row = layout.row(align=True)
     scale = _icon_scale(context, len(names))
-    for name in names:
+    labels = [translated(_LABELS.get(name, name.title())) for name in names]
+    if not fits(context, room(context) / len(names) - BUTTON, *labels):
+        labels = [translated(_SHORT.get(name, name.title())) for name in names]
+    for name, label in zip(names, labels, strict=True):
         column = row.column(align=True)
         if previews.icon(name):
             column.template_icon(icon_value=previews.icon(name), scale=scale)
-        label = _LABELS.get(name, name.title())
-        if is_narrow(context) and len(names) > 2:
-            label = _SHORT.get(name, label)
-        label = translated(label)
         if clickable:
             column.operator("mfo.show_pictures", text=label).show = name
         else:
@@ -76,19 +116,18 @@ def draw_pictures(
 
 def _icon_scale(context: bpy.types.Context, pictures: int) -> float:
     """Height of an icon, in rows of the interface, that is as wide as its share of the region: no empty bands."""
-    width = context.region.width / context.preferences.system.ui_scale - 60  # without margins and tabs
-    return min(max(width / pictures / 20, 2.0), 10.0)  # a row is 20 px at scale 1
+    return min(max(room(context) / pictures / UNIT, 2.0), 10.0)
 
 
 def draw_numbers(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection) -> None:
     """Errors at the start and of the result."""
     if not rows:
         return
-    grid = layout.box().column(align=True)
+    grid = layout.column(align=True)  # a box would take the room of a narrow sidebar
     for name, *numbers in (("Error", "Start", "Result"), *((row.name, row.start, row.result) for row in rows)):
-        split = grid.split(factor=0.46)
+        split = grid.split(factor=0.37, align=True)
         split.label(text=translated(name))
-        columns = split.split(factor=0.5)
+        columns = split.split(factor=0.5, align=True)
         for number in numbers:
             columns.label(text=number)
 

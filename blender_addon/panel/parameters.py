@@ -13,6 +13,10 @@ from ..graph_values.place import holder_of, is_there
 from ..graph_values.table import GraphValue
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
 from ..running import running_job
+from ..sentences.translated import word
+from .layout import BOX, BUTTON, ICON, NAMED_NUMBER, NUMBER, UNIT, fits, names_of, room, side_by_side
+
+_NAMES = 0.6  # share of a value's name beside its number
 
 
 class Parameters:
@@ -25,8 +29,7 @@ class Parameters:
         """Say in the heading which values may change."""
         settings = context.scene.mfo
         named = settings.bl_rna.properties["parameter_set"].enum_items[settings.parameter_set].name
-        words = bpy.app.translations.pgettext_iface("Values to Fit")
-        self.layout.label(text=f"{words}: {bpy.app.translations.pgettext_iface(named)}")  # type: ignore[attr-defined]
+        self.layout.label(text=f"{word('Values to Fit')}: {word(named)}")  # type: ignore[attr-defined]
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -38,16 +41,17 @@ class Parameters:
         layout, settings = self.layout, context.scene.mfo  # type: ignore[attr-defined]  # from Panel
         _draw_leaves(layout, context)
         layout.operator("mfo.start_from", icon="EYEDROPPER")
-        layout.row().prop(settings, "parameter_set", expand=True)
+        sets = side_by_side(layout, context, *names_of(settings, "parameter_set"), margins=BUTTON)
+        sets.prop(settings, "parameter_set", expand=True)
         if settings.parameter_set != "chosen":
             return
         column = layout.column(align=True)
         if settings.model == "blender_principled":
             target = target_shader(context.object.active_material if context.object else None)
             for key, name, *_ in SOCKET_ITEMS:
-                _draw_value(column, settings, key, name, target)
+                _draw_value(column, context, settings, key, name, target)
             if target is not None:
-                _draw_nodes(layout, settings, target)
+                _draw_nodes(layout, context, settings, target)
         else:
             for key, name, *_ in PARAMETER_ITEMS:
                 column.prop_enum(settings, chosen_of(settings.model), key, text=name)
@@ -70,20 +74,23 @@ def _draw_leaves(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 
 
 def _draw_value(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, key: str, name: str, target: TargetShader | None
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    settings: bpy.types.PropertyGroup,
+    key: str,
+    name: str,
+    target: TargetShader | None,
 ) -> None:
     """A box that unlocks the value, its name, and the value itself to set where the fit starts."""
     socket = target.sockets.get(name) if target is not None else None
     if target is not None and socket is None:
         return  # not in this version of Blender, or not of this node
     name = target.own_name(name) if target is not None else name
-    split = layout.split(factor=0.6, align=True)
+    box, value = _cells(layout, context, room(context), word(name))
     is_linked = socket is not None and socket.is_linked
     icon = "LINKED" if is_linked else "CHECKBOX_HLT" if key in settings.sockets else "LOCKED"
-    box = split.row(align=True)
     box.enabled = not is_linked
     box.prop_enum(settings, "sockets", key, text=name, icon=icon)
-    value = split.row(align=True)
     if is_linked:
         value.label(text="linked")
     elif socket is not None:
@@ -93,34 +100,49 @@ def _draw_value(
     bound = settings.bounds.get(key)
     value.operator("mfo.limit_value", text="", icon="NOCURVE", depress=bound is not None).name = key
     if bound is not None:
-        limits = layout.row(align=True)
+        texts = (f"{word(name)} {value:.3f}" for name, value in (("Least", bound.lower), ("Most", bound.upper)))
+        limits = side_by_side(layout, context, *texts, margins=NAMED_NUMBER)
         limits.prop(bound, "lower")
         limits.prop(bound, "upper")
 
 
-def _draw_nodes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, target: TargetShader) -> None:
+def _cells(
+    layout: bpy.types.UILayout, context: bpy.types.Context, width: float, name: str
+) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:
+    """Layouts for the name as it is shown and its value, beside each other or below in a width."""
+    names = _NAMES * width
+    if fits(context, names - ICON, name) and width - names - UNIT >= NUMBER:
+        split = layout.split(factor=_NAMES, align=True)
+        return split.row(align=True), split.row(align=True)
+    return layout.row(align=True), layout.row(align=True)
+
+
+def _draw_nodes(
+    layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup, target: TargetShader
+) -> None:
     """The values inside the target's nodes, or of a mix those of the others, under their nodes' labels."""
     tree = (target.groups[0] if target.groups else target.node).id_data
     for (_, label), values in groupby(inside_values(target), lambda value: (value.place.path, value.label)):
         box = layout.box().column(align=True)
         box.label(text=label, icon="NODE")
         for value in values:
-            _draw_node_value(box, settings, tree, value)
+            _draw_node_value(box, context, settings, tree, value)
 
 
 def _draw_node_value(
     layout: bpy.types.UILayout,
+    context: bpy.types.Context,
     settings: bpy.types.PropertyGroup,
     tree: bpy.types.NodeTree,
     value: GraphValue | MixValue,
 ) -> None:
     """A box that unlocks the value, its name within the node, and the value itself."""
-    split = layout.split(factor=0.6, align=True)
     is_chosen = value.name in settings.node_values
-    text, icon = value.name.rpartition("/")[2], "CHECKBOX_HLT" if is_chosen else "LOCKED"
-    split.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen).name = value.name
+    text, icon = word(value.name.rpartition("/")[2]), "CHECKBOX_HLT" if is_chosen else "LOCKED"
+    box, number = _cells(layout, context, room(context) - BOX, text)
+    box.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen, translate=False).name = value.name
     if not is_there(tree, value.place):
-        split.label(text="new node")
+        number.label(text="new node")
         return
     owner, attribute = holder_of(tree, value.place)
-    split.row(align=True).prop(owner, attribute, text="", index=max(value.place.component, -1))
+    number.prop(owner, attribute, text="", index=max(value.place.component, -1))

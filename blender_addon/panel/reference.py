@@ -9,8 +9,8 @@ from ..check import preflight
 from ..check.checks import asks_view
 from ..result import overlay
 from ..running import running_job
-from ..sentences.translated import translated
-from .layout import pair
+from ..sentences.translated import translated, word
+from .layout import BOX, BUTTON, NAMED_NUMBER, buttons_side_by_side, names_of, side_by_side
 from .part import draw_part
 
 
@@ -34,7 +34,7 @@ class Reference:
             column.template_ID(settings, "reference_image", open="image.open")
         _draw_pictures(column, context, settings)
         shown = overlay.is_shown(context.scene.camera)
-        row = pair(layout, context) if shown else layout.row(align=True)
+        row = buttons_side_by_side(layout, context, "Over the View", "") if shown else layout.row(align=True)
         row.operator(
             "mfo.overlay_reference", text="Over the View", icon="HIDE_OFF" if shown else "HIDE_ON", depress=shown
         )
@@ -43,7 +43,8 @@ class Reference:
         if asks_view(context.scene):
             question = column.column(align=True)
             question.label(text="How was it made?")
-            pair(question, context).prop(settings, "reference_view", expand=True)
+            row = side_by_side(question, context, *names_of(settings, "reference_view"), margins=BUTTON)
+            row.prop(settings, "reference_view", expand=True)
 
 
 def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
@@ -52,27 +53,33 @@ def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, setti
     box = column
     if pictures:
         box = column.box().column(align=True)
-        _draw_what_it_shows(box, first, "1")
+        _draw_what_it_shows(box, context, first, "1")
     draw_part(box, context, first.part)
     for index, picture in enumerate(pictures):
         box = column.box().column(align=True)
-        _draw_what_it_shows(box, picture, str(index + 2), index)
+        _draw_what_it_shows(box, context, picture, str(index + 2), index)
         box.prop(picture, "path", text="")
         draw_part(box, context, picture.part, index + 2)
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
 
 
 def _draw_what_it_shows(
-    box: bpy.types.UILayout, picture: bpy.types.PropertyGroup, number: str, index: int | None = None
+    box: bpy.types.UILayout,
+    context: bpy.types.Context,
+    picture: bpy.types.PropertyGroup,
+    number: str,
+    index: int | None = None,
 ) -> None:
     row = box.row(align=True)
     row.prop(picture, "use", text=translated(f"Picture {number}"))
-    row.prop(picture, "exposure", text="EV")
     if index is not None:
         row.operator("mfo.remove_picture", text="", icon="X").index = index
-    row = box.row(align=True)
-    row.active = picture.use
-    row.prop(picture, "camera", text="", icon="CAMERA_DATA")
+    rest = box.column(align=True)
+    rest.active = picture.use
+    rest.prop(picture, "camera", text="", icon="CAMERA_DATA")
+    numbers = (f"{word('EV')} {picture.exposure:.3f}", f"{word('Frame')} {picture.frame}")
+    row = side_by_side(rest, context, *numbers, margins=NAMED_NUMBER, taken=BOX)
+    row.prop(picture, "exposure", text="EV")
     row.prop(picture, "frame")
     if index is not None and len(bpy.data.scenes) > 1:
         row = box.row()
@@ -89,7 +96,8 @@ def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         layout.label(text="Select an object", icon="ERROR")
     else:
         material = obj.active_material
-        row = layout.row()
+        shown = material.name if material is not None else word("No material")
+        row = side_by_side(layout, context, obj.name, shown)
         row.label(text=obj.name, icon="OBJECT_DATA", translate=False)  # a name is nobody's to translate
         if material is None:
             row.label(text="No material", icon="ERROR")

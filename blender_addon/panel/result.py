@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import bpy
 
 from ..export.nodes.target_shader import target_shader
 from ..result import previews, shown_result
 from ..result.animated_sockets import animation_of
 from ..result.job_result import must_ask
-from ..sentences.translated import translated
-from .layout import draw_sentence, letters, pair
+from ..sentences.translated import translated, word
+from .layout import BOX, BUTTON, ICON, draw_sentence, fits, room, side_by_side
 
-_LETTERS_OF_THREE = 26  # of a line with name, start and result; a narrower side bar has no start
+_NUMBER = "-0.123"  # which a narrow sidebar holds; where it does not hold three columns, it has no start
+_NAME_OF_TWO, _NAME_OF_THREE = 0.66, 0.52  # share of the name beside its values
 _KEPT = "not_visible"  # level of what stays as it was
 
 
@@ -44,7 +47,7 @@ class Result:
         applied = material is not None and bool(material.mfo.originals)
         shows_own = material is not None and applied and material.mfo.shows_original
         text = ("A: Own" if shows_own else "B: Recovered") if applied else "A/B"
-        row = pair(column, context)
+        row = side_by_side(column, context, translated(text), word("Revert", "Operator"))
         row.operator("mfo.toggle", text=translated(text), icon="ARROW_LEFTRIGHT", depress=applied and not shows_own)
         row.operator("mfo.revert", text="Revert", icon="LOOP_BACK")
         column.operator("mfo.save_as_asset", icon="ASSET_MANAGER")
@@ -70,7 +73,8 @@ def _draw_materials(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup
 def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: bpy.types.bpy_prop_collection) -> None:
     """Names, starts and results; what the picture does not show is one sentence."""
     kept = [row.name for row in rows if row.certainty == _KEPT]
-    has_start = letters(context) >= _LETTERS_OF_THREE
+    column = (room(context) - BOX) * (1.0 - _NAME_OF_THREE) / 2 - BUTTON
+    has_start = fits(context, column, word("Start"), word("Result"), _NUMBER)
     box = layout.box()
     grid = box.column(align=True)
     name, start, result = _cells(grid, has_start)
@@ -78,15 +82,12 @@ def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: b
     if start is not None:
         start.label(text="Start")
     result.label(text="Result")
-    for row in rows:
-        if row.certainty == _KEPT:
-            continue
-        name, start, result = _cells(grid, has_start)
-        icon = "ERROR" if row.certainty == "doubtful" else "NONE"
-        name.operator("mfo.copy_values", text=row.name, icon=icon, emboss=False).name = row.name
-        if start is not None:
-            _draw_value(start, row.start, -1.0)
-        _draw_value(result, row.result, row.sureness)
+    found = [row for row in rows if row.certainty != _KEPT]
+    for node, values in groupby(found, lambda row: row.name.rpartition("/")[0]):
+        if node:
+            grid.label(text=node, icon="NODE")
+        for row in values:
+            _draw_row(grid, context, row, has_start)
     if any(row.sureness >= 0.0 for row in rows):
         draw_sentence(box, context, "Bar: how sure the value is.", "INFO")
     if kept:
@@ -104,16 +105,35 @@ def _draw_next_picture(layout: bpy.types.UILayout, context: bpy.types.Context) -
     box.operator("mfo.set_up_next_picture", text="Set Up Light" if light else "Set Up Camera", icon=icon)
 
 
+def _draw_row(
+    grid: bpy.types.UILayout, context: bpy.types.Context, row: bpy.types.PropertyGroup, has_start: bool
+) -> None:
+    """One value; a name that its cell would cut has a line of its own."""
+    text, is_doubtful = word(row.name.rpartition("/")[2]), row.certainty == "doubtful"
+    cell = (room(context) - BOX) * (_NAME_OF_THREE if has_start else _NAME_OF_TWO)
+    beside = fits(context, cell - (ICON if is_doubtful else BUTTON), text)
+    line = None if beside else grid.row()
+    name, start, result = _cells(grid, has_start)
+    if line is not None:
+        name.label(text="")
+        name, name.alignment = line, "LEFT"
+    icon = "ERROR" if is_doubtful else "NONE"
+    name.operator("mfo.copy_values", text=text, icon=icon, emboss=False, translate=False).name = row.name
+    if start is not None:
+        _draw_value(start, row.start, -1.0)
+    _draw_value(result, row.result, row.sureness)
+
+
 def _cells(
     grid: bpy.types.UILayout, has_start: bool
 ) -> tuple[bpy.types.UILayout, bpy.types.UILayout | None, bpy.types.UILayout]:
     """Layouts for the name, the start and the result of one line."""
-    split = grid.split(factor=0.56 if has_start else 0.66)
+    split = grid.split(factor=_NAME_OF_THREE if has_start else _NAME_OF_TWO, align=True)
     name = split.row()
     name.alignment = "LEFT"
     if not has_start:
         return name, None, split.row(align=True)
-    columns = split.split(factor=0.46)
+    columns = split.split(factor=0.5, align=True)
     return name, columns.row(align=True), columns.row(align=True)
 
 

@@ -10,11 +10,13 @@ from ..operators.fit_options import selected_targets
 from ..result import previews, shown_result
 from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
-from ..sentences.translated import translated
+from ..sentences.translated import translated, word
 from ..translations import CONTEXT
-from .layout import draw_pictures, draw_sentence, letters
+from .layout import BOX, BUTTON, LABEL, UNIT, draw_pictures, draw_sentence, fits, room
 
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
+
+_JOINT = " · "  # between what is done, how far it is and the time left
 
 
 class Run:
@@ -30,7 +32,7 @@ class Run:
         if running_job.current is not None:
             _draw_progress(layout, context)
         elif running_export.current is not None:
-            _draw_export(layout)
+            _draw_export(layout, context)
         _draw_buttons(layout, context)
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
@@ -44,7 +46,7 @@ class Run:
             body.prop(settings, "max_iterations")
         _draw_queue(layout, context)
         if has_trouble():
-            draw_setup(layout, width=letters(context))
+            draw_setup(layout, context, width=room(context) - BOX - LABEL)
         _draw_end(layout, context)  # a result of an earlier day needs no backend
 
 
@@ -78,26 +80,32 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
 
 
-def _draw_export(layout: bpy.types.UILayout) -> None:
+def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What is waited for, how long already, and the way out."""
-    row = layout.row(align=True)
-    row.scale_y = 1.4
     seconds = running_export.seconds()
     share = seconds / (seconds + _USUAL_SECONDS)  # how long it takes is not known
-    text = bpy.app.translations.pgettext_iface("Cycles prepares the scene")
-    row.progress(factor=share, type="BAR", text=f"{text} · {seconds:.0f} s")
+    text = word("Cycles prepares the scene")
+    _draw_bar(layout, context, share, f"{text} · {seconds:.0f} s")
+
+
+def _draw_bar(layout: bpy.types.UILayout, context: bpy.types.Context, share: float, text: str) -> None:
+    """How far it is, and the way out; what is done stands below where it would cost the time left its room."""
+    done, joint, rest = text.partition(_JOINT)
+    fitting = not joint or fits(context, room(context) - UNIT - BUTTON, text)
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    row.progress(factor=share, type="BAR", text=text if fitting else rest)
     row.operator("mfo.cancel", text="", icon="X")
+    if not fitting:
+        layout.label(text=done, translate=False)
 
 
 def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     runtime = context.window_manager.mfo_runtime
     column = layout.column()
-    row = column.row(align=True)
-    row.scale_y = 1.4
-    row.progress(factor=runtime.fraction, type="BAR", text=translated(runtime.progress_text))
-    row.operator("mfo.cancel", text="", icon="X")
+    _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text))
     if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
-        column.label(text=translated(f"Of material {runtime.material}"), icon="MATERIAL")
+        draw_sentence(column, context, f"Of material {runtime.material}", "MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:
         draw_pictures(column, context, shown)
@@ -107,8 +115,8 @@ def _draw_queue(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not fit_queue.waiting and not fit_queue.finished:
         return
     box = layout.box()
-    said = translated(f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended")
-    box.label(text=said, icon="SEQUENCE")
+    said = f"Queue: {len(fit_queue.waiting)} waiting, {len(fit_queue.finished)} ended"
+    draw_sentence(box, context, said, "SEQUENCE")
     for ended in fit_queue.finished:
         draw_sentence(box, context, f"{ended.material_name}: {ended.sentence}", ended.icon)
     for index, fit in enumerate(fit_queue.waiting):

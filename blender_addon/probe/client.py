@@ -7,23 +7,19 @@ import contextlib
 import json
 import os
 import queue
-import re
 import shutil
 import subprocess
-import tempfile
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
 from ..process.backend_python import EXTENSION_ROOT
 from ..process.background_task import environment_for
 from ..process.job_process import log_tail
-from ..process.process_group import KILL, own_group, process_lives, signal_group
+from ..process.process_group import KILL, own_group, signal_group
+from ..process.temporary_folder import make_folder
 from .own_blender import own_blender, save_copy
 
-PREFIX = "material_fit_probe_"
-_FOLDER = re.compile(PREFIX + r"(\d+)_.+")  # the process that asks, mkdtemp's letters
 # a surface of 1024 texels takes up to 7 s of one core, a sky of 1024 pixels 5; a big file on a slow machine far more
 ANSWER_SECONDS = 600.0  # the second Blender may take for the opening of the file, or for an answer
 MORE_SECONDS = 120.0  # and for each further thing that a request asks for
@@ -46,8 +42,7 @@ class Probe:
     """
 
     def __init__(self) -> None:
-        _remove_abandoned()
-        self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}_"))
+        self.folder = make_folder("probe")
         self._log = self.folder / "probe.log"
         # from the first, which says that the file is open; None: the process has ended
         self._answers: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
@@ -165,12 +160,3 @@ class Probe:
         self._answers.put(None)
         last = next((text for text in reversed(log_tail(self._log).splitlines()) if text.strip()), "its log is empty")
         raise ProbeError(f"The second Blender, which evaluates nodes, has ended: {last.strip()}")
-
-
-def _remove_abandoned() -> None:
-    """Remove what processes that were killed have left."""
-    with contextlib.suppress(OSError):
-        for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-            found = _FOLDER.fullmatch(path.name)
-            if found is not None and not process_lives(int(found[1])):
-                shutil.rmtree(path, ignore_errors=True)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import bpy.utils.previews
 import numpy as np
 
 from ..export.files.png_file import write_png
+from ..process.temporary_folder import temporary_folder
 
 _collection: Any = None
 _shown: dict[str, str] = {}
@@ -45,8 +45,8 @@ def warm_up() -> None:
     if _collection is None or bpy.app.background or _is_warm:
         return
     _is_warm = True
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "pixel.png"
+    with temporary_folder("pixel") as folder:
+        path = folder / "pixel.png"
         write_png(path, np.zeros((1, 1, 3), np.uint8))
         show("pixel", path, now=True)
 

@@ -10,7 +10,6 @@ import atexit
 import os
 import shutil
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ import bpy
 from ..check.preflight import redraw
 from ..process.backend_python import EXTENSION_ROOT, backend_environment
 from ..process.background_task import BackgroundTask, Step, environment_for
+from ..process.temporary_folder import make_folder
 from ..result import previews, shown_result
 
 TICK = 0.3  # seconds between two looks
@@ -68,7 +68,7 @@ def check_result(job: Path, material: str, python: Path) -> None:
             for name in shown_result.CHECKED[: 2 * len(flips)]:
                 previews.show(name, job / "pictures" / f"{name}.png")
 
-    folder = Path(tempfile.mkdtemp(prefix="material_fit_"))
+    folder = make_folder("check")
     engine = engine_name(bpy.context.scene.render.engine)
     alone = engine == "Cycles" or not bpy.app.binary_path  # the module may have no graphics
     steps = []
@@ -98,7 +98,7 @@ def render_reference(out: Path) -> None:
             bpy.ops.mfo.use_reference("EXEC_DEFAULT", True, filepath=str(out))
 
     out.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix="material_fit_"))
+    folder = make_folder("check")
     _begin(folder, [_blender_step(folder, "render", ["--out", str(out)], "Rendering the reference")], done)
 
 

@@ -48,6 +48,11 @@ def translated(text: str) -> str:
     return in_language(_language(), text) if _is_wanted() else text
 
 
+def word(text: str, context: str = "*") -> str:
+    """A label as Blender shows it: names of operators have the context Operator, other labels none."""
+    return bpy.app.translations.pgettext_iface(text, context)
+
+
 def report_language() -> str:
     """The language that reports are shown in, as `de`; empty for English."""
     code = _code(_language()) if _is_wanted() else ""

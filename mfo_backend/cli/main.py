@@ -15,6 +15,7 @@ from typing import TextIO
 from .. import __version__
 from .. import one_blas_thread as one_blas_thread
 from ..render.machine.cache_folder import use_kernel_cache
+from ..render.machine.temporary_folder import remove_abandoned
 from ..types.errors import MfoError
 from ..types.status import Status
 
@@ -66,6 +67,7 @@ _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not install
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     use_kernel_cache()
+    remove_abandoned()
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         parsed = _parser(words).parse_args(words)  # loads the command's module and what that needs

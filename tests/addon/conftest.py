@@ -15,6 +15,11 @@ WIDTH, HEIGHT = 96, 64  # of the fake backend's pictures
 
 @pytest.fixture
 def scene(addon: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """A new scene in the test's own folder."""
+    return new_scene(tmp_path, monkeypatch)
+
+
+def new_scene(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Blender's start-up scene with names, a reference that fits it and the fake backend; `bpy`, `reference`, `job`."""
     import bpy
 
@@ -24,7 +29,7 @@ def scene(addon: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sim
     render = bpy.context.scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
     bpy.context.scene.view_settings.view_transform = "Standard"
-    reference = tmp_path / "reference.png"
+    reference = folder / "reference.png"
     fake_backend.png(reference, (180, 60, 40), WIDTH, HEIGHT)
-    monkeypatch.setenv("MFO_BACKEND_PYTHON", str(fake_backend.write_interpreter(tmp_path / "backend python")))
-    return SimpleNamespace(bpy=bpy, reference=str(reference), job=str(tmp_path / "job"))
+    monkeypatch.setenv("MFO_BACKEND_PYTHON", str(fake_backend.write_interpreter(folder / "backend python")))
+    return SimpleNamespace(bpy=bpy, reference=str(reference), job=str(folder / "job"))

@@ -27,7 +27,7 @@ def shown_messages() -> set[tuple[str, str]]:
             if isinstance(node, ast.ClassDef):
                 found.update(_of_class(node))
             elif isinstance(node, ast.Call):
-                found.update(_of_call(node))
+                found.update(of_call(node))
             elif isinstance(node, ast.Assign) and any(_name(t).endswith("_ITEMS") for t in node.targets):
                 found.update(_of_items(node.value))
             elif isinstance(node, ast.Assign) and _name(node.targets[0]) == "_TITLES":
@@ -46,7 +46,8 @@ def _of_class(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
         yield "*", description
 
 
-def _of_call(node: ast.Call) -> Iterator[tuple[str, str]]:
+def of_call(node: ast.Call) -> Iterator[tuple[str, str]]:
+    """The (context, text) pairs that one call hands over."""
     name = _name(node.func)
     words = {word.arg: word.value for word in node.keywords}
     if name in _PROPERTIES and "HIDDEN" not in ast.dump(node) and "_SCRIPT" not in ast.dump(node):
@@ -55,8 +56,9 @@ def _of_call(node: ast.Call) -> Iterator[tuple[str, str]]:
         yield from _of_items(words.get("items"))
     elif name in _LABELLED:
         yield from _texts("Operator" if name in {"operator"} else "*", words.get("text"))
-    elif name == "pgettext_iface" and node.args:
-        yield from _texts("*", node.args[0])
+    elif name == "word":  # text and context
+        context = node.args[1].value if len(node.args) > 1 and isinstance(node.args[1], ast.Constant) else "*"
+        yield from _texts(str(context), node.args[0])
 
 
 def _of_items(node: ast.expr | None) -> Iterator[tuple[str, str]]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..addon.fake_backend import png
 
+ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = Path(__file__).resolve().parent / "scripts" / "graph_fit_until_killed.py"
 START_SECONDS = 90.0  # until the backend has started a Blender for the nodes
 ORPHAN_SECONDS = 12.0  # the backend promises ten
@@ -37,9 +38,15 @@ def kill_blender_of_a_graph_fit(command: Sequence[str], folder: Path, *words: st
     assert (folder / "scene.blend").read_bytes() == blend
     hidden = [path.name for path in folder.glob(".*")]
     assert hidden == [], hidden
-    # Blender's own folder for one session, and what a render wrote at the very end, which the next start removes
-    left = [path.name for path in temporary.iterdir() if not path.name.startswith(("blender_", "mfo_nodes_"))]
-    assert left == [], left
+    assert left_in(temporary, "blender_", "mfo_nodes_", "mfo_llvm_") == []
+    start = [sys.executable, "-m", "mfo_backend", "--version"]
+    subprocess.run(start, env=environment, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    assert left_in(temporary, "blender_") == []  # Blender's own folder for one session
+
+
+def left_in(temporary: Path, *known: str) -> list[str]:
+    """What lies there and does not begin with what may."""
+    return [path.name for path in temporary.iterdir() if not path.name.startswith(known)]
 
 
 def processes_with(temporary: Path) -> dict[int, bytes]:

@@ -11,9 +11,13 @@ import pytest
 
 from ..addon import fake_backend
 from ..addon.backend.wheel_folder import write_wheel
-from .conftest import ADDON_ID, RealBlender
+from .conftest import ADDON_ID, PATIENCE, RealBlender
 
-pytestmark = [pytest.mark.blender, pytest.mark.slow]
+pytestmark = [
+    pytest.mark.blender,
+    pytest.mark.slow,
+    pytest.mark.timeout(PATIENCE + 60.0),  # Blender and its screen are ended first
+]
 SCRIPT = Path(__file__).resolve().parent / "scripts" / "in_windows.py"
 
 

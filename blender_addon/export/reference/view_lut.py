@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...process.temporary_folder import temporary_folder
 from ..files.exr_file import write_exr
 from ..images.color_space import from_rec709
 from .reference_view import output_view
@@ -76,8 +76,8 @@ def shown_by(scene: bpy.types.Scene, linear: NDArray[np.floating]) -> NDArray[np
         settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "16"
         settings.compression = 0
         image.pixels.foreach_set(pixels.ravel())
-        with tempfile.TemporaryDirectory() as folder:
-            path = str(Path(folder) / "view.png")
+        with temporary_folder("view") as folder:
+            path = str(folder / "view.png")
             image.save_render(path, scene=copied)
             written = bpy.data.images.load(path, check_existing=False)
             written.colorspace_settings.name = "Non-Color"

@@ -68,7 +68,7 @@ LABELS = {
     "Opacity": "Opacité",
     "Show the reference over the camera's view, or take it away": "Montrer la référence sur la vue de la caméra, ou l'enlever",
     "Use as Reference of Material Fit": "Prendre comme référence de Material Fit",
-    "Allow Online Access": "Autoriser l'accès en ligne",
+    "Allow Online Access": "Autoriser l'accès réseau",
     "Cycles prepares the scene": "Cycles prépare la scène",
     "Fit this shader of the material's mix and hold the others": "Ajuster ce shader du mélange du matériau et garder les autres",
     "Its node, after the groups it lies in": "Son nœud, après les groupes qui le contiennent",

@@ -24,8 +24,8 @@ PANEL = {
     # heading of the check
     "Check": "Vérification",
     "Choose a picture": "Choisir une image",
-    "{} problem to fix": "{} problème à corriger",
-    "{} problems to fix": "{} problèmes à corriger",
+    "{} problem to fix": "{} problème",
+    "{} problems to fix": "{} problèmes",
     "Ready": "Prêt",
     "Ready, {} note": "Prêt, {} remarque",
     "Ready, {} notes": "Prêt, {} remarques",

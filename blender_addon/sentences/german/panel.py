@@ -24,8 +24,8 @@ PANEL = {
     # heading of the check
     "Check": "Prüfen",
     "Choose a picture": "Ein Bild wählen",
-    "{} problem to fix": "{} Problem beheben",
-    "{} problems to fix": "{} Probleme beheben",
+    "{} problem to fix": "{} Problem",
+    "{} problems to fix": "{} Probleme",
     "Ready": "Bereit",
     "Ready, {} note": "Bereit, {} Hinweis",
     "Ready, {} notes": "Bereit, {} Hinweise",

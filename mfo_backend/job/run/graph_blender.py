@@ -11,11 +11,9 @@ import contextlib
 import json
 import os
 import queue
-import re
 import shutil
 import signal
 import subprocess
-import tempfile
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -26,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from ...render.machine.temporary_folder import make_folder
 from ...render.models.graph_pictures import Evaluated, GraphPictures, Picture, Variant
 from ...types.errors import BadInputError, MfoError
 from ..folder.graph_request import COPY, NodeGraph
 from .more_pictures import JobPicture
-from .parent_process import liveness_of
 
 # one render of many variants takes a second; a big file opens in a minute, and a loaded machine is ten times slower
 ANSWER_SECONDS = 300.0
@@ -47,8 +45,6 @@ _NO_COPY = (
 _NOT_THIS_PICTURE = (
     "Picture {label} does not say how its camera sees the values inside nodes: export all pictures of the job anew."
 )
-_PREFIX = "mfo_nodes_"
-_FOLDER = re.compile(_PREFIX + r"(\d{1,9})_.+")  # the backend's process, mkdtemp's letters
 
 
 class GraphBlender:
@@ -66,8 +62,7 @@ class GraphBlender:
             If it cannot be started.
         """
         self._ready = False
-        _remove_abandoned()
-        self._folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}_"))
+        self._folder = make_folder("nodes")
         self._log = self._folder / "blender.log"
         own = [str(copy), "--folder", str(self._folder), "--parent", str(os.getpid())]
         kept = {key: value for key, value in os.environ.items() if key not in ("PYTHONHOME", "PYTHONSTARTUP")}
@@ -184,14 +179,6 @@ class GraphBlender:
                 os.killpg(self._process.pid, signal.SIGKILL)
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(END_SECONDS)
-
-
-def _remove_abandoned() -> None:
-    """Remove what a Blender has still written while it ended with a backend that was killed."""
-    for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
-        found = _FOLDER.fullmatch(path.name)
-        if found is not None and not liveness_of(int(found[1]))():
-            shutil.rmtree(path, ignore_errors=True)
 
 
 @contextmanager

@@ -16,8 +16,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from ...render.machine.other_process import liveness_of
 from ...types.status import Status
-from .parent_process import liveness_of
 
 POLL_SECONDS = 0.1  # how often cancel file and parent are looked at; a stop is promised within a second
 ORPHAN_GRACE = 10.0  # seconds an orphan may take to write its best values

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
+from ...render.machine.other_process import liveness_of
 from ...types.status import Status
-from .parent_process import liveness_of
 
 LOG = "backend.log"  # in the job's folder; the add-on reads it
 _LOOK_SECONDS = 0.5  # between two looks at the clock and at the parent

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...render.machine.temporary_folder import temporary_folder
 from ...types.errors import BadInputError, SetupError
 from ..flip.flip_filters import DEFAULT_PIXELS_PER_DEGREE
 from ..pixels.pixel_check import check_pair
@@ -50,8 +50,7 @@ def hdr_vdp_q_jods(
         For pictures of different size or with NaN or infinite pixels.
     """
     folder, program = find_code(), find_program()
-    with tempfile.TemporaryDirectory(prefix="mfo-hdrvdp3-") as name:
-        job = Path(name)
+    with temporary_folder("hdrvdp") as job:
         shape, count = _write_pairs(job / "pairs.raw", pairs)
         if count == 0:
             return []

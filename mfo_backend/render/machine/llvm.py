@@ -18,7 +18,6 @@ import platform
 import re
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ from pathlib import Path
 from ...types.errors import SetupError
 from .cache_folder import cache_folder
 from .llvm_candidates import llvm_candidates
+from .temporary_folder import temporary_folder
 
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 _LIBRARY_AT_FAULT = ("LLVM ERROR", "too old")
@@ -174,11 +174,11 @@ def _processor() -> str:
 def _probe_in_child(path: Path, timeout: float) -> LlvmVerdict | None:
     package_root = Path(__file__).resolve().parents[3]
     search_path = os.pathsep.join(filter(None, [str(package_root), os.environ.get("PYTHONPATH")]))
-    with tempfile.TemporaryDirectory(prefix="mfo-llvm-", ignore_cleanup_errors=True) as kernels:
+    with temporary_folder("llvm") as kernels:
         environment = {
             **os.environ,
             PATH_VARIABLE: str(path),
-            "DRJIT_CACHE_DIR": kernels,
+            "DRJIT_CACHE_DIR": str(kernels),
             "PYTHONPATH": search_path,
             "PYTHONUTF8": "1",
         }

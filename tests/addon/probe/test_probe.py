@@ -16,7 +16,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from blender_addon.probe.client import PREFIX, Probe, ProbeError  # noqa: E402
+from blender_addon.probe.client import Probe, ProbeError  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[3]
 PATIENCE = 20.0  # seconds
@@ -30,6 +30,9 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     monkeypatch.setenv("TMPDIR", str(folder))
     return folder
+
+
+PREFIX = "material_fit_probe_"
 
 
 def left_in(folder: Path) -> list[Path]:
@@ -137,8 +140,8 @@ def lives(pid: int) -> bool:
 def test_what_killed_processes_have_left_goes(temporary: Path) -> None:
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
-    (temporary / f"{PREFIX}{gone.pid}_abcd").mkdir()
-    (temporary / f"{PREFIX}{os.getpid()}_abcd").mkdir()  # somebody else's probe in this process
+    (temporary / f"{PREFIX}{gone.pid}_abcd_123").mkdir()
+    (temporary / f"{PREFIX}{os.getpid()}_abcd_123").mkdir()  # somebody else's probe in this process
     with Probe():
         pass
-    assert [path.name for path in left_in(temporary)] == [f"{PREFIX}{os.getpid()}_abcd"]
+    assert [path.name for path in left_in(temporary)] == [f"{PREFIX}{os.getpid()}_abcd_123"]

@@ -14,6 +14,7 @@ import bpy
 
 STEP = 14  # pixels between two looks of the mouse, less than the height of a button at scale 1
 SCREEN_HEIGHT = 1000  # pixels
+GRIP = 7  # pixels at scale 1 from a sidebar's edge to where Blender 4.3 and 5.2 let it be dragged
 SETTLED = 0.3  # seconds after which Blender knows what is under a mouse that rests, on busy cores
 _screen: Any = None
 _last = None  # height at which a button was found
@@ -197,7 +198,8 @@ def look_for(words, place, where, region, part=0.3, begin=None):
 
 def widen(width):
     """Drag the sidebar's edge, as its width is no property."""
-    region = side_bar()
+    region, grip = side_bar(), GRIP * scale()
     y, target = region.y + region.height // 2, region.x + region.width - width
-    yield from drag((region.x, y), (target, y))
+    yield from drag((region.x + grip, y), (target + grip, y))
     yield 0.3
+    assert abs(region.width - width) < 2 * scale(), f"the sidebar is {region.width} pixels wide, not {width}"

@@ -13,7 +13,6 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from blender_addon.probe.client import PREFIX  # noqa: E402
 from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
 from mfo_backend.job.run.job_scene import request_materials  # noqa: E402
@@ -202,4 +201,4 @@ def test_nothing_is_left_in_the_temporary_folder() -> None:
     import os
     import tempfile
 
-    assert not list(Path(tempfile.gettempdir()).glob(f"{PREFIX}{os.getpid()}_*"))
+    assert not list(Path(tempfile.gettempdir()).glob(f"material_fit_probe_{os.getpid()}_*"))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -210,7 +211,7 @@ def test_without_mitsuba_llvm_is_not_blamed(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_the_probe_leaves_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(llvm.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     llvm.probe_llvm(tmp_path / "missing.so")
     shutil.rmtree(tmp_path / "cache", ignore_errors=True)
     assert list(tmp_path.iterdir()) == []
