@@ -51,6 +51,10 @@ class Glow(mi.Emitter):
             return bsdf.emission_share(si, active, sampled=sampled)
         return 1.0 - mi.Color3f(bsdf.eval_null_transmission(si, active))
 
+    def unlayered(self, si: mi.SurfaceInteraction3f, unit: float | None, active: Any = True) -> mi.Color3f:
+        """What is sent out below all layers; where the colour is free, `unit` is the radiance of a colour of 1."""
+        return mi.Color3f(self.radiance.eval(si, active) if unit is None else dr.opaque(mi.Float, unit))
+
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
     ) -> tuple[mi.DirectionSample3f, mi.Color3f]:

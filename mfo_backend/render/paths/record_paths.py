@@ -132,7 +132,7 @@ def record_paths(
         hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.glows else None
-        radiance = _unlayered(shape, settings, si) if settings.glows else None
+        radiance = shape.emitter().unlayered(si, settings.unit_emission) * filter_weight if settings.glows else None
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
@@ -159,7 +159,7 @@ def record_paths(
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))
-            exact.append(_lit(hits, nowhere, radiance * filter_weight, mi.Bool(True))())
+            exact.append(_lit(hits, nowhere, radiance, mi.Bool(True))())
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
             lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
@@ -175,13 +175,6 @@ def record_paths(
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged
-
-
-def _unlayered(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.Color3f:
-    """What the target's emission sends out below all layers, of a colour of 1 where that is free."""
-    if settings.unit_emission is not None:
-        return dr.full(mi.Color3f, settings.unit_emission, dr.width(si))
-    return mi.Color3f(shape.emitter().radiance.eval(si))
 
 
 def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, width: int, height: int) -> PrimaryRays:

@@ -23,22 +23,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
-from ...material.plugins.closure_tree import ClosureTree
-from ...material.plugins.principled_plugin import BlenderPrincipled
-from ...material.principled.blender_principled import evaluate
-from ...material.principled.layers import layer_stack
-from ...material.principled.lobe_sampling import NAMES, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
 from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
-from ..models.prepared_material import EMISSION
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from ..transport.cycles_path import seen_world
 from ..transport.path_random import PathRandom
 from ..transport.shadow_rays import ShadowRays, left_of, sample_light
 from ..transport.smooth_facets import leaves_on, seen_side
-from .tangents import Tangents
+from .traced_target import TracedTarget
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
@@ -46,7 +40,6 @@ _DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmi
 _TRANSMITS = (
     int(mi.BSDFFlags.GlossyTransmission) | int(mi.BSDFFlags.DeltaTransmission) | int(mi.BSDFFlags.DiffuseTransmission)
 )
-LEAST_DIFFUSE = 0.02  # probability, under glass: more takes paths from the glass
 DEEPEST = 32  # path length of a scene without a limit
 
 
@@ -65,16 +58,9 @@ class TracedPaths:
     """
 
     def __init__(self, renderer: MitsubaRenderer) -> None:
-        bsdf = renderer.shape.bsdf()
-        self._tree = bsdf if isinstance(bsdf, ClosureTree) else None
-        self._plugin = bsdf if self._tree is None else self._tree.fitted.material
-        if not isinstance(self._plugin, BlenderPrincipled):
-            raise UnrecordableError(f"Model {renderer.model!r} has no traced version for transmissive materials.")
-        if renderer.mix is not None:
-            raise UnrecordableError("Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.")
         self.renderer, self.table = renderer, renderer.table
-        self._bsdf = bsdf
-        self._tangents = Tangents.of(renderer.table)
+        self._target = target = TracedTarget(renderer)
+        self._bsdf, self._glow, self._tangents = target.bsdf, target.glow, target.tangents
         scene = renderer.scene
         integrator = scene.integrator()
         limit = int(getattr(integrator, "max_depth", DEEPEST))
@@ -87,20 +73,17 @@ class TracedPaths:
         self._terminator = self._shadows.terminator
         self._camera_world = getattr(integrator, "camera_world", None)
         # a mix tells by its other leaves what goes through it; of those this one's alpha is taken as it is
-        names = () if self._tree is not None else self.table.names
+        names = () if target.tree is not None else self.table.names
         through = self._shadows.lets_through and "alpha" in names
         self._alpha_entry = (self.table.slice_of("alpha").start,) if through else None
-        glow = renderer.shape.emitter() if renderer.shape.is_emitter() and self._tree is None else None
-        # the target's own light: the layers that are fitted dim it
-        self._glow = glow if getattr(glow, "layered", False) else None
-        self._others = any(s.bsdf() is not None and s.bsdf() is not bsdf for s in scene.shapes())
+        self._others = any(s.bsdf() is not None and s.bsdf() is not target.bsdf for s in scene.shapes())
         self.lanes = 0
 
     def roughness(self, vector: NDArray[np.float64]) -> float:
         """Roughness of the material `vector`; 1 where a texture gives it."""
         if "roughness" in self.table.names:
             return float(vector[self.table.slice_of("roughness").start])
-        value = self._plugin.fixed["roughness"]
+        value = self._target.plugin.fixed["roughness"]
         return 1.0 if value is None else float(np.mean(value))
 
     def images(
@@ -235,11 +218,11 @@ class TracedPaths:
             ours = si.bsdf() == mi.BSDFPtr(self._bsdf) if self._others else mi.Bool(True)
             on = active & ours
             at_hit = on if self._glow is None else met & ours
-            f_light, pdf_light, f_next, pdf_next, local, kind, glow = self._at_target(
-                si, wo, u1, u2, at_hit, on, theta, offset, directions
-            )
+            found = self._target.at(si, wo, u1, u2, at_hit, on, theta, offset, directions)
+            f_light, pdf_light, f_next, pdf_next = found.light, found.light_density, found.following, found.density
+            local, kind = found.drawn, found.kind
             if self._glow is not None:
-                glow = [dr.select(own, c, 0.0) for c in glow]
+                glow = [dr.select(own, c, 0.0) for c in found.glow]
                 kept = self._clamp(beta[0] * glow[0], depth >= 2)
                 total[0] += beta[0] * glow[0] * kept
                 for k in range(directions):
@@ -337,80 +320,3 @@ class TracedPaths:
             done |= count > limit
         least = dr.select(counts & (density > 0.0), dr.minimum(state["least"], density), state["least"])
         return {"least": least, "bounces": bounces, "left": dr.select(done, dr.minimum(left, 1), left)}
-
-    def _at_target(self, si, wo, u1, u2, met, on, theta, offset, directions):
-        """Value and derivatives of the BSDF towards `wo` and towards a direction drawn from it, with densities, where
-        paths go `on`; last those of the surface's own light, wherever they have `met` it."""
-        plugin = self._plugin
-        entries = [dr.gather(mi.Float, theta, offset + k, met) for k in range(self.table.length)]
-        if directions:
-            dr.enable_grad(*entries)
-        parameters: dict[str, Any] = plugin.values_at(si, met)
-        if self._glow is not None:
-            parameters |= {EMISSION: mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
-        iterator = iter(entries)
-        for p in self.table:
-            parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
-        layers = layer_stack(parameters, si.wi, plugin.lobes, plugin.model)
-        if plugin.filtered:
-            layers = layers.blurred(si.duv_dx.x)
-        choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha, least_diffuse=LEAST_DIFFUSE)
-        only = plugin.reachable_only
-        mixture = None if self._tree is None else self._tree.mixture(si, u1, u2, on)
-        drawn, lobe, valid = sample(layers, choice, u1 if mixture is None else mixture.u1, u2)
-        if mixture is not None:
-            drawn = dr.select(mixture.is_held, layers.to_frame(mixture.drawn.wo), drawn)
-            valid = dr.select(mixture.is_held, mixture.drawn.pdf > 0.0, valid)
-        towards = dr.detach(layers.to_frame(wo))
-        f_light = mi.Color3f(evaluate(layers, towards, reachable_only=only))
-        pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
-        f_next = mi.Color3f(evaluate(layers, drawn, reachable_only=only))
-        pdf_next = dr.detach(pdf(layers, choice, drawn, reachable_only=only))
-        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
-        kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
-        through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
-        kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
-        kind = dr.select(lobe == NAMES.index("translucent"), mi.UInt32(+mi.BSDFFlags.DiffuseTransmission), kind)
-        null, passes, chance = mi.Bool(False), mi.Color3f(0.0), mi.Float(0.0)
-        if choice["transparent"] is not None:
-            null = lobe == NAMES.index("transparent")
-            passes, chance = mi.Color3f(layers.transparency), dr.detach(choice["transparent"])
-        if mixture is not None:
-            value, density = mixture.held(wo)
-            f_light = mixture.weight * f_light + value
-            pdf_light = mixture.chance * pdf_light + density
-            value, density = mixture.held(dr.detach(layers.from_frame(drawn)))
-            f_next = mixture.weight * f_next + value
-            pdf_next = mixture.chance * pdf_next + density
-            kind = dr.select(mixture.is_held, mixture.drawn.sampled_type, kind)
-            null = dr.select(mixture.is_held, mixture.straight, null)
-            passes = mixture.weight * passes + mixture.passes
-            chance = mixture.chance * chance + mixture.passing_chance
-            valid |= mixture.is_held & mixture.straight
-        if mixture is not None or choice["transparent"] is not None:
-            f_next = dr.select(null, passes, f_next)
-            pdf_next = dr.select(null, chance, pdf_next)
-            kind = dr.select(null, mi.UInt32(+mi.BSDFFlags.Null), kind)
-            drawn = dr.select(null, -layers.wi, drawn)
-        pdf_next = dr.select(valid & on, pdf_next, 0.0)
-        results = [f_light, f_next]
-        if self._glow is not None:
-            results.append(self._radiance(si, met) * mi.Color3f(layers.emission))
-        columns = [[dr.detach(result)] for result in results]
-        for entry in self._tangents.entries[:directions]:
-            for k in entry:
-                dr.set_grad(entries[k], 1.0)
-                dr.enqueue(dr.ADMode.Forward, entries[k])
-            dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
-            for column, result in zip(columns, results, strict=True):
-                column.append(mi.Color3f(dr.grad(result)))
-                dr.clear_grad(result)
-        light, following = ([dr.select(on, c, 0.0) for c in column] for column in columns[:2])
-        glow = columns[2] if self._glow is not None else []
-        return light, pdf_light, following, pdf_next, dr.detach(layers.from_frame(drawn)), kind, glow
-
-    def _radiance(self, si, met) -> mi.Color3f:
-        """What the target's emission sends out below all layers, of a colour of 1 where that is free."""
-        if EMISSION in self.table.names:
-            return mi.Color3f(dr.opaque(mi.Float, self.renderer.factors[EMISSION]))
-        return mi.Color3f(self._glow.radiance.eval(si, met))
