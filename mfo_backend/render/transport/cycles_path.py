@@ -151,6 +151,7 @@ class CyclesPath(RBIntegrator):
                 ratio *= terminator.bend(si, bs.wo, goes_on)
             onward = si.spawn_ray(si.to_world(bs.wo))
             is_straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            onward.maxt = dr.select(is_straight, ray.maxt - si.t, onward.maxt)  # the camera's far clipping holds on
             is_through = (bs.sampled_type & TRANSMITS) != 0
             goes_on &= dr.any(throughput * ratio != 0)
             goes_on &= is_straight | (scatters & leaves_on(si, bs.wo, is_through))
