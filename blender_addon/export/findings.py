@@ -27,9 +27,10 @@ class Findings:
     """Errors (the fit would be wrong) and notes (ignored or approximated), each sentence once, in order.
 
     `fixes` has what one press could do about a sentence; `left_out` has the notes that may be why a result does not
-    match.
+    match. `of_mitsuba` says that the fit's model is mitsuba_principled.
     """
 
+    of_mitsuba: bool = False
     errors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     fixes: dict[str, tuple[Fix, ...]] = field(default_factory=dict)
@@ -51,6 +52,11 @@ class Findings:
             self.fixes[sentence] = fixes
             if explains:
                 self.left_out.append(sentence)
+
+    def note_of_mitsuba(self, sentence: str) -> None:
+        """Remember what Mitsuba's principled cannot have, where that is the fit's model."""
+        if self.of_mitsuba:
+            self.note(sentence)
 
     def raise_first(self) -> None:
         """Raise the first error.

@@ -37,6 +37,7 @@ from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
 from .scene.scene_file import scene_files
 
+MITSUBA = "mitsuba_principled"
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
@@ -204,7 +205,7 @@ def partial_export(
     `several` says that it is one of several pictures, and `first` is the part of the first of them, where it is a
     further one; `targets` are slots whose materials are fitted together.
     """
-    findings = Findings()
+    findings = Findings(of_mitsuba=fit.get("model") == MITSUBA)
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
     of_mix, wanted = ([], fit) if targets else named_mix_values(obj, fit)
@@ -317,9 +318,9 @@ def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[lis
     return findings.errors, findings.notes
 
 
-def export_findings(context: bpy.types.Context, obj: bpy.types.Object) -> Findings:
-    """Return what an export would say, with what could be done about it, without writing anything."""
-    findings = Findings()
+def export_findings(context: bpy.types.Context, obj: bpy.types.Object, model: str = "") -> Findings:
+    """Return what an export for a fit with this model would say, with what could be done about it, writing nothing."""
+    findings = Findings(of_mitsuba=model == MITSUBA)
     data = read_scene(context, obj, findings)
     if data is not None:
         finish_scene(data, findings)

@@ -114,7 +114,7 @@ def thorough_check(context: bpy.types.Context) -> None:
     target = view_layer.objects.active
     if target is not None:
         with suppress(ExportError):  # the quick check names it
-            found += from_export(export_findings(context, target))
+            found += from_export(export_findings(context, target, context.scene.mfo.model))
     preflight.show_thorough(in_order(found))
 
 

@@ -124,19 +124,19 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
     }
     for name, socket in material.sockets.items():
         if socket.texture is not None and name not in (*TEXTURED, "Alpha", "Emission Color"):
-            findings.note(
+            findings.note_of_mitsuba(
                 f"Material '{material.name}': scene.xml has the average of the picture on {name}, which Mitsuba's "
                 "principled cannot take as a picture."
             )
     lost = [name for name, nothing in UNMATCHED.items() if material.value(name, nothing) != nothing]
     if lost:
-        findings.note(
+        findings.note_of_mitsuba(
             f"Material '{material.name}': {', '.join(lost)} has no counterpart in Mitsuba's principled and is missing "
             "in a fit with the model mitsuba_principled."
         )
     above = [name for name in _above_emission(material) if name != "Alpha"]
     if above and not (material.is_mixed or material.emission_is_dimmed):
-        findings.note(
+        findings.note_of_mitsuba(
             f"Material '{material.name}': the emission is not dimmed by {', '.join(above)} in a fit with the model "
             "mitsuba_principled."
         )

@@ -46,7 +46,7 @@ def test_every_socket_is_in_the_request(scene: Any, export: Any) -> None:
     )
     principled(material).distribution = "GGX"
     add_camera("ORTHO", ortho_scale=2.0)
-    report = export(add_quad("Target", 1.0, 0.0, material), fit={"preset": "paper", "parameters": "reduced"})
+    report = export(add_quad("Target", 1.0, 0.0, material), fit={"preset": "paper", "model": "mitsuba_principled"})
     entry = report.request["materials"]["target_bsdf"]
     assert entry["name"] == "Glaze"
     assert entry["distribution"] == "GGX"
@@ -55,7 +55,7 @@ def test_every_socket_is_in_the_request(scene: Any, export: Any) -> None:
     assert entry["sockets"]["Base Color"]["value"] == pytest.approx([0.1, 0.2, 0.3])
     assert entry["sockets"]["Roughness"] == {"value": 0.25, "linked": False}
     assert entry["sockets"]["Subsurface Radius"]["value"] == pytest.approx([1.0, 0.2, 0.1])
-    assert report.request["fit"] == {"preset": "paper", "parameters": "reduced"}
+    assert report.request["fit"] == {"preset": "paper", "model": "mitsuba_principled"}
     assert any("Thin Film Thickness has no counterpart" in note for note in report.notes)
     assert report.request["notes"] == list(report.notes)
 
@@ -66,11 +66,13 @@ def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
     glow = {"Emission_Color": (1.0, 0.5, 0.2), "Emission_Strength": 2.0}
     add_quad("Floor", 1.0, -1.0, new_material("Glow", **glow))
     add_quad("Wall", 1.0, -2.0, new_material("Coated", Coat_Weight=0.5, **glow))
-    notes = export(add_quad("Target", 1.0, 0.0, new_material("Plain", Subsurface_Weight=0.3))).notes
-    assert [note for note in notes if "mitsuba_principled" not in note] == [
+    target = add_quad("Target", 1.0, 0.0, new_material("Plain", Subsurface_Weight=0.3))
+    said = (
         "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface. "
         "Its weight has no effect at Diffuse Roughness 0.",
-    ]
+    )
+    assert export(target).notes == said
+    notes = export(target, "other", fit={"model": "mitsuba_principled"}).notes
     assert [note for note in notes if "dimmed" in note] == [
         "Material 'Coated': the emission is not dimmed by Coat Weight in a fit with the model mitsuba_principled."
     ]
