@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -24,7 +25,7 @@ from .material_model import Material
 from .materials.chosen_leaves import chosen_mix_values, name_shares, named_mix_values, with_mix_values
 from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
-from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
+from .materials.node_graph import NodeGraph, asks_leaf, evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, shown
@@ -37,6 +38,9 @@ from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
 from .scene.scene_file import scene_files
 
+NOWHERE = (
+    "Material '{material}' of '{obj}' is in none of the pictures: leave it out, or add a picture that shows it."
+)
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
@@ -86,12 +90,14 @@ def export_job(
     check_setups(reference)
     first: PartialExport | None = None
     notes: list[str] = []
+    unseen = set(range(len(targets)))
+    leaves = _leaves_of(context, obj, reference, fit, targets) if len(reference) > 1 and targets else None
     with new_job_folder(Path(folder)) as partial:
         paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in reference[1:])]
         for done, (setup, path) in enumerate(zip(reference, paths, strict=True)):
             here = partial / path
             here.mkdir(parents=True, exist_ok=True)
-            try:
+            with _named(setup, len(reference)):
                 with shown(context, setup, obj, own_size=len(reference) > 1) as there:
                     steps = partial_export(
                         there,
@@ -102,15 +108,13 @@ def export_job(
                         reference_view,
                         upright,
                         several=len(reference) > 1,
-                        first=first,
+                        is_first=first is None,
+                        leaves=leaves,
                         targets=targets,
                     )
                     part = drained(steps)
                     part.request["picture"] = setup.request(there)
-            except ExportError as error:
-                if len(reference) == 1:
-                    raise
-                raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
+            leaves, unseen = part.leaves, unseen & part.unseen
             if first is None:
                 first, notes = part, list(part.findings.notes)
                 first.request["more_pictures"] = paths[1:]
@@ -122,9 +126,49 @@ def export_job(
                 part.write_request(here)
                 share_files(partial, here)
             tell((done + 1) / len(reference))
+        for number in sorted(unseen):
+            each = targets[number]
+            assert each.material is not None  # it was read
+            raise ExportError(NOWHERE.format(material=each.material.name, obj=each.object.name))
         assert first is not None
         first.write_request(partial)
     return ExportReport(Path(folder), first.request, tuple(notes))
+
+
+@contextmanager
+def _named(setup: PictureSetup, count: int) -> Iterator[None]:
+    """Have the errors of one of several pictures begin with its number and name."""
+    try:
+        yield
+    except ExportError as error:
+        if count == 1:
+            raise
+        raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
+
+
+def _leaves_of(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    pictures: Sequence[PictureSetup],
+    fit: dict[str, Any],
+    targets: Sequence[FittedSlot],
+) -> list[str | None]:
+    """Of each mix of shaders the one that is fitted, as the first picture that shows it has it."""
+    leaves = [each.leaf for each in targets]
+    asked = [number for number, each in enumerate(targets) if asks_leaf(each)]
+    for setup in pictures if isinstance(fit.get("parameters", "all"), str) else ():
+        if not asked:
+            break
+        with (
+            _named(setup, len(pictures)),
+            shown(context, setup, obj, own_size=True) as there,
+            probe_for(targets, always=True) as probe,
+        ):
+            assert probe is not None
+            for number in asked:
+                leaves[number] = largest_leaf(probe, there, targets[number], may_miss=True)
+        asked = [number for number in asked if leaves[number] is None]
+    return leaves
 
 
 def export_steps(
@@ -168,6 +212,7 @@ class PartialExport:
     findings: Findings
     more: Mapping[str, dict[str, Any]] = field(default_factory=dict)
     leaves: tuple[str | None, ...] = ()  # of a mix the one that each fitted material's plain names are of
+    unseen: frozenset[int] = frozenset()  # numbers of fitted materials that the picture does not show
 
     @property
     def values(self) -> dict[tuple[str, str], Any]:
@@ -196,13 +241,14 @@ def partial_export(
     tell: Callable[[float], None] = lambda _share: None,
     *,
     several: bool = False,
-    first: PartialExport | None = None,
+    is_first: bool = True,
+    leaves: Sequence[str | None] | None = None,
     targets: Sequence[FittedSlot] = (),
 ) -> Steps[PartialExport]:
     """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
 
-    `several` says that it is one of several pictures, and `first` is the part of the first of them, where it is a
-    further one; `targets` are slots whose materials are fitted together.
+    `several` says that it is one of several pictures, and `is_first` that it is the first of them; `leaves` are the
+    fitted ones of mixes where they are known, and `targets` slots whose materials are fitted together.
     """
     findings = Findings()
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
@@ -213,9 +259,7 @@ def partial_export(
     with probe_for(fitted, always=bool(values)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
-        if first is not None:
-            leaves = list(first.leaves)
-        else:
+        if leaves is None:
             leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
         if leaves and leaves[0] is not None:  # whose numbers and values are others
             values, fit = chosen_graph_values(obj, wanted, Findings(), alone=not targets, leaf=leaves[0])
@@ -236,7 +280,7 @@ def partial_export(
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
             target = target_shader(obj.active_material, leaves[0])
             inside_request = request_of(context, obj, target, values) if values and target is not None else {}
-            with_copy = bool(values) and first is None  # which all pictures are evaluated in
+            with_copy = bool(values) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
             while not bakes.is_ready():
@@ -244,12 +288,17 @@ def partial_export(
             finish_scene(data, findings, bakes)
         findings.raise_first()
         graphs: list[NodeGraph | None] = [None for _ in fitted]
+        unseen = set(data.unseen)
         for number, each in enumerate(fitted):
             described = data.materials[target_bsdf(number)]
             if probe is not None and (described.asks_graph or (number == 0 and values)):
-                described, graphs[number] = yield from evaluate_graph(probe, context, each, described, number)
+                described, graphs[number] = yield from evaluate_graph(
+                    probe, context, each, described, number, may_miss=may_miss
+                )
                 data.materials[target_bsdf(number)] = described
-            name_shares(described, findings)
+                (unseen.add if graphs[number] is None else unseen.discard)(number)  # Cycles knows better than rays
+            if number not in unseen:
+                name_shares(described, findings)
         files = scene_files(data, findings)
         tell(0.5)
         paths = [f"{TARGETS}/{number}" for number in range(1, len(fitted) + 1)] if targets else [""]
@@ -274,7 +323,7 @@ def partial_export(
                 graph.write(folder / path)
         if with_copy:
             (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
-    return PartialExport(requests.pop(""), findings, requests, tuple(leaves))
+    return PartialExport(requests.pop(""), findings, requests, tuple(leaves), frozenset(unseen))
 
 
 def _read_values(
