@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -21,14 +20,15 @@ from ..versions import PRINCIPLED
 from .files.job_folder import MORE_PICTURES, TARGETS, link_files, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .fitted_slot import FittedSlot, check_slots
+from .leaves_by_pictures import leaves_by_pictures
 from .material_model import Material
 from .materials.chosen_leaves import chosen_mix_values, name_shares, named_mix_values, with_mix_values
 from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
-from .materials.node_graph import NodeGraph, asks_leaf, evaluate_graph, largest_leaf, probe_for
+from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
-from .reference.picture_setup import PictureSetup, check_setups, shown
+from .reference.picture_setup import PictureSetup, check_setups, named, shown
 from .reference.reference import Picture, read_reference
 from .reference.reference_view import SCENE
 from .request import WholeRequest, parameter_of
@@ -38,9 +38,7 @@ from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
 from .scene.scene_file import scene_files
 
-NOWHERE = (
-    "Material '{material}' of '{obj}' is in none of the pictures: leave it out, or add a picture that shows it."
-)
+NOWHERE = "Material '{material}' of '{obj}' is in none of the pictures: leave it out, or add a picture that shows it."
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
@@ -91,29 +89,31 @@ def export_job(
     first: PartialExport | None = None
     notes: list[str] = []
     unseen = set(range(len(targets)))
-    leaves = _leaves_of(context, obj, reference, fit, targets) if len(reference) > 1 and targets else None
+    leaves = leaves_by_pictures(context, obj, reference, fit, targets) if len(reference) > 1 and targets else None
     with new_job_folder(Path(folder)) as partial:
         paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in reference[1:])]
         for done, (setup, path) in enumerate(zip(reference, paths, strict=True)):
             here = partial / path
             here.mkdir(parents=True, exist_ok=True)
-            with _named(setup, len(reference)):
-                with shown(context, setup, obj, own_size=len(reference) > 1) as there:
-                    steps = partial_export(
-                        there,
-                        obj,
-                        here,
-                        setup.reference,
-                        fit,
-                        reference_view,
-                        upright,
-                        several=len(reference) > 1,
-                        is_first=first is None,
-                        leaves=leaves,
-                        targets=targets,
-                    )
-                    part = drained(steps)
-                    part.request["picture"] = setup.request(there)
+            with (
+                named(setup, len(reference)),
+                shown(context, setup, obj, own_size=len(reference) > 1) as there,
+            ):
+                steps = partial_export(
+                    there,
+                    obj,
+                    here,
+                    setup.reference,
+                    fit,
+                    reference_view,
+                    upright,
+                    several=len(reference) > 1,
+                    is_first=first is None,
+                    leaves=leaves,
+                    targets=targets,
+                )
+                part = drained(steps)
+                part.request["picture"] = setup.request(there)
             leaves, unseen = part.leaves, unseen & part.unseen
             if first is None:
                 first, notes = part, list(part.findings.notes)
@@ -133,42 +133,6 @@ def export_job(
         assert first is not None
         first.write_request(partial)
     return ExportReport(Path(folder), first.request, tuple(notes))
-
-
-@contextmanager
-def _named(setup: PictureSetup, count: int) -> Iterator[None]:
-    """Have the errors of one of several pictures begin with its number and name."""
-    try:
-        yield
-    except ExportError as error:
-        if count == 1:
-            raise
-        raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
-
-
-def _leaves_of(
-    context: bpy.types.Context,
-    obj: bpy.types.Object,
-    pictures: Sequence[PictureSetup],
-    fit: dict[str, Any],
-    targets: Sequence[FittedSlot],
-) -> list[str | None]:
-    """Of each mix of shaders the one that is fitted, as the first picture that shows it has it."""
-    leaves = [each.leaf for each in targets]
-    asked = [number for number, each in enumerate(targets) if asks_leaf(each)]
-    for setup in pictures if isinstance(fit.get("parameters", "all"), str) else ():
-        if not asked:
-            break
-        with (
-            _named(setup, len(pictures)),
-            shown(context, setup, obj, own_size=True) as there,
-            probe_for(targets, always=True) as probe,
-        ):
-            assert probe is not None
-            for number in asked:
-                leaves[number] = largest_leaf(probe, there, targets[number], may_miss=True)
-        asked = [number for number in asked if leaves[number] is None]
-    return leaves
 
 
 def export_steps(

@@ -90,9 +90,7 @@ def asks_leaf(fitted: FittedSlot) -> bool:
     return len(leaves) > 1 and not chosen_leaf(fitted.material) and any(leaf.is_linked for leaf in leaves)
 
 
-def largest_leaf(
-    probe: Probe, context: bpy.types.Context, fitted: FittedSlot, *, may_miss: bool = False
-) -> str | None:
+def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot, *, may_miss: bool = False) -> str | None:
     """The name of the leaf that covers most of the target in the picture.
 
     None where there is nothing to choose, or the camera does not see a target that it `may_miss`.
