@@ -172,7 +172,7 @@ def test_two_pictures_show_both_and_one_of_them_only_the_floor(corner: Path, tmp
 
 
 def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(tmp_path: Path) -> None:
-    """The first picture does not show it, and has its light: a Mix of equal shares would make the floor there too dark."""
+    """The first picture does not show it, and has its light: of a Mix of equal shares the floor would be too dark."""
     start, both, side, saved = (tmp_path / name for name in ("start.blend", "both.exr", "side.exr", "fitted.blend"))
     run_bpy(BUILD, start, both, side, "mixed")
     done = run_mfo(
