@@ -86,6 +86,9 @@ def export_job(
     if not isinstance(reference, Sequence):
         return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
     check_setups(reference)
+    if len(reference) > 1:  # what is named wrongly is so in all of them
+        check_slots(targets)
+        _check_names(obj, fit, targets)
     first: PartialExport | None = None
     notes: list[str] = []
     unseen = set(range(len(targets)))
@@ -133,6 +136,12 @@ def export_job(
         assert first is not None
         first.write_request(partial)
     return ExportReport(Path(folder), first.request, tuple(notes))
+
+
+def _check_names(obj: bpy.types.Object, fit: dict[str, Any], targets: Sequence[FittedSlot]) -> None:
+    """Raise `ExportError` where `fit` names a value that there is not, or that cannot be fitted."""
+    wanted = fit if targets else named_mix_values(obj, fit)[1]
+    chosen_graph_values(obj, wanted, Findings(), alone=not targets)
 
 
 def export_steps(

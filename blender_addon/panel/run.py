@@ -96,7 +96,9 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     row.scale_y = 1.4
     row.progress(factor=runtime.fraction, type="BAR", text=translated(runtime.progress_text))
     row.operator("mfo.cancel", text="", icon="X")
-    if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
+    own = context.object.active_material if context.object else None
+    is_one = runtime.material in bpy.data.materials  # several that are fitted together have no name of one
+    if is_one and (own is None or runtime.material != own.name):
         column.label(text=translated(f"Of material {runtime.material}"), icon="MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:

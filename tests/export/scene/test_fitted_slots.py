@@ -174,3 +174,13 @@ def test_a_material_in_none_of_the_pictures_is_refused_by_name(apart: dict[str, 
         export(apart["Floor"], targets=slots[:2], reference=pictures_from("Right", "Right"))
     with pytest.raises(ExportError, match=re.escape("Picture 2 (Left): The camera does not see 'Floor'")):
         export(apart["Floor"], targets=slots[1:], reference=pictures_from("Right", "Left"))
+
+
+def test_what_is_named_wrongly_is_said_of_no_picture(apart: dict[str, Any], export: Any) -> None:
+    slots, pictures = [FittedSlot(apart["Floor"], 0), FittedSlot(apart["Floor"], 1)], pictures_from("Right", "Left")
+    with pytest.raises(ExportError, match=r"^Noise Texture/Scale cannot be fitted: a fit of several materials changes"):
+        export(apart["Floor"], targets=slots, reference=pictures, fit={"parameters": ["Noise Texture/Scale"]})
+    with pytest.raises(ExportError, match=r"^Slot 1 of 'Floor' .material 'Wood'. is named twice"):
+        export(apart["Floor"], targets=[*slots, slots[0]], reference=pictures)
+    with pytest.raises(ExportError, match=r"^The material's nodes have no value 'Nose/Scale'"):
+        export(apart["Floor"], reference=pictures, fit={"parameters": ["Nose/Scale"]})
