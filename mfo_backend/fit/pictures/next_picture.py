@@ -147,7 +147,7 @@ def open_values(x: Vector, certainty: Mapping[str, Certainty], user: Vector, tab
     """
 
     def may_be_absent(amount: str | None) -> bool:
-        if amount not in certainty:
+        if amount is None or amount not in certainty:
             return False  # it is given
         return bool((x[table.slice_of(amount)] <= PERHAPS_ABSENT * np.array(certainty[amount].sd)).all())
 
