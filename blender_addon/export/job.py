@@ -20,6 +20,7 @@ from ..versions import PRINCIPLED
 from .files.job_folder import MORE_PICTURES, TARGETS, link_files, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .fitted_slot import FittedSlot, check_slots
+from .leaves_by_pictures import leaves_by_pictures
 from .material_model import Material
 from .materials.chosen_leaves import chosen_mix_values, name_shares, named_mix_values, with_mix_values
 from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
@@ -27,7 +28,7 @@ from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
-from .reference.picture_setup import PictureSetup, check_setups, shown
+from .reference.picture_setup import PictureSetup, check_setups, named, shown
 from .reference.reference import Picture, read_reference
 from .reference.reference_view import SCENE
 from .request import WholeRequest, parameter_of
@@ -38,6 +39,7 @@ from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
 from .scene.scene_file import scene_files
 
 MITSUBA = "mitsuba_principled"
+NOWHERE = "Material '{material}' of '{obj}' is in none of the pictures: leave it out, or add a picture that shows it."
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
@@ -85,33 +87,38 @@ def export_job(
     if not isinstance(reference, Sequence):
         return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
     check_setups(reference)
+    if len(reference) > 1:  # what is named wrongly is so in all of them
+        check_slots(targets)
+        _check_names(obj, fit, targets)
     first: PartialExport | None = None
     notes: list[str] = []
+    unseen = set(range(len(targets)))
+    leaves = leaves_by_pictures(context, obj, reference, fit, targets) if len(reference) > 1 and targets else None
     with new_job_folder(Path(folder)) as partial:
         paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in reference[1:])]
         for done, (setup, path) in enumerate(zip(reference, paths, strict=True)):
             here = partial / path
             here.mkdir(parents=True, exist_ok=True)
-            try:
-                with shown(context, setup, obj, own_size=len(reference) > 1) as there:
-                    steps = partial_export(
-                        there,
-                        obj,
-                        here,
-                        setup.reference,
-                        fit,
-                        reference_view,
-                        upright,
-                        several=len(reference) > 1,
-                        first=first,
-                        targets=targets,
-                    )
-                    part = drained(steps)
-                    part.request["picture"] = setup.request(there)
-            except ExportError as error:
-                if len(reference) == 1:
-                    raise
-                raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
+            with (
+                named(setup, len(reference)),
+                shown(context, setup, obj, own_size=len(reference) > 1) as there,
+            ):
+                steps = partial_export(
+                    there,
+                    obj,
+                    here,
+                    setup.reference,
+                    fit,
+                    reference_view,
+                    upright,
+                    several=len(reference) > 1,
+                    is_first=first is None,
+                    leaves=leaves,
+                    targets=targets,
+                )
+                part = drained(steps)
+                part.request["picture"] = setup.request(there)
+            leaves, unseen = part.leaves, unseen & part.unseen
             if first is None:
                 first, notes = part, list(part.findings.notes)
                 first.request["more_pictures"] = paths[1:]
@@ -123,9 +130,19 @@ def export_job(
                 part.write_request(here)
                 share_files(partial, here)
             tell((done + 1) / len(reference))
+        for number in sorted(unseen):
+            each = targets[number]
+            assert each.material is not None  # it was read
+            raise ExportError(NOWHERE.format(material=each.material.name, obj=each.object.name))
         assert first is not None
         first.write_request(partial)
     return ExportReport(Path(folder), first.request, tuple(notes))
+
+
+def _check_names(obj: bpy.types.Object, fit: dict[str, Any], targets: Sequence[FittedSlot]) -> None:
+    """Raise `ExportError` where `fit` names a value that there is not, or that cannot be fitted."""
+    wanted = fit if targets else named_mix_values(obj, fit)[1]
+    chosen_graph_values(obj, wanted, Findings(), alone=not targets)
 
 
 def export_steps(
@@ -169,6 +186,7 @@ class PartialExport:
     findings: Findings
     more: Mapping[str, dict[str, Any]] = field(default_factory=dict)
     leaves: tuple[str | None, ...] = ()  # of a mix the one that each fitted material's plain names are of
+    unseen: frozenset[int] = frozenset()  # numbers of fitted materials that the picture does not show
 
     @property
     def values(self) -> dict[tuple[str, str], Any]:
@@ -197,13 +215,14 @@ def partial_export(
     tell: Callable[[float], None] = lambda _share: None,
     *,
     several: bool = False,
-    first: PartialExport | None = None,
+    is_first: bool = True,
+    leaves: Sequence[str | None] | None = None,
     targets: Sequence[FittedSlot] = (),
 ) -> Steps[PartialExport]:
     """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
 
-    `several` says that it is one of several pictures, and `first` is the part of the first of them, where it is a
-    further one; `targets` are slots whose materials are fitted together.
+    `several` says that it is one of several pictures, and `is_first` that it is the first of them; `leaves` are the
+    fitted ones of mixes where they are known, and `targets` slots whose materials are fitted together.
     """
     findings = Findings(of_mitsuba=fit.get("model") == MITSUBA)
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
@@ -214,9 +233,7 @@ def partial_export(
     with probe_for(fitted, always=bool(values)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
-        if first is not None:
-            leaves = list(first.leaves)
-        else:
+        if leaves is None:
             leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
         if leaves and leaves[0] is not None:  # whose numbers and values are others
             values, fit = chosen_graph_values(obj, wanted, Findings(), alone=not targets, leaf=leaves[0])
@@ -237,7 +254,7 @@ def partial_export(
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
             target = target_shader(obj.active_material, leaves[0])
             inside_request = request_of(context, obj, target, values) if values and target is not None else {}
-            with_copy = bool(values) and first is None  # which all pictures are evaluated in
+            with_copy = bool(values) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
             while not bakes.is_ready():
@@ -245,12 +262,17 @@ def partial_export(
             finish_scene(data, findings, bakes)
         findings.raise_first()
         graphs: list[NodeGraph | None] = [None for _ in fitted]
+        unseen = set(data.unseen)
         for number, each in enumerate(fitted):
             described = data.materials[target_bsdf(number)]
             if probe is not None and (described.asks_graph or (number == 0 and values)):
-                described, graphs[number] = yield from evaluate_graph(probe, context, each, described, number)
+                described, graphs[number] = yield from evaluate_graph(
+                    probe, context, each, described, number, may_miss=may_miss
+                )
                 data.materials[target_bsdf(number)] = described
-            name_shares(described, findings)
+                (unseen.add if graphs[number] is None else unseen.discard)(number)  # Cycles knows better than rays
+            if number not in unseen:
+                name_shares(described, findings)
         files = scene_files(data, findings)
         tell(0.5)
         paths = [f"{TARGETS}/{number}" for number in range(1, len(fitted) + 1)] if targets else [""]
@@ -275,7 +297,7 @@ def partial_export(
                 graph.write(folder / path)
         if with_copy:
             (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
-    return PartialExport(requests.pop(""), findings, requests, tuple(leaves))
+    return PartialExport(requests.pop(""), findings, requests, tuple(leaves), frozenset(unseen))
 
 
 def _read_values(

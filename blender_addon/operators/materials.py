@@ -30,8 +30,18 @@ def ticked_slots(scene: bpy.types.Scene) -> list[FittedSlot]:
     return found
 
 
+def _views(scene: bpy.types.Scene) -> list[tuple[bpy.types.Object, int]]:
+    """Camera and frame of each listed picture of the scene that is used; none where there is no list."""
+    settings = scene.mfo
+    if not settings.pictures:
+        return []
+    used = [each for each in (settings.first_picture, *settings.pictures) if each.use and each.scene in (None, scene)]
+    cameras = [(each.camera or scene.camera, each.frame) for each in used]
+    return list(dict.fromkeys((camera, frame) for camera, frame in cameras if camera is not None))
+
+
 class MFO_OT_list_materials(bpy.types.Operator):
-    """List the materials that the camera sees, to fit several of them together"""
+    """List the materials that the cameras of the pictures see, to fit several of them together"""
 
     bl_idname = "mfo.list_materials"
     bl_label = "Fit Several Materials"
@@ -40,7 +50,7 @@ class MFO_OT_list_materials(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Make the list anew; what was unticked stays so."""
         entries = context.scene.mfo.targets
-        slots = seen_slots(context)
+        slots = seen_slots(context, _views(context.scene))
         if not slots:
             self.report(
                 {"ERROR"}, translated("The camera sees no material with a Principled BSDF: set the scene's camera up.")

@@ -104,7 +104,9 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     runtime = context.window_manager.mfo_runtime
     column = layout.column()
     _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text))
-    if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
+    own = context.object.active_material if context.object else None
+    is_one = runtime.material in bpy.data.materials  # several that are fitted together have no name of one
+    if is_one and (own is None or runtime.material != own.name):
         draw_sentence(column, context, f"Of material {runtime.material}", "MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" in shown:

@@ -47,10 +47,16 @@ class Outputs:
     frame: Frame
 
 
-def frame_of(scene: bpy.types.Scene, obj: bpy.types.Object, scale: int, outputs: int) -> Frame:
-    """The frame around `obj` with at most `scale` subpixels along a pixel, less where the AOVs would be too large."""
+def frame_of(scene: bpy.types.Scene, obj: bpy.types.Object, scale: int, outputs: int) -> Frame | None:
+    """The frame around `obj` with at most `scale` subpixels along a pixel, less where the AOVs would be too large.
+
+    None where all of it is beside the picture or behind the camera.
+    """
     size = _picture_size(scene.render)
-    left, top, right, bottom = _bounds(scene, obj, size)
+    bounds = _bounds(scene, obj, size)
+    if bounds is None:
+        return None
+    left, top, right, bottom = bounds
     area = max((right - left) * (bottom - top), 1)
     while scale > 1 and area * scale**2 * outputs * BYTES_PER_VALUE > MOST_BYTES:
         scale //= 2
@@ -171,9 +177,9 @@ def _picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
     return render.resolution_x * percent // 100, render.resolution_y * percent // 100
 
 
-def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]) -> tuple[int, int, int, int]:
+def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]) -> tuple[int, int, int, int] | None:
     """Left, top, right and bottom of the pixels that can see `obj`; the whole picture where it reaches behind the
-    camera or is outside of it."""
+    camera, None where there are none."""
     width, height = size
     whole = (0, 0, width, height)
     corners = []
@@ -186,6 +192,8 @@ def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]
     if not corners:
         return whole
     seen = [world_to_camera_view(scene, scene.camera, corner) for corner in corners]
+    if max(point.z for point in seen) <= 0.0:
+        return None
     if min(point.z for point in seen) <= 0.0:
         return whole
     left, right = (pick(point.x for point in seen) * width for pick in (min, max))
@@ -196,4 +204,4 @@ def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]
         min(math.ceil(right + MARGIN), width),
         min(math.ceil(height - bottom + MARGIN), height),
     )
-    return found if found[0] < found[2] and found[1] < found[3] else whole
+    return found if found[0] < found[2] and found[1] < found[3] else None

@@ -28,12 +28,14 @@ from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
 DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
-# Cycles says the second on its stderr alone, and shows nothing
-NOT_SEEN = (
-    "The camera does not see '{obj}', or the nodes of '{material}' are too many for Cycles to evaluate at once: move "
-    "it into the picture, or leave nodes out."
-)
+NOT_SEEN = "The camera does not see '{obj}': move it into the frame."
+# Cycles says so on its stderr alone, and shows nothing
+TOO_MANY = "The nodes of '{material}' are too many for Cycles to evaluate at once: leave nodes out."
 SEEN = 0.05  # share of a subpixel's samples on the target from which on it has a value
+
+
+class NotSeenError(ProbeRequestError):
+    """The camera does not see the target."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +62,22 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     Where `elsewhere` is requested and nodes ask for the ray, sockets and weights have a file of that name, too: one
     below the other what rays from elsewhere find at `other_views.ANGLES` angles, a place a pixel.
 
+    Where `may_miss` is requested and the camera does not see the target, `seen` is answered alone, as false.
+
     Raises
     ------
     ProbeRequestError
-        If the camera does not see the target, or Blender cannot render.
+        If the camera does not see the target and may not miss it, its nodes are too many, or Blender cannot render.
     """
+    try:
+        return _answer(request)
+    except NotSeenError:
+        if request.get("may_miss"):
+            return {"seen": False}
+        raise
+
+
+def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
     target = Target.of(request)
     material, depths = target.material, int(request.get("depths", 1))
     outputs, found, frame = _rendered(target, request, request["scale"])
@@ -75,7 +88,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     seen = mask[..., 0] > SEEN
     first = seen & (np.arange(len(seen)) < len(seen) // depths)[:, None]
     if not first.any():
-        raise ProbeRequestError(NOT_SEEN.format(obj=target.obj.name, material=material.name))
+        raise target.why_nothing(frame, request["samples"])
     folder = Path(request["folder"])
     leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
     for number, each in enumerate(outputs):
@@ -109,7 +122,7 @@ def _rendered(
         make_opaque(copy, ours=True)
         wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
         at_depths = peeled(copy.node_tree, wanted, depths)
-        frame = frame_of(target.scene, target.obj, scale, len(at_depths))
+        frame = target.frame(scale, len(at_depths))
         widen_bumps(copy.node_tree, frame.scale)
         rendered = target.outputs(copy, at_depths, frame, request["samples"])
     finally:
@@ -146,6 +159,25 @@ class Target:
     def material(self) -> bpy.types.Material:
         """The material that is looked at."""
         return self.slot.material
+
+    def frame(self, scale: int, outputs: int) -> Frame:
+        """See `frame_of`; raises `NotSeenError` where there is none."""
+        frame = frame_of(self.scene, self.obj, scale, outputs)
+        if frame is None:
+            raise NotSeenError(NOT_SEEN.format(obj=self.obj.name))
+        return frame
+
+    def why_nothing(self, frame: Frame, samples: int) -> ProbeRequestError:
+        """Why Cycles has shown nothing of it: nothing is seen without its nodes either, or they are too many."""
+        copy = own_copy(self.material)
+        try:
+            make_opaque(copy)
+            mask = self.outputs(copy, [(MASK, False), (POSITION, True)], frame, samples)[MASK]
+        finally:
+            remove_copy(copy)
+        if (mask > SEEN).any():
+            return ProbeRequestError(TOO_MANY.format(material=self.material.name))
+        return NotSeenError(NOT_SEEN.format(obj=self.obj.name))
 
     def outputs(
         self, copy: bpy.types.Material, wanted: list[tuple[str, bool]], frame: Frame, samples: int

@@ -16,14 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..graph_values.place import Place, write
-from .aov_render import Frame, frame_of, world_to_frame
+from .aov_render import Frame, world_to_frame
 from .closure_tree import ClosureTree
 from .graph_copy import node_at, own_copy, remove_copy, variant_of
 from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
 from .server import ProbeRequestError
 from .socket_pictures import (
     MASK,
-    NOT_SEEN,
     POSITION,
     SEEN,
     Target,
@@ -64,7 +63,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     variants: _Sets = [(variant["values"], variant["sockets"]) for variant in request["variants"]]
     most = max(min(len(variants), MOST_VARIANTS), 1)
     while True:
-        frame = frame_of(target.scene, target.obj, request["scale"], _outputs_of(variants[:most]))
+        frame = target.frame(request["scale"], _outputs_of(variants[:most]))
         if frame.scale < request["scale"] and most > 1:  # all answers of a fit have one size
             most //= 2
             continue
@@ -104,7 +103,7 @@ def _all(
         if not seen.any():  # Cycles shows nothing of a material that is too large for it
             if most > 1:
                 raise _TooManyError
-            raise ProbeRequestError(NOT_SEEN.format(obj=target.obj.name, material=target.material.name))
+            raise target.why_nothing(frame, request["samples"])
         kinds = _kinds(target.material, request["sockets"])
         for k, (_, names) in enumerate(some):
             files.append({})
@@ -120,7 +119,7 @@ def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], 
     """Files by socket of what rays from elsewhere find of a variant, at each angle."""
     names, paths = variants[0][1], request["sockets"]
     kinds = _kinds(target.material, paths)
-    frame = frame_of(target.scene, target.obj, ELSEWHERE_SCALE, len(names) + 2)
+    frame = target.frame(ELSEWHERE_SCALE, len(names) + 2)
     ways = []
     for angle in range(ANGLES):
         found, mask, _ = _rendered(target, request, places, variants, frame, cosine=cosine_of(angle))

@@ -89,5 +89,10 @@ AGAINST_REST = 2.0
 TOLD_APART = 2.0
 # A further picture is proposed where it divides a deviation by so much. Larger: fewer proposals. No measurement.
 WORTH_A_PICTURE = 2.0
+# Deviations from 0 of a lobe's amount up to which there may be no lobe, so that nothing is promised of its details. Of
+# 40 predictions in scenes 4 to 12 of `studies.views` two were of such ones, wrong by factors of 3.6 and 10.8
+# (docs/notebook/several_pictures.md). Larger: a lobe's details are promised by fewer pictures. Smaller: those of one
+# that noise made.
+PERHAPS_ABSENT = 2.0
 # Deviation, of the box, of a value that may lie anywhere in it: about 1/sqrt(12), that of a uniform distribution.
 NOTHING_KNOWN = 0.3

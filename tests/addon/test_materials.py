@@ -47,6 +47,26 @@ def test_the_list_holds_what_the_camera_sees_and_keeps_what_was_unticked(two: Si
     assert not entries
 
 
+def test_the_list_holds_what_the_cameras_of_the_pictures_see(two: SimpleNamespace) -> None:
+    """The first camera looks at the floor alone; the second, at frame 7, at the vase, which is out of sight before."""
+    bpy = two.bpy
+    scene, vase = bpy.context.scene, bpy.data.objects["Väse"]
+    for frame, place in ((1, (0.0, 0.0, -50.0)), (7, tuple(vase.location))):
+        vase.location = place
+        vase.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    bpy.ops.mfo.list_materials()
+    assert [e.material.name for e in scene.mfo.targets] == ["Wood"]
+    assert bpy.ops.mfo.add_picture() == {"FINISHED"}
+    scene.mfo.pictures[0].camera, scene.mfo.pictures[0].frame = scene.camera, 7
+    bpy.ops.mfo.list_materials()
+    assert [e.material.name for e in scene.mfo.targets] == ["Wood", "Glaze"]
+    assert (scene.frame_current, scene.frame_subframe) == (1, 0.0)
+    scene.mfo.pictures[0].use = False
+    bpy.ops.mfo.list_materials()
+    assert [e.material.name for e in scene.mfo.targets] == ["Wood"]
+
+
 def test_both_are_fitted_shown_applied_and_kept(two: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     bpy, runtime = two.bpy, two.bpy.context.window_manager.mfo_runtime
     before = rough(two, "Wood"), rough(two, "Glaze")

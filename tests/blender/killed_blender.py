@@ -14,7 +14,7 @@ from pathlib import Path
 from ..addon.fake_backend import png
 
 ROOT = Path(__file__).resolve().parents[2]
-SCRIPT = Path(__file__).resolve().parent / "scripts" / "graph_fit_until_killed.py"
+SCRIPT = Path(__file__).resolve().parent / "scripts" / "graphs" / "fit_until_killed.py"
 START_SECONDS = 90.0  # until the backend has started a Blender for the nodes
 ORPHAN_SECONDS = 12.0  # the backend promises ten
 BACKEND = b"mfo_backend"

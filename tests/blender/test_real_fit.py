@@ -38,3 +38,14 @@ def test_demo_then_operators(blender: RealBlender, tmp_path: Path) -> None:
     after = flip_error(read_image(demo / "reference.exr"), read_image(tmp_path / "after.exr"), display=DisplayView())
     assert after.mean <= 0.06
     assert after.mean * 4 <= done.answer["flip_before"]
+
+
+def test_values_inside_nodes_of_two_pictures(blender: RealBlender, tmp_path: Path) -> None:
+    """Both pictures are rendered by this Blender's Cycles, which evaluates the nodes for the fit, too."""
+    script = SCRIPT.parent / "graphs" / "two_pictures.py"
+    assert "ALL GOOD" in blender.script(script, str(tmp_path), MFO_BACKEND_PYTHON=sys.executable)
+    found = json.loads((tmp_path / "values.json").read_text("utf-8"))
+    for truth, applied in zip(found["truth"], found["applied"], strict=True):
+        assert applied == pytest.approx(truth, abs=0.015)
+    result = json.loads((tmp_path / "job" / "result.json").read_text("utf-8"))
+    assert [(picture["number"], picture["verdict"]) for picture in result["pictures"]] == [(1, "same"), (2, "same")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -61,4 +62,13 @@ def test_main_way_by_mouse_and_keys(windowed: RealBlender, tmp_path: Path, scale
     script = [str(SCRIPT.with_name("by_hand.py")), "--", ADDON_ID, str(tmp_path), str(scale), str(width)]
     out = windowed.run(*options, "--python", *script, windows=True, MFO_BACKEND_PYTHON=python).stdout
     assert "ALL GOOD by hand" in out, out[-4000:]
+    assert "script error" not in out, out[-4000:]
+
+
+def test_two_pictures_and_two_materials_by_real_events(windowed: RealBlender, tmp_path: Path) -> None:
+    """Both lists, the real backend: values near the truth of Cycles, a verdict for each, one step to apply and undo."""
+    script = [str(SCRIPT.parent / "desktop" / "both_lists.py"), "--", ADDON_ID, str(tmp_path)]
+    options = ["--addons", ADDON_ID, "--python-exit-code", "3", "--python"]
+    out = windowed.run(*options, *script, windows=True, MFO_BACKEND_PYTHON=sys.executable).stdout
+    assert "ALL GOOD with both lists" in out, out[-4000:]
     assert "script error" not in out, out[-4000:]

@@ -43,6 +43,22 @@ scene.camera = camera
 side = bpy.data.objects.new("Side", bpy.data.cameras.new("Side"))
 side.location = (0.0, 0.0, 5.0)  # above the floor: the wall is seen edge on, beyond its frame
 scene.collection.objects.link(side)
+if "mixed" in argv:  # the wall: its paint beside patches of dark ones, which a noise scatters
+    tree = bpy.data.materials["Wall Paint"].node_tree
+    paint, output = (next(n for n in tree.nodes if n.type == kind) for kind in ("BSDF_PRINCIPLED", "OUTPUT_MATERIAL"))
+    patches, noise, ramp, place, mix = (
+        tree.nodes.new("ShaderNode" + kind) for kind in ("BsdfDiffuse", "TexNoise", "ValToRGB", "TexCoord", "MixShader")
+    )
+    patches.inputs["Color"].default_value = (0.02, 0.02, 0.02, 1.0)
+    low, high = ramp.color_ramp.elements
+    low.position, high.position, low.color, high.color = 0.45, 0.55, (0.0, 0.0, 0.0, 1.0), (0.2, 0.2, 0.2, 1.0)
+    noise.inputs["Scale"].default_value = 1.5
+    for source, sink in (
+        (place.outputs["Object"], noise.inputs["Vector"]), (noise.outputs[0], ramp.inputs[0]),
+        (ramp.outputs[0], mix.inputs[0]), (paint.outputs[0], mix.inputs[1]), (patches.outputs[0], mix.inputs[2]),
+        (mix.outputs[0], output.inputs["Surface"]),
+    ):
+        tree.links.new(source, sink)
 bpy.ops.wm.save_as_mainfile(filepath=argv[0], copy=True)
 for inputs, color, rough in zip(nodes, ((0.75, 0.2, 0.1, 1.0), (0.25, 0.6, 0.8, 1.0)), (0.35, 0.6)):
     inputs["Base Color"].default_value, inputs["Roughness"].default_value = color, rough
@@ -153,3 +169,26 @@ def test_two_pictures_show_both_and_one_of_them_only_the_floor(corner: Path, tmp
         own = json.loads((job / found["folder"] / "result.json").read_text("utf-8"))
         assert own["recovered"]["base_color"] != answer["materials"][[*TRUTH].index(name)]["recovered"]["base_color"]
         np.testing.assert_allclose(own["recovered"]["base_color"], TRUTH[name], atol=0.05)
+
+
+def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(tmp_path: Path) -> None:
+    """The first picture does not show it, and has its light: of a Mix of equal shares the floor would be too dark."""
+    start, both, side, saved = (tmp_path / name for name in ("start.blend", "both.exr", "side.exr", "fitted.blend"))
+    run_bpy(BUILD, start, both, side, "mixed")
+    done = run_mfo(
+        "blend", start, "--object", "Floor", "--object", "Wall", "--preset", "fast", "--parameters",
+        "base_color, roughness", "--reference", f"{side}@camera=Side", "--reference", f"{both}@camera=Camera",
+        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    floor, wall = done.answer["materials"]
+    assert [[p["number"] for p in found["pictures"]] for found in (floor, wall)] == [[1, 2], [2]]
+    assert [p["verdict"] for found in (floor, wall) for p in found["pictures"]] == ["same"] * 3
+    for found in (floor, wall):
+        np.testing.assert_allclose(found["recovered"]["base_color"], TRUTH[found["object"]], atol=0.01)
+        assert found["recovered"]["roughness"] == pytest.approx({"Floor": 0.35, "Wall": 0.6}[found["object"]], abs=0.02)
+        assert found["certainty"]["base_color"]["level"] == "determined"
+    run_bpy(READ, saved, tmp_path / "read.json")
+    written = json.loads((tmp_path / "read.json").read_text("utf-8"))
+    for found in (floor, wall):
+        assert written[found["object"]] == pytest.approx(found["recovered"]["base_color"], abs=1e-5)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...probe.client import Probe, ProbeError
 from ..findings import ExportError, Findings
@@ -25,6 +26,7 @@ FOLDER = "graph"
 SCALE, SAMPLES = 4, 4
 # Times that a ray meets a target which lets light through, and finds what nodes give: of the far side, too
 DEPTHS = 4
+EMISSION_SOCKETS = ("Emission Color", "Emission Strength")
 
 
 @dataclass(frozen=True)
@@ -82,21 +84,30 @@ def asks_graph(fitted: FittedSlot) -> bool:
     return described is not None and described.asks_graph
 
 
-def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot) -> str | None:
-    """The name of the leaf that covers most of the target in the picture; None where there is nothing to choose.
+def asks_leaf(fitted: FittedSlot) -> bool:
+    """Whether the picture says which shader of the material's mix is fitted."""
+    leaves = [] if fitted.material is None else fitted_leaves(fitted.material)
+    return len(leaves) > 1 and not chosen_leaf(fitted.material) and any(leaf.is_linked for leaf in leaves)
+
+
+def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot, *, may_miss: bool = False) -> str | None:
+    """The name of the leaf that covers most of the target in the picture.
+
+    None where there is nothing to choose, or the camera does not see a target that it `may_miss`.
 
     Raises
     ------
     ProbeError
         If Cycles cannot evaluate the graph.
     """
-    material = fitted.material
-    leaves = [] if material is None else fitted_leaves(material)
-    if len(leaves) < 2 or chosen_leaf(material) or not any(leaf.is_linked for leaf in leaves):
+    if not asks_leaf(fitted):
         return None
+    leaves = fitted_leaves(fitted.material)
     asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
-    _send(probe, context, fitted, asked, 1, probe.folder, elsewhere=False)
+    _send(probe, context, fitted, asked, 1, probe.folder, elsewhere=False, may_miss=may_miss)
     answer = probe.receive()  # waited for: the scene is read by it, and must be as in the copy that was asked
+    if not answer.get("seen", True):
+        return None
     shares = [
         found["weight"]["mean"][0] if leaf.is_linked else leaf.share
         for leaf, found in zip(leaves, answer["leaves"], strict=True)
@@ -114,11 +125,13 @@ def _send(
     depths: int = 1,
     *,
     elsewhere: bool = True,
+    may_miss: bool = False,
 ) -> None:
     probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=fitted.object.name, slot=fitted.slot,
         leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths, elsewhere=elsewhere,
+        may_miss=may_miss,
     )  # fmt: skip
 
 
@@ -128,11 +141,18 @@ def names_by_graph(material: Material) -> list[str]:
 
 
 def evaluate_graph(
-    probe: Probe, context: bpy.types.Context, fitted: FittedSlot, material: Material, number: int = 0
-) -> Generator[None, None, tuple[Material, NodeGraph]]:
+    probe: Probe,
+    context: bpy.types.Context,
+    fitted: FittedSlot,
+    material: Material,
+    number: int = 0,
+    *,
+    may_miss: bool = False,
+) -> Generator[None, None, tuple[Material, NodeGraph | None]]:
     """The material with the mean of each socket of its graph, and the pictures of them; yields while Cycles works.
 
-    Several fitted materials have different numbers, so that their files do not meet.
+    Several fitted materials have different numbers, so that their files do not meet. One that the camera does not see
+    and `may_miss` stays as it is, without pictures.
 
     Raises
     ------
@@ -151,10 +171,12 @@ def evaluate_graph(
     folder = probe.folder / f"target_{number}"
     folder.mkdir(exist_ok=True)
     depths = DEPTHS if material.passes_light else 1
-    _send(probe, context, fitted, asked, SCALE, folder, depths)
+    _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss)
     while not probe.is_answered():
         yield
     answer = probe.receive()
+    if not answer.get("seen", True):
+        return _perhaps_glowing(material), None
     files = [folder / answer["positions"]]
 
     def seen(socket: Socket, found: dict[str, Any]) -> Socket:
@@ -173,6 +195,20 @@ def evaluate_graph(
     first, *held = map(evaluated, leaves, answer["leaves"])
     seen_by = NodeGraph(answer["camera"], files[0], tuple(files), depths, answer["scale"])
     return replace(first, leaves=tuple(held)), seen_by
+
+
+def _perhaps_glowing(material: Material) -> Material:
+    """A material that this camera does not see, which gives light where nodes give its emission.
+
+    The backend puts in what another picture shows of it, where the scene has an emitter.
+    """
+    glowing = {
+        name: replace(socket, value=np.ones_like(socket.value, dtype=np.float64).tolist())
+        for name, socket in material.sockets.items()
+        if name in EMISSION_SOCKETS and socket.by_graph
+    }
+    leaves = tuple(map(_perhaps_glowing, material.leaves))
+    return replace(material, sockets=material.sockets | glowing, leaves=leaves)
 
 
 def _own_name(leaf: Material, name: str) -> str:

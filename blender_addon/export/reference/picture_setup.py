@@ -121,6 +121,17 @@ def shown(
             scene.frame_set(frame[0], subframe=frame[1])
 
 
+@contextmanager
+def named(setup: PictureSetup, count: int) -> Iterator[None]:
+    """Have the errors of one of several pictures begin with its number and name."""
+    try:
+        yield
+    except ExportError as error:
+        if count == 1:
+            raise
+        raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
+
+
 def check_setups(setups: Sequence[PictureSetup]) -> None:
     """Raise `ExportError` for no picture or more than fit together."""
     if not setups:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import bpy
 import numpy as np
@@ -111,18 +112,20 @@ def read_scene(
         for number, (each, shape) in enumerate(zip(fitted, shapes, strict=True)):
             if shape is None:
                 _say_no_faces(each, view_layer, walk.targets_left_out[number], findings)
-        seen = [(each, shape) for each, shape in zip(fitted, shapes, strict=True) if shape is not None]
-        if len(seen) < len(fitted):
+        there = [(each, shape) for each, shape in zip(fitted, shapes, strict=True) if shape is not None]
+        if len(there) < len(fitted):
             return None
         walk.note_coincident_faces()
-        walk.note_bent_normals(seen)
-        unseen = []
-        for each, shape in seen:
+        walk.note_bent_normals(there)
+        unseen: dict[int, list[str]] = {}
+        for number, (each, shape) in enumerate(there):
             of_one = Findings()
             check_visible(data, shape, each.object, each.slot, scene, depsgraph, of_one)
-            unseen += of_one.errors
-        if not may_miss or len(unseen) == len(seen):
-            for sentence in unseen:
+            if of_one.errors:
+                unseen[number] = of_one.errors
+        data.unseen.update(unseen)
+        if not may_miss or len(unseen) == len(there):
+            for sentence in chain(*unseen.values()):
                 findings.error(sentence)
     return data
 

@@ -79,6 +79,7 @@ class SceneData:
     shapes: list[Shape] = field(default_factory=list)
     materials: dict[str, Material] = field(default_factory=dict)
     target_count: int = 1
+    unseen: set[int] = field(default_factory=set)  # numbers of fitted materials that no ray of the camera was found for
 
     @property
     def target(self) -> Shape | None:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which material slots the camera sees, by rays through the picture."""
+"""Which material slots cameras see, by rays through the picture."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import bpy
 from mathutils import Vector  # pyright: ignore[reportMissingImports]
@@ -15,12 +16,35 @@ from ..render_state import rendered_objects
 ACROSS = 96  # rays along the longer side of the picture; what is missed is smaller than one of them
 
 
-def seen_slots(context: bpy.types.Context) -> list[FittedSlot]:
-    """The slots with materials that can be fitted, each material once, those that cover most first."""
-    scene, camera = context.scene, context.scene.camera
-    if camera is None or camera.type != "CAMERA":
-        return []
-    depsgraph = context.evaluated_depsgraph_get()
+def seen_slots(context: bpy.types.Context, views: Sequence[tuple[bpy.types.Object, int]] = ()) -> list[FittedSlot]:
+    """The slots with materials that can be fitted, each material once, those that cover most first.
+
+    `views` are cameras and frames, instead of the scene's own as it is.
+    """
+    scene = context.scene
+    now = scene.frame_current, scene.frame_subframe
+    hits: Counter[tuple[bpy.types.Object, int]] = Counter()
+    try:
+        for camera, frame in views:
+            if (scene.frame_current, scene.frame_subframe) != (frame, 0.0):
+                scene.frame_set(frame)
+            hits += _hits(context, camera)
+    finally:
+        if (scene.frame_current, scene.frame_subframe) != now:
+            scene.frame_set(now[0], subframe=now[1])
+    if not views and scene.camera is not None and scene.camera.type == "CAMERA":
+        hits = _hits(context, scene.camera)
+    slots: dict[str, FittedSlot] = {}
+    for (obj, slot), _ in hits.most_common():
+        each = FittedSlot(obj, slot)
+        if each.material is not None and target_shader(each.material) is not None:
+            slots.setdefault(each.material.name_full, each)
+    return list(slots.values())
+
+
+def _hits(context: bpy.types.Context, camera: bpy.types.Object) -> Counter[tuple[bpy.types.Object, int]]:
+    """How many rays of a camera meet each slot of the objects that a render shows."""
+    scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
     rendered = rendered_objects(context.view_layer)
     hits: Counter[tuple[bpy.types.Object, int]] = Counter()
     for origin, direction in _rays(scene, camera):
@@ -30,12 +54,7 @@ def seen_slots(context: bpy.types.Context) -> list[FittedSlot]:
         polygons = getattr(item.evaluated_get(depsgraph).data, "polygons", ())
         slot = polygons[face].material_index if 0 <= face < len(polygons) else item.original.active_material_index
         hits[item.original, min(slot, max(len(item.original.material_slots) - 1, 0))] += 1
-    slots: dict[str, FittedSlot] = {}
-    for (obj, slot), _ in hits.most_common():
-        each = FittedSlot(obj, slot)
-        if each.material is not None and target_shader(each.material) is not None:
-            slots.setdefault(each.material.name_full, each)
-    return list(slots.values())
+    return hits
 
 
 def _rays(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[tuple[Vector, Vector]]:

@@ -31,7 +31,7 @@ LABELS = {
     "Queue": "File",
     "Fit each once and quickly, in the light that the others' base colours give; without it at most 120 values together": "Ajuster chacun une fois et vite, dans la lumière que donnent les couleurs de base des autres ; sans cela, 120 valeurs au plus ensemble",
     "Fit this material together with the others": "Ajuster ce matériau avec les autres",
-    "List the materials that the camera sees, to fit several of them together": "Lister les matériaux que la caméra voit, pour en ajuster plusieurs ensemble",
+    "List the materials that the cameras of the pictures see, to fit several of them together": "Lister les matériaux que voient les caméras des images, pour en ajuster plusieurs ensemble",
     "Fit the material of the active object alone again": "Ajuster de nouveau le seul matériau de l'objet actif",
     "Show the values and pictures of this one of the materials that were fitted together": "Montrer les valeurs et les images de ce matériau parmi ceux ajustés ensemble",
     "Set the camera or the light up that the fit proposes, and list the picture, which is to be made yet": "Installer la caméra ou la lumière que l'ajustement propose et ajouter à la liste l'image, qui reste à faire",

@@ -31,7 +31,7 @@ LABELS = {
     "Queue": "Warteschlange",
     "Fit each once and quickly, in the light that the others' base colours give; without it at most 120 values together": "Jedes einmal und schnell anpassen, im Licht, das die Grundfarben der anderen geben; ohne das höchstens 120 Werte zusammen",
     "Fit this material together with the others": "Dieses Material mit den anderen zusammen anpassen",
-    "List the materials that the camera sees, to fit several of them together": "Die Materialien auflisten, die die Kamera sieht, um mehrere davon zusammen anzupassen",
+    "List the materials that the cameras of the pictures see, to fit several of them together": "Die Materialien auflisten, die die Kameras der Bilder sehen, um mehrere davon zusammen anzupassen",
     "Fit the material of the active object alone again": "Wieder das Material des aktiven Objekts allein anpassen",
     "Show the values and pictures of this one of the materials that were fitted together": "Werte und Bilder dieses der zusammen angepassten Materialien zeigen",
     "Set the camera or the light up that the fit proposes, and list the picture, which is to be made yet": "Die vorgeschlagene Kamera oder das Licht einrichten und das Bild in die Liste nehmen, das noch zu machen ist",

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...material.principled.blender_selection import AMOUNT_OF
 from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_image import TwoSamples
 from ...render.paths.recorded_scene import RecordedScene
@@ -36,7 +37,7 @@ from ..certainty.covariance import Further, covariance
 from ..squares.problem import Rival
 from ..squares.recording_noise import MOST_OWN, rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
-from ..tolerances import DETERMINED_BELOW, NOTHING_KNOWN, WORTH_A_PICTURE
+from ..tolerances import DETERMINED_BELOW, NOTHING_KNOWN, PERHAPS_ABSENT, WORTH_A_PICTURE
 
 Vector = NDArray[np.float64]
 
@@ -140,8 +141,18 @@ class Known:
 
 
 def open_values(x: Vector, certainty: Mapping[str, Certainty], user: Vector, table: ParameterTable) -> tuple[str, ...]:
-    """Values that a further picture is for; none where all that is not determined is the user's own again."""
-    names = tuple(name for name, c in certainty.items() if c.level is not Level.DETERMINED)
+    """Values that a further picture is for; none where all that is not determined is the user's own again.
+
+    Details of a lobe that there may not be are none of them: what a picture tells of them hangs on the lobe.
+    """
+
+    def may_be_absent(amount: str | None) -> bool:
+        if amount is None or amount not in certainty:
+            return False  # it is given
+        return bool((x[table.slice_of(amount)] <= PERHAPS_ABSENT * np.array(certainty[amount].sd)).all())
+
+    left = (name for name, c in certainty.items() if c.level is not Level.DETERMINED)
+    names = tuple(name for name in left if not may_be_absent(AMOUNT_OF.get(name)))
     moved = (np.abs(x - user)[table.slice_of(name)].max() > 0.0 for name in names)
     return names if any(moved) else ()
 

@@ -99,17 +99,16 @@ def _load(pictures: Sequence[JobPicture]) -> list[list[MitsubaRenderer]]:
     """Each picture's renderers of all materials; values are those of the first, nodes as each camera sees them."""
     from ...render.pictures.mitsuba_renderer import load_renderers_together
 
-    firsts: dict[str, Any] = {}
+    own = [_own_materials(picture) for picture in pictures]
+    # what nodes give a material that a picture does not show lights it as the first one that shows it has it
+    seen = {bsdf: found for here in reversed(own) for bsdf, (found, is_seen) in here.items() if is_seen}
     found = []
-    for picture in pictures:
+    for picture, here in zip(pictures, own, strict=True):
         request = picture.request
         materials = request_materials(picture.folder, request)
-        for path, each in request.targets:  # what nodes give a material is in its own folder
-            bsdf = each.target.bsdf_id
-            own = request_materials(JobFolder.open(picture.folder.root / path), each)
-            if bsdf in own:
-                materials[bsdf] = of_one_material(firsts.get(bsdf), own[bsdf])
-                firsts.setdefault(bsdf, own[bsdf])
+        for bsdf, (material, is_seen) in here.items():
+            first, _ = own[0].get(bsdf, (None, False))
+            materials[bsdf] = of_one_material(first, material if is_seen else seen.get(bsdf, material))
         parameters = [each.fit.parameters for _, each in pictures[0].request.targets]
         renderers = load_renderers_together(
             picture.folder.root / request.scene,
@@ -121,6 +120,16 @@ def _load(pictures: Sequence[JobPicture]) -> list[list[MitsubaRenderer]]:
             renderer.table = narrowed(renderer.table, pictures[0].request.fit.bounds)
             renderer.start = renderer.table.clip(renderer.start)
         found.append(renderers)
+    return found
+
+
+def _own_materials(picture: JobPicture) -> dict[str, tuple[dict[str, Any], bool]]:
+    """The picture's fitted materials by BSDF, and whether it has what nodes give them: that is in their own folders."""
+    found = {}
+    for path, each in picture.request.targets:
+        materials = request_materials(JobFolder.open(picture.folder.root / path), each)
+        if each.target.bsdf_id in materials:
+            found[each.target.bsdf_id] = materials[each.target.bsdf_id], each.graph is not None
     return found
 
 

@@ -71,6 +71,49 @@ def test_what_cannot_be_answered_is_said_in_its_own_words(temporary: Path) -> No
         probe.ask("sockets", **where, **asked, folder=str(probe.folder))
 
 
+def add_noises(count: int) -> dict[str, object]:
+    """Give the cube's roughness the sum of so many noises; the request that asks for it."""
+    cube, view = bpy.data.objects["Cube"], bpy.context.view_layer
+    tree = cube.active_material.node_tree
+    shader = tree.nodes["Principled BSDF"]
+    total = tree.nodes.new("ShaderNodeValue").outputs[0]
+    for number in range(count):
+        noise, add = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeMath")
+        noise.inputs["Scale"].default_value = 1.0 + number
+        tree.links.new(total, add.inputs[0])
+        tree.links.new(noise.outputs[0], add.inputs[1])
+        total = add.outputs[0]
+    tree.links.new(total, shader.inputs["Roughness"])
+    leaf = {"node": [shader.name], "sockets": ["Roughness"], "weight": False}
+    where = {"scene": bpy.context.scene.name, "layer": view.name, "object": cube.name, "slot": 0}
+    return {**where, "leaves": [leaf], "scale": 1, "samples": 1}
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, -80.0), (12.0, -11.0, 8.0)], ids=["beside the picture", "behind"])
+def test_a_target_that_the_camera_does_not_see_may_be_missed(place: tuple[float, ...], temporary: Path) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=False)
+    asked = add_noises(1)
+    bpy.data.objects["Cube"].location = place
+    bpy.context.view_layer.update()
+    with Probe() as probe:
+        assert probe.ask("sockets", **asked, folder=str(probe.folder), may_miss=True) == {"status": "ok", "seen": False}
+        with pytest.raises(ProbeError, match=r"^The camera does not see 'Cube': move it into the frame\.$"):
+            probe.ask("sockets", **asked, folder=str(probe.folder))
+
+
+def test_a_hidden_target_may_be_missed_and_nodes_that_are_too_many_are_said_by_their_own_words(temporary: Path) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=False)
+    asked = add_noises(1)
+    bpy.ops.mesh.primitive_plane_add(size=8.0, location=(2.5, -2.3, 1.8))  # between camera and cube
+    bpy.context.object.rotation_euler = bpy.context.scene.camera.rotation_euler
+    with Probe() as probe:
+        assert probe.ask("sockets", **asked, folder=str(probe.folder), may_miss=True) == {"status": "ok", "seen": False}
+    bpy.data.objects.remove(bpy.context.object)
+    add_noises(300)  # Cycles shows nothing of it, and 150 it does
+    with Probe() as probe, pytest.raises(ProbeError, match=r"^The nodes of 'Material' are too many for Cycles to"):
+        probe.ask("sockets", **asked, folder=str(probe.folder), may_miss=True)
+
+
 def test_a_killed_second_blender_is_said(temporary: Path) -> None:
     with Probe() as probe:
         os.kill(probe.pid, signal.SIGTERM)

@@ -105,3 +105,82 @@ def test_each_picture_has_all_materials(room: dict[str, Any], export: Any) -> No
     assert more.picture.camera == "Side"
     mesh = report.folder / "meshes" / "target_2.ply"
     assert mesh.samefile(report.folder / path / "targets" / "2" / "meshes" / "target_2.ply")
+
+
+@pytest.fixture
+def apart(room: dict[str, Any]) -> dict[str, Any]:
+    """The floor's two materials, each before a camera of its own: a mix by noise, and one whose glow is by noise."""
+    for name, x in (("Left", -1.0), ("Right", 1.0)):
+        camera = add_camera(ortho_scale=1.2)
+        camera.name, camera.location.x = name, x
+        image = bpy.data.images.new(name, 32, 32, float_buffer=True)
+        image.pixels[:] = [0.5, 0.4 + 0.1 * x, 0.3, 1.0] * 32**2
+    bpy.data.objects.remove(room["Table"])
+    mix, glow = (bpy.data.materials[name].node_tree for name in ("Wood", "Rug"))
+    shader, output = (next(n for n in mix.nodes if n.type == t) for t in ("BSDF_PRINCIPLED", "OUTPUT_MATERIAL"))
+    noise, mixer, cover = (mix.nodes.new(f"ShaderNode{kind}") for kind in ("TexNoise", "MixShader", "BsdfDiffuse"))
+    noise.inputs["Scale"].default_value = 8.0
+    above = mix.nodes.new("ShaderNodeMath")  # the Diffuse BSDF covers most: which only a picture of it can say
+    above.operation, above.inputs[1].default_value = "MULTIPLY_ADD", 0.2
+    above.inputs[2].default_value = 0.75
+    mix.links.new(noise.outputs[0], above.inputs[0])
+    mix.links.new(above.outputs[0], mixer.inputs[0])
+    mix.links.new(shader.outputs[0], mixer.inputs[1])
+    mix.links.new(cover.outputs[0], mixer.inputs[2])
+    mix.links.new(mixer.outputs[0], output.inputs["Surface"])
+    lit = next(n for n in glow.nodes if n.type == "BSDF_PRINCIPLED")
+    spots = glow.nodes.new("ShaderNodeTexNoise")
+    lit.inputs["Emission Strength"].default_value = 0.0
+    glow.links.new(spots.outputs[0], lit.inputs["Emission Strength"])
+    bpy.context.view_layer.update()
+    return room
+
+
+def pictures_from(*cameras: str) -> list[PictureSetup]:
+    return [PictureSetup(bpy.data.images[name], number, camera=name) for number, name in enumerate(cameras, 1)]
+
+
+def test_a_picture_without_a_material_of_nodes_leaves_them_to_the_picture_that_shows_it(
+    apart: dict[str, Any], export: Any
+) -> None:
+    slots = [FittedSlot(apart["Floor"], 0), FittedSlot(apart["Floor"], 1)]
+    report = export(apart["Floor"], targets=slots, reference=pictures_from("Right", "Left"))
+    inner = {
+        (picture, target): json.loads((report.folder / path / f"targets/{target}/request.json").read_text("utf-8"))
+        for picture, path in (("Right", "."), ("Left", "more_pictures/2"))
+        for target in (1, 2)
+    }
+    assert {key for key, request in inner.items() if "graph" in request} == {("Left", 1), ("Right", 2)}
+    # the first picture does not show the mix, and has its leaves in the order of the one that does
+    assert [inner[picture, 1]["target"]["node"] for picture in ("Right", "Left")] == [["Diffuse BSDF"]] * 2
+    seen = inner["Left", 1]["materials"]["target_bsdf"]
+    assert seen["weight"]["value"] == pytest.approx(0.85, abs=0.05)
+    assert not (report.folder / "targets" / "1" / "graph").exists()
+    # a glow that nodes give is an emitter where the picture does not show it, too
+    for path in (".", "more_pictures/2"):
+        root = ElementTree.parse(report.folder / path / "scene.xml").getroot()
+        shape = next(s for s in root.iter("shape") if s.get("id") == "target_2")
+        assert shape.find("emitter") is not None
+    read_request(JobFolder.open(report.folder))
+
+
+def test_a_material_in_none_of_the_pictures_is_refused_by_name(apart: dict[str, Any], export: Any) -> None:
+    slots = [FittedSlot(apart["Floor"], 0), FittedSlot(apart["Floor"], 1), FittedSlot(apart["Away"], 0)]
+    said = "Material 'Unseen' of 'Away' is in none of the pictures: leave it out, or add a picture that shows it."
+    with pytest.raises(ExportError, match=re.escape(said)):
+        export(apart["Floor"], targets=slots, reference=pictures_from("Right", "Left"))
+    said = "Material 'Wood' of 'Floor' is in none of the pictures"
+    with pytest.raises(ExportError, match=re.escape(said)):
+        export(apart["Floor"], targets=slots[:2], reference=pictures_from("Right", "Right"))
+    with pytest.raises(ExportError, match=re.escape("Picture 2 (Left): The camera does not see 'Floor'")):
+        export(apart["Floor"], targets=slots[1:], reference=pictures_from("Right", "Left"))
+
+
+def test_what_is_named_wrongly_is_said_of_no_picture(apart: dict[str, Any], export: Any) -> None:
+    slots, pictures = [FittedSlot(apart["Floor"], 0), FittedSlot(apart["Floor"], 1)], pictures_from("Right", "Left")
+    with pytest.raises(ExportError, match=r"^Noise Texture/Scale cannot be fitted: a fit of several materials changes"):
+        export(apart["Floor"], targets=slots, reference=pictures, fit={"parameters": ["Noise Texture/Scale"]})
+    with pytest.raises(ExportError, match=r"^Slot 1 of 'Floor' .material 'Wood'. is named twice"):
+        export(apart["Floor"], targets=[*slots, slots[0]], reference=pictures)
+    with pytest.raises(ExportError, match=r"^The material's nodes have no value 'Nose/Scale'"):
+        export(apart["Floor"], reference=pictures, fit={"parameters": ["Nose/Scale"]})

@@ -10,8 +10,18 @@ import pytest
 
 from mfo_backend.fit.certainty.covariance import covariance
 from mfo_backend.fit.pictures import next_picture
-from mfo_backend.fit.pictures.next_picture import PRESENT, Choice, Evidence, Known, _proposal, _Told, predictions
+from mfo_backend.fit.pictures.next_picture import (
+    PRESENT,
+    Choice,
+    Evidence,
+    Known,
+    _proposal,
+    _Told,
+    open_values,
+    predictions,
+)
 from mfo_backend.render.pictures.pass_counter import PassCounter
+from mfo_backend.types.certainty import Certainty, Level
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
 TABLE = ParameterTable([Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("coat_weight", 1, 0.0, 1.0, 0.5)])
@@ -44,6 +54,21 @@ def test_nothing_is_promised_of_a_value_that_no_picture_shows():
     found = _proposal(Choice(), np.zeros(3), np.array([0.1, 0.5753]), np.array([0.3, 0.5752]), TABLE.names, TABLE)
     assert found is not None
     assert list(found.predicted) == ["roughness"]
+
+
+@pytest.mark.parametrize(
+    ("weight", "sd", "asked"),
+    [(0.165, 0.226, ["roughness", "coat_weight"]), (0.67, 0.2, ["roughness", "coat_weight", "coat_roughness"])],
+)
+def test_details_of_a_lobe_that_there_may_not_be_are_not_asked_for(weight, sd, asked):
+    """Scene 7 of `studies.views` promised the roughness of such a coat ten times as well as it came; 8 has its coat."""
+    table = ParameterTable([*TABLE, Parameter("coat_roughness", 1, 0.0, 1.0, 0.5)])
+    certainty = {name: Certainty((each,), Level.WEAK) for name, each in zip(table.names, (0.05, sd, 0.1), strict=True)}
+    assert list(open_values(np.array([0.5, weight, 0.17]), certainty, np.zeros(3), table)) == asked
+    # an amount that is given is there
+    details = {"coat_roughness": certainty["coat_roughness"]}
+    alone = ParameterTable([table["coat_roughness"]])
+    assert open_values(np.array([0.17]), details, np.zeros(1), alone) == ("coat_roughness",)
 
 
 def test_a_candidate_whose_derivatives_are_no_numbers_is_passed_over():
