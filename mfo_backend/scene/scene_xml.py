@@ -199,7 +199,8 @@ def _rewrite_sensor(sensor: Element) -> None:
         film = ElementTree.SubElement(sensor, "film")
     film.set("type", "hdrfilm")
     for child in list(film):
-        is_size = child.get("name") in ("width", "height") or child.get("name", "").startswith("crop_")
+        name = child.get("name", "")
+        is_size = name in ("width", "height", "sample_border") or name.startswith("crop_")
         if not is_size and child.tag != "rfilter":
             film.remove(child)
     ElementTree.SubElement(film, "string", name="pixel_format", value="rgb")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files.xml_scene import Element, add, integer, plugin, scalar, string, transform
+from ..files.xml_scene import Element, add, boolean, integer, plugin, scalar, string, transform
 
 # Blender looks along -Z with +X right; Mitsuba looks along +Z with +X left
 TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -115,6 +115,7 @@ def sensor_element(camera: Camera, pixel_filter: PixelFilter, spp: int) -> Eleme
         integer("height", camera.height),
         string("pixel_format", "rgb"),
         string("component_format", "float32"),
+        boolean("sample_border", True),  # Cycles' filter reaches beyond the picture
         filter_element(pixel_filter),
     )
     sampler = add(plugin("sampler", "independent"), integer("sample_count", spp))

@@ -70,14 +70,17 @@ def _render(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> 
     film = sensor.film()
     width, height = (int(n) for n in film.crop_size())
     offset = film.crop_offset()
-    columns, rows, samples = opaque(width), opaque(height), opaque(spp)
-    pixel = dr.arange(mi.UInt32, width * height)
-    y = pixel // columns
-    x = pixel - y * columns
     rfilter = film.rfilter()
+    # samples around the picture, which pixels at its edges reach, too
+    border = rfilter.border_size() if film.sample_border() else 0
+    columns, rows, samples = opaque(width + 2 * border), opaque(height + 2 * border), opaque(spp)
+    pixel = dr.arange(mi.UInt32, width * height)
+    y = pixel // opaque(width)
+    x = pixel - y * opaque(width)
     plain = rfilter.is_box_filter()
     reach = 0 if plain else math.ceil(rfilter.radius() - 0.5)
     centre = mi.Point2f(mi.Float(x) + (offset[0] + 0.5), mi.Float(y) + (offset[1] + 0.5))
+    x, y = x + border, y + border
     left, right = dr.maximum(x, reach) - reach, dr.minimum(x + reach, columns - 1)
     bottom = dr.minimum(y + reach, rows - 1)
 

@@ -22,6 +22,7 @@ CROP = (
     '<integer name="crop_offset_x" value="5"/><integer name="crop_offset_y" value="3"/>'
     '<integer name="crop_width" value="12"/><integer name="crop_height" value="9"/>'
 )
+BORDER = '<boolean name="sample_border" value="true"/>'
 FILTERS = ("box", "gaussian", "tent", "mitchell", "lanczos")
 
 
@@ -51,9 +52,11 @@ def test_equals_the_film_but_for_rounding(tmp_path: Path, rfilter: str, spp: int
     np.testing.assert_allclose(image, expected, rtol=1e-3 if rfilter in ("mitchell", "lanczos") else 2e-6, atol=2e-6)
 
 
+@pytest.mark.parametrize("film", [CROP, CROP + BORDER], ids=["without border", "with border"])
 @pytest.mark.parametrize("rfilter", ["box", "gaussian"])
-def test_a_cropped_film_is_the_cut_out(tmp_path: Path, rfilter: str) -> None:
-    renderer = load(tmp_path, rfilter, film=CROP)
+def test_a_cropped_film_is_the_cut_out(tmp_path: Path, rfilter: str, film: str) -> None:
+    renderer = load(tmp_path, rfilter, film=film)
+    assert renderer.scene.sensors()[0].film().sample_border() == (film != CROP)
     image = renderer.image(renderer.start, seed=4, spp=16)
     assert image.shape == (9, 12, 3)
     np.testing.assert_allclose(image, of_film(renderer, 4, 16), rtol=2e-6, atol=2e-6)
