@@ -158,7 +158,7 @@ def test_puts_in_the_differentiable_integrator(integrator: str, depth: str, roul
     assert sensor.get("type") == "perspective"
 
 
-def test_keeps_size_crop_and_filter_of_the_film() -> None:
+def test_keeps_size_crop_border_and_filter_of_the_film() -> None:
     scene = scene_of(
         '<sensor type="perspective"><sampler type="stratified"/><film type="specfilm"><rfilter type="gaussian"/>'
         '<integer name="width" value="64"/><integer name="height" value="32"/><integer name="crop_width" value="8"/>'
@@ -174,6 +174,7 @@ def test_keeps_size_crop_and_filter_of_the_film() -> None:
         "width": "64",
         "height": "32",
         "crop_width": "8",
+        "sample_border": "true",
         "pixel_format": "rgb",
         "component_format": "float32",
     }
