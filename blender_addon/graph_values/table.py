@@ -13,7 +13,7 @@ import bpy
 
 from ..export.nodes.closure_leaves import ClosureLeaf
 from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
-from ..export.nodes.leaf_kinds import KINDS
+from ..export.nodes.leaf_kinds import KINDS, UNUSED_SOCKETS
 from ..export.nodes.shader_graph import Links, source_of
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader
 from ..export.nodes.target_shader import Place as SocketPlace
@@ -122,7 +122,7 @@ def _reached(target: TargetShader) -> Iterator[tuple[str, str, SocketPlace]]:
 
 
 def _is_free(name: str, place: SocketPlace) -> bool:
-    return name not in NOT_FITTED and place.socket.is_linked
+    return name not in (*NOT_FITTED, *UNUSED_SOCKETS) and place.socket.is_linked
 
 
 def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:

@@ -27,7 +27,7 @@ from ..images.image_pixels import without_pixels
 from ..material_model import Material, Socket, grey
 from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
-from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, WITHOUT_SPECULAR, inputs_of, only_nearest
+from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, UNUSED_SOCKETS, WITHOUT_SPECULAR, inputs_of, only_nearest
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
     plain_value,
@@ -47,8 +47,6 @@ from ..nodes.target_shader import (
 from .leaf_sockets import distribution_of, other_sockets
 
 SKIPPED_SOCKETS = ("Weight",)
-# sockets without an effect in the fit, whatever is linked to them
-UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
 # what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
 DEFAULT_SOCKETS = {
     "Base Color": Socket((0.8, 0.8, 0.8)),

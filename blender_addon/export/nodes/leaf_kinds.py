@@ -86,6 +86,8 @@ KINDS: dict[str, LeafKind] = {
     "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHairPrincipled": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
 }
+# of a Principled BSDF: sockets that no model has, whatever is linked to them
+UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
 EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
 # values of `all` that join only where the node has some of them already
 _WHERE_PRESENT = {

@@ -135,3 +135,36 @@ def test_the_recorded_picture_at_other_values_is_cycles(
         # the difference is taken over a few per cent of the range, where normals turn
         assert np.corrcoef(change_of.ravel(), slope.ravel())[0, 1] > 0.98, renderer.table.names
         assert abs((change_of * slope).sum() / (slope**2).sum() - 1.0) < 0.06
+
+
+def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:
+    """A number linked to every input of a Principled BSDF: one that also fed Subsurface Scale ended a fit."""
+    from blender_addon.export.nodes.target_shader import DIRECTIONS, target_shader
+    from blender_addon.graph_values.table import graph_values
+    from mfo_backend.render.models.graph_pictures import name_of
+
+    material = new_material("Every")
+    tree, node = material.node_tree, principled(material)
+    number = tree.nodes.new("ShaderNodeMath")
+    for socket in node.inputs:
+        if socket.type != "SHADER":
+            tree.links.new(number.outputs[0], socket)
+    target = target_shader(material)
+    assert target is not None
+    reached = {name for value in graph_values(target) for name in value.sockets}
+    assert {"Base Color", "Roughness", "Coat Weight"} <= reached
+    assert not {"Subsurface Scale", "Thin Wall", "Alpha"} & reached
+    names = {name_of(name) for name in reached - set(DIRECTIONS)}
+    assert len(names) == len(reached - set(DIRECTIONS))
+
+
+def test_a_value_that_reaches_nothing_a_model_has_is_not_offered() -> None:
+    from blender_addon.export.nodes.target_shader import target_shader
+    from blender_addon.graph_values.table import graph_values
+
+    material = new_material("Scale")
+    tree, node = material.node_tree, principled(material)
+    tree.links.new(tree.nodes.new("ShaderNodeMath").outputs[0], node.inputs["Subsurface Scale"])
+    target = target_shader(material)
+    assert target is not None
+    assert graph_values(target) == []
