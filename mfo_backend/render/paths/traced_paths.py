@@ -190,8 +190,6 @@ class TracedPaths:
             met, own = active & si.is_valid(), mi.Bool(False)
             if self._glow is not None:
                 own = met & (emitter == mi.EmitterPtr(self._glow))
-                # light samples leave it to the rays that meet it
-                seen = dr.select(own, 1.0, seen)
             emission = dr.select(active & ~own, emission * seen, 0.0)
             emission *= self._clamp(beta[0] * emission, depth >= 2)
             total = [t + b * emission for t, b in zip(total, beta, strict=True)]
@@ -212,7 +210,7 @@ class TracedPaths:
             )  # fmt: skip
             wo = si.to_local(ds.d)
             lit = scatters & (ds.pdf > 0.0)
-            if self._glow is not None:
+            if self._glow is not None:  # which is left to the rays that meet it
                 lit &= ds.emitter != mi.EmitterPtr(self._glow)
             u1, u2 = rng.pair(3 + 3 * depth).x, rng.pair(4 + 3 * depth)
             ours = si.bsdf() == mi.BSDFPtr(self._bsdf) if self._others else mi.Bool(True)
