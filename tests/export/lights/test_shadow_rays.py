@@ -73,6 +73,18 @@ def test_a_glowing_object_without_shadow_is_named(tmp_path: Path) -> None:
     assert said.startswith("An object of the glowing material 'Box' casts no shadows")
 
 
+@pytest.mark.parametrize(("other", "is_said"), [("glowing box", True), ("world picture", True), ("lamp radius", False)])
+def test_light_that_samples_and_rays_find_alike_is_named_where_an_object_casts_no_shadow(
+    other: str, is_said: bool, tmp_path: Path
+) -> None:
+    from blender_addon.export.job import check_export
+    from studies.differential.random_scene import build
+
+    rig = build(("target without shadow", other), SEED, tmp_path, size=32, samples=1)
+    notes = check_export(bpy.context, rig.target)[1]
+    assert any(note.startswith("An object of material 'Ball' casts no shadows") for note in notes) == is_said
+
+
 def test_recorded_paths_see_the_same(mitsuba: Any, tmp_path: Path) -> None:
     """The floor, in the shadow of a box that is cut out."""
     from blender_addon.export.job import export_job
