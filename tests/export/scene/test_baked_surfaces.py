@@ -346,7 +346,7 @@ def test_without_a_second_blender_the_nearest_model_stays(
 
     target, _, nodes = stage
     nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
-    monkeypatch.setattr(client.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     ask = baker.Baker.ask
 
     def killed(self: Any, *words: Any, **more: Any) -> int:

@@ -229,7 +229,7 @@ def test_world_that_cannot_be_rendered_is_an_error(scene: Any, export: Any, monk
     tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
     add_camera("ORTHO", ortho_scale=2.0)
     target = add_quad("Target", 1.0, 0.0, new_material("Target"))
-    monkeypatch.setattr(client.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     for words, said in ((["false"], "has ended"), (["/no/such/program"], "could not be started")):
         monkeypatch.setattr(client, "own_blender", lambda *_arguments, words=words: words)
         with pytest.raises(ExportError, match=f"World 'World' could not be rendered by Cycles: .*{said}"):
