@@ -36,7 +36,7 @@ from .polished import CORE, Polished
 from .search import Setting, race, scan
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
-    from ...render.paths.traced_paths import TracedPaths
+    from ...render.traced.traced_paths import TracedPaths
 
 STAGES = ("scan", "race", "polish")
 _LOOK_SPP = 32  # of a picture between two stages; its noise is taken out of what is compared
@@ -59,7 +59,7 @@ class TracedRoute:
     """
 
     def __init__(self, task: FitTask, renderer: MitsubaRenderer, begin: Vector | None = None) -> None:
-        from ...render.paths.traced_paths import TracedPaths
+        from ...render.traced.traced_paths import TracedPaths
 
         settings, encoding = task.settings, task.reference.encoding
         self._task, self._renderer, self._plan, self._begin = task, renderer, TransmissionPlan(), begin

@@ -19,7 +19,7 @@ from .sample_count import EqualCounts, NoiseComparison, Recount, TwoPictures, eq
 from .tile_rows import BLOCK, CHANNELS, TileRows
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
-    from ...render.paths.traced_paths import TracedPaths
+    from ...render.traced.traced_paths import TracedPaths
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import cross_equations
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 _OF_EVERY_FIT = (
     *("...fit.recover_material", "...render.pictures.renderer"),
     *("...fit.pictures.one_sheet", "...render.pictures.pixel_pictures", "...render.transport.direct_light"),
-    *("...render.paths.recorded_scene", "...render.paths.traced_paths"),
+    *("...render.paths.recorded_scene", "...render.traced.traced_paths"),
     *("...render.lamps.lamp_plugins", "...render.lamps.changed_light"),
     *("...material.plugins.projective_texture", "...material.plugins.leaf_radiance"),
     *("scipy.ndimage", "scipy.optimize", "PIL.Image", "PIL.ImageDraw", "PIL.ImageFont", "OpenEXR"),

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light paths over the target: recorded once for any material, or traced with derivatives by the material's values."""
+"""Light paths over the target, recorded once for any material."""

@@ -26,7 +26,7 @@ from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..transport.even_points import even_points
 from ..transport.shadow_rays import ShadowRays
-from ..transport.smooth_facets import leaves_on, seen_side
+from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from ..transport.traced_radiance import traced_radiance
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .proposal import DefensiveProposal
@@ -315,8 +315,7 @@ def _sampled_lights(
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
     emitter = far.emitter(scene, valid)
     emission = emitter.eval(far, valid)
-    ds = mi.DirectionSample3f(scene, far, si)
-    ds.n = far.n  # not the bent one
+    ds = met_light(scene, far, si)
     light_density = emitter.pdf_direction(si, ds, valid & (dr.max(emission) > 0.0)) * choice
     weight = emission / (light_density + density)
     if lamps:

@@ -23,7 +23,7 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .shadow_rays import ShadowRays, sample_light
-from .smooth_facets import leaves_on, seen_side
+from .smooth_facets import leaves_on, met_light, seen_side
 
 PLUGIN_NAME = "cycles_path"
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
@@ -109,8 +109,7 @@ class CyclesPath(RBIntegrator):
             bsdf = si.bsdf(ray)
 
             # light that the last direction meets
-            ds = mi.DirectionSample3f(scene, si, previous)
-            ds.n = si.n  # not the bent one
+            ds = met_light(scene, si, previous)
             beyond = active & (left < self.max_depth) if known else active
             seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)

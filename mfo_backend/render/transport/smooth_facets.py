@@ -133,6 +133,13 @@ def seen_side(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     return si
 
 
+def met_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, it: mi.Interaction3f) -> mi.DirectionSample3f:
+    """What emitters are asked with for the density of a ray from `it` that has met `si`; its normal is the facet's."""
+    ds = mi.DirectionSample3f(scene, si, it)
+    ds.n = si.n  # not the bent one, which is no facet's area
+    return ds
+
+
 def leaves_on(si: mi.SurfaceInteraction3f, wo: mi.Vector3f, through: mi.Bool | bool) -> mi.Bool:
     """Whether a sampled direction `wo` (shading frame) is on the side of the facet that its lobe sends light to.
 

@@ -133,7 +133,7 @@ def test_pictures_of_whole_paths_are_cycles(
 ) -> None:
     """Under a plain world, by the path tracer that judges results and by that of the fit."""
     from mfo_backend.render.paths.recorded_scene import RecordedScene
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
     from mfo_backend.types.errors import UnrecordableError
 
     from ..scenes import add_quad, diffuse_material

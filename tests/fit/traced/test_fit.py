@@ -185,7 +185,7 @@ def test_every_step_can_be_shown(tmp_path, monkeypatch):
 @pytest.mark.parametrize("shape", [(24, 24), (90, 150), (61, 400)])
 def test_a_preview_costs_the_same_for_every_picture(tmp_path, monkeypatch, shape):
     renderer = load(tmp_path, size=24)
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     paths = TracedPaths(renderer)
     monkeypatch.setattr(traced_fit, "_PREVIEW_PATHS", 1 << 11)
@@ -206,7 +206,7 @@ def test_a_preview_costs_the_same_for_every_picture(tmp_path, monkeypatch, shape
 def test_no_launch_is_longer_than_a_request_to_stop_may_wait(tmp_path, monkeypatch):
     renderer = load(tmp_path, size=160)
     reference = renderer.image(renderer.table.pack(TRUTH), seed=5, spp=16)
-    from mfo_backend.render.paths import traced_paths
+    from mfo_backend.render.traced import traced_paths
 
     launches, parts = [], []
     launch, pictures = traced_paths.TracedPaths._launch, renderer.pixels_later
@@ -245,7 +245,7 @@ def test_losses_of_the_users_choice_are_no_stages_of_glass(tmp_path):
 
 def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
     renderer = load(tmp_path, size=64)
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     monkeypatch.setattr("mfo_backend.fit.result.course.PREVIEW_SECONDS", np.inf)  # they come by the clock
     launch, launches, passes = TracedPaths._launch, [], []

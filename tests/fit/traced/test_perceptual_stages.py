@@ -116,7 +116,7 @@ def test_tiles_are_the_means_of_the_picture_and_of_its_halves():
 
 def test_values_that_are_kept_stay(blend):
     renderer, picture = blend
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     mask, reference = renderer.target_mask(), Image(picture(5, 32), Encoding.LINEAR)
     view = DisplayView.for_scene(reference.pixels, mask)
@@ -140,7 +140,7 @@ def test_values_that_are_kept_stay(blend):
 def test_a_difference_of_four_per_cent_is_found_whatever_the_random_numbers(blend, seed):
     """With a quarter of the paths it was found with every second seed."""
     renderer, picture = blend
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     # where squares end
     near = {"base_color": (0.583, 0.607, 0.571), "roughness": 0.438, "ior": 1.5, "transmission_weight": 0.569}
@@ -152,7 +152,7 @@ def test_a_difference_of_four_per_cent_is_found_whatever_the_random_numbers(blen
 
 def test_nothing_is_done_where_noise_is_all_that_is_left(blend):
     renderer, _ = blend
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     truth = renderer.table.pack(TRUTH)
     mask, reference = renderer.target_mask(), Image(renderer.image(truth, seed=5, spp=32), Encoding.LINEAR)

@@ -85,7 +85,7 @@ def test_paths_through_glass_meet_lamps(tmp_path, camera):
 target="0, 0, 0" up="0, 0, 1"/></transform><rgb name="radiance" value="3, 4, 5"/></emitter>"""
     lights = behind.replace("</emitter>", SEEN) if camera else behind
     renderer = load(tmp_path, lights + LAMPS["sphere"], GLASS, depth=6)
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     pixels = np.flatnonzero(renderer.target_mask().ravel())
     x = renderer.table.pack({"base_color": (0.9, 0.8, 0.7), "roughness": 0.3})

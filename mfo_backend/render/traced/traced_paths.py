@@ -28,18 +28,14 @@ from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
-from ..transport.cycles_path import seen_world
+from ..transport.cycles_path import DIFFUSE, TRANSMITS, seen_world
 from ..transport.path_random import PathRandom
 from ..transport.shadow_rays import ShadowRays, left_of, sample_light
-from ..transport.smooth_facets import leaves_on, seen_side
+from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from .traced_target import TracedTarget
 
 MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
-_DIFFUSE = int(mi.BSDFFlags.DiffuseReflection) | int(mi.BSDFFlags.DiffuseTransmission)
-_TRANSMITS = (
-    int(mi.BSDFFlags.GlossyTransmission) | int(mi.BSDFFlags.DeltaTransmission) | int(mi.BSDFFlags.DiffuseTransmission)
-)
 DEEPEST = 32  # path length of a scene without a limit
 
 
@@ -176,8 +172,7 @@ class TracedPaths:
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
             emitter = si.emitter(scene, active)
-            ds = mi.DirectionSample3f(scene, si, s["before"])
-            ds.n = si.n  # not the bent one
+            ds = met_light(scene, si, s["before"])
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
             seen = dr.select(s["delta"], 1.0, self._share(s["density"], light))
             straight = depth == s["passages"]
@@ -250,7 +245,7 @@ class TracedPaths:
                     total[1 + k] += beta[0] * f_light[0] * weight * slope
             is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
             usable = active & (pdf_next > 0.0)
-            usable &= ~is_bounce | (scatters & leaves_on(si, local, (kind & _TRANSMITS) != 0))
+            usable &= ~is_bounce | (scatters & leaves_on(si, local, (kind & TRANSMITS) != 0))
             inverse = dr.select(usable, dr.rcp(dr.maximum(pdf_next, 1e-30)), 0.0)
             new = [beta[0] * f_next[0] * inverse]
             for k in range(directions):
@@ -307,7 +302,7 @@ class TracedPaths:
         if self._light_paths is None:
             return {}
         counts = ~mi.has_flag(kind, mi.BSDFFlags.Null)
-        through, diffuse = (kind & _TRANSMITS) != 0, (kind & _DIFFUSE) != 0
+        through, diffuse = (kind & TRANSMITS) != 0, (kind & DIFFUSE) != 0
         of_kind = (diffuse & ~through, ~diffuse & ~through, through)
         limits = self._light_paths
         most = (limits.diffuse_bounces, limits.glossy_bounces, limits.transmission_bounces)

@@ -26,7 +26,7 @@ def traced(folder, light_paths=None, depth=8):
     renderer = load_renderer(
         path, "target", model="blender_principled", parameters=NAMES, materials=materials, light_paths=light_paths
     )
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     return renderer, TracedPaths(renderer), np.flatnonzero(renderer.target_mask().ravel())
 
@@ -73,7 +73,7 @@ def test_alpha_has_the_slope_of_the_light_that_passes(tmp_path):
     renderer = load_renderer(
         path, "target", model="blender_principled", parameters=NAMES, materials=materials, light_paths=LightPaths()
     )
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     paths, pixels = TracedPaths(renderer), np.flatnonzero(renderer.target_mask().ravel())
     x = renderer.table.pack({**GLASS, "transmission_weight": 0.0, "alpha": 0.5})
@@ -103,7 +103,7 @@ def test_a_targets_own_light_is_dimmed_in_picture_and_derivatives(tmp_path):
     renderer = load_renderer(
         path, "target", model="blender_principled", parameters=names, materials=materials, light_paths=LightPaths()
     )
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     paths, pixels = TracedPaths(renderer), np.arange(256)
     values = {"base_color": (0.6, 0.3, 0.2), "coat_weight": 0.8, "sheen_weight": 0.3, "alpha": 0.6}
@@ -145,14 +145,14 @@ def test_large_pictures_are_traced_in_parts(glass, monkeypatch):
     renderer, paths, pixels = glass
     x = np.stack([renderer.table.pack({**GLASS, "roughness": r}) for r in (0.2, 0.4, 0.6)])
     whole = paths.images(x, pixels, seed=3, samples=4, jacobian=True)
-    monkeypatch.setattr("mfo_backend.render.paths.traced_paths.MOST_LANES", 150)
+    monkeypatch.setattr("mfo_backend.render.traced.traced_paths.MOST_LANES", 150)
     np.testing.assert_allclose(paths.images(x, pixels, seed=3, samples=4, jacobian=True), whole, rtol=1e-3, atol=1e-3)
 
 
 def test_other_models_are_refused(tmp_path):
     path = write_scene(tmp_path, SKY, material='<float name="spec_trans" value="0.8"/>')
     renderer = load_renderer(path, "target", model="mitsuba_principled", parameters=["roughness"])
-    from mfo_backend.render.paths.traced_paths import TracedPaths
+    from mfo_backend.render.traced.traced_paths import TracedPaths
 
     with pytest.raises(UnrecordableError, match="no traced version"):
         TracedPaths(renderer)
