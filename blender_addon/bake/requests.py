@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the second Blender renders and bakes when it is asked: worlds, surfaces, and painted images put back before."""
+"""What the second Blender renders and bakes when it is asked: worlds, surfaces and displaced meshes. Painted images are
+put back before."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import numpy as np
 from ..export.render_state import render_state
 from .bake_cache import cached
 from .bake_key import surface_key, world_key
+from .displaced import displaced_corners
 from .panorama import world_panoramas
 from .surface import baked_surface
 
@@ -28,11 +31,8 @@ def world(request: Mapping[str, Any]) -> Mapping[str, Any]:
 def surfaces(request: Mapping[str, Any]) -> Mapping[str, Any]:
     """Bake each of `surfaces` into a folder of its own number; one that fails says why and stops no other."""
     scene = bpy.data.scenes[request["scene"]]
-    window = bpy.context.window
-    window.scene = scene
-    window.view_layer = scene.view_layers[request["view_layer"]]
     found = []
-    with render_state(window.view_layer, scene):
+    with _shown(scene, request["view_layer"]):
         for number, asked in enumerate(request["surfaces"]):
             place = Path(request["folder"]) / str(number)
             place.mkdir()
@@ -42,6 +42,14 @@ def surfaces(request: Mapping[str, Any]) -> Mapping[str, Any]:
                 words = " ".join(str(error).split())
                 found.append({"status": "failed", "sentence": f"{type(error).__name__}: {words}"})
     return {"surfaces": found}
+
+
+def displaced(request: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Write the displaced triangles of `instance` into `folder`; see `displaced_corners`."""
+    scene = bpy.data.scenes[request["scene"]]
+    with _shown(scene, request["view_layer"]):
+        place = Path(request["folder"])
+        return _of_instance(request["instance"], lambda one, graph: displaced_corners(scene, one, graph, place))
 
 
 def paint(request: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -61,18 +69,35 @@ def _cache(request: Mapping[str, Any]) -> Path | None:
 
 
 def _surface(scene: bpy.types.Scene, asked: Mapping[str, Any], place: Path, cache: Path | None) -> dict[str, Any]:
+    slot, size = asked["slot"], asked["size"]
+
+    def baked(instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
+        key = surface_key(scene, instance, depsgraph, slot, size) if cache is not None else None
+        return cached(cache, key, place, lambda: baked_surface(scene, instance, depsgraph, slot, place, size))
+
+    return _of_instance(asked["instance"], baked)
+
+
+@contextmanager
+def _shown(scene: bpy.types.Scene, view_layer: str) -> Iterator[None]:
+    """The scene in the window, as it is rendered."""
+    window = bpy.context.window
+    window.scene = scene
+    window.view_layer = scene.view_layers[view_layer]
+    with render_state(window.view_layer, scene):
+        yield
+
+
+def _of_instance(
+    name: Mapping[str, Any],
+    found: Callable[[bpy.types.DepsgraphObjectInstance, bpy.types.Depsgraph], dict[str, Any]],
+) -> dict[str, Any]:
+    """What is found of the instance of this name, which is there while the loop is at it and no longer."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
-        if name_of(instance) == asked["instance"]:
-            slot, size = asked["slot"], asked["size"]
-            key = surface_key(scene, instance, depsgraph, slot, size) if cache is not None else None
-            return cached(
-                cache,
-                key,
-                place,
-                lambda: baked_surface(scene, instance, depsgraph, slot, place, size),  # noqa: B023
-            )
-    raise LookupError(f"{asked['instance']['object']!r} is not there")
+        if name_of(instance) == name:
+            return found(instance, depsgraph)
+    raise LookupError(f"{name['object']!r} is not there")
 
 
 def name_of(instance: bpy.types.DepsgraphObjectInstance) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for
+from ..export.nodes.displacement import bends_normals, unbent
 from ..probe.closure_tree import ClosureTree, Leaf, Value
 from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output
+from .stage import Stage, bake, staged
 from .unwrap import unwrapped
 
 Pixels = NDArray[np.float32]
@@ -46,7 +48,6 @@ def baked_surface(
     A value is a number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working
     space. Normals are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
     """
-    original = instance.object.original
     shown = material_of_slot(instance.object, slot)
     assert shown is not None  # a surface without material needs no bake
     material = shown.original.copy()
@@ -57,15 +58,15 @@ def baked_surface(
         groups += answer_light_paths(tree, SCATTERED)
         view, around = asked_for(tree, OF_VIEW), asked_for(tree, OF_SURROUNDINGS)
         emits = _emits(tree)
-        with _stage(scene, instance, original, depsgraph, slot, material) as stage:
-            bake = _Bake(stage, material, folder, size, bool(view))
+        with _stage(scene, instance, depsgraph, slot, material) as stage:
+            baked = _Bake(stage, material, folder, size, bool(view))
             answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": around}
             answer["place"] = asked_for(tree, OF_PLACE)
             if emits:
-                answer["emission"] = bake.file(bake.closure())
+                answer["emission"] = baked.file(baked.closure())
             closures = ClosureTree(tree)
             groups += closures.groups
-            answer["leaves"] = _leaves(closures, bake)
+            answer["leaves"] = _leaves(closures, baked)
             sockets = [leaf.node.inputs.get(name) for leaf in closures.leaves for name in LEFT_OUT]
             answer["left_out"] = sorted({socket.name for socket in sockets if socket is not None and socket.is_linked})
             np.save(folder / "corners.npy", stage.corners)
@@ -77,7 +78,7 @@ def baked_surface(
             bpy.data.node_groups.remove(group)
 
 
-def _leaves(closures: ClosureTree, bake: _Bake) -> list[dict[str, Any]]:
+def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     asked: list[tuple[dict[str, Any], str, Value, bool]] = []
     leaves = []
     for leaf in closures.leaves:
@@ -91,13 +92,13 @@ def _leaves(closures: ClosureTree, bake: _Bake) -> list[dict[str, Any]]:
                 several = socket.type != "VALUE"  # whatever is linked: a colour on Roughness is one number
                 asked.append((found["sockets"], socket.name, closures.value(leaf.path, socket), several))
         leaves.append(found)
-    bake.values(asked)
+    baked.values(asked)
     for found, leaf in zip(leaves, closures.leaves, strict=True):
         normal = _normal(closures, leaf)
-        if normal is not None:
-            local = bake.local_normal(normal)
+        if normal is not None or baked.is_bent:
+            local = baked.local_normal(normal)
             if np.abs(local[..., :2]).max() > FLAT:
-                found["normal"] = bake.file(local)
+                found["normal"] = baked.file(local)
     return leaves
 
 
@@ -109,87 +110,52 @@ def _normal(closures: ClosureTree, leaf: Leaf) -> Value | None:
     return value if hasattr(value, "is_output") else None
 
 
-class _Stage:
-    """The object to bake: alone in a scene of its own."""
+class _Stage(NamedTuple):
+    """The object to bake, with a UV map and a material of its own."""
 
-    def __init__(self, scene: bpy.types.Scene, item: bpy.types.Object, corners: NDArray[np.float32]) -> None:
-        self.scene, self.item, self.corners = scene, item, corners
+    stage: Stage
+    corners: NDArray[np.float32]
+
+    @property
+    def scene(self) -> bpy.types.Scene:
+        """The scene that it is alone in."""
+        return self.stage.scene
+
+    @property
+    def item(self) -> bpy.types.Object:
+        """The object."""
+        return self.stage.item
 
 
 @contextmanager
 def _stage(
-    scene: bpy.types.Scene,
-    instance: Any,
-    original: bpy.types.Object,
-    depsgraph: bpy.types.Depsgraph,
-    slot: int,
-    material: bpy.types.Material,
+    scene: bpy.types.Scene, instance: Any, depsgraph: bpy.types.Depsgraph, slot: int, material: bpy.types.Material
 ) -> Iterator[_Stage]:
-    """A scene with a copy of the evaluated object, whose coordinates are those of the original."""
-    stage = bpy.data.scenes.new("material_fit_bake")
-    matrix, last = instance.matrix_world.copy(), max(slot_count(instance.object) - 1, 0)
-    layers = original.type == "MESH"
-    mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
-    item = bpy.data.objects.new("material_fit_bake", mesh)
+    """The object of an instance alone, with a UV map for the faces in `slot`, which have `material`."""
+    last = max(slot_count(instance.object) - 1, 0)
     blank = bpy.data.materials.new("material_fit_blank")
-    window = bpy.context.window
-    before, view_layer, name = window.scene, window.view_layer, original.name
     try:
-        item.matrix_world = matrix
-        _copy_what_nodes_ask_for(original, item, mesh)
-        stage.collection.objects.link(item)
-        stage.camera = scene.camera
-        stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-        _set_up(stage, scene)
-        window.scene = stage
-        faces = np.empty(len(mesh.polygons), dtype=np.int32)
-        mesh.polygons.foreach_get("material_index", faces)
-        uv = unwrapped(mesh, np.clip(faces, 0, last) == slot, stage)
-        while len(mesh.uv_layers) >= MOST_UV_MAPS:
-            mesh.uv_layers.remove(next(layer for layer in reversed(mesh.uv_layers) if not layer.active_render))
-        layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
-        layer.uv.foreach_set("vector", uv.reshape(-1))
-        mesh.uv_layers.active = layer
-        corners = _add_tangents(mesh, uv, matrix)
-        mesh.materials.clear()
-        for number in range(last + 1):
-            mesh.materials.append(material if number == slot else blank)
-        mesh.polygons.foreach_set("material_index", np.clip(faces, 0, last))  # clear() has set them to 0
-        yield _Stage(stage, item, corners)
+        with staged(scene, instance, depsgraph) as stage:
+            mesh: Any = stage.item.data
+            stage.scene.cycles.samples = SAMPLES
+            settings = stage.scene.render.bake
+            settings.target, settings.margin, settings.margin_type = "IMAGE_TEXTURES", MARGIN, "EXTEND"
+            faces = np.empty(len(mesh.polygons), dtype=np.int32)
+            mesh.polygons.foreach_get("material_index", faces)
+            uv = unwrapped(mesh, np.clip(faces, 0, last) == slot, stage.scene)
+            while len(mesh.uv_layers) >= MOST_UV_MAPS:
+                mesh.uv_layers.remove(next(layer for layer in reversed(mesh.uv_layers) if not layer.active_render))
+            layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
+            layer.uv.foreach_set("vector", uv.reshape(-1))
+            mesh.uv_layers.active = layer
+            corners = _add_tangents(mesh, uv, stage.item.matrix_world)
+            mesh.materials.clear()
+            for number in range(last + 1):
+                mesh.materials.append(material if number == slot else blank)
+            mesh.polygons.foreach_set("material_index", np.clip(faces, 0, last))  # clear() has set them to 0
+            yield _Stage(stage, corners)
     finally:
-        window.scene, window.view_layer = before, view_layer
-        bpy.data.objects.remove(item)
-        original.name = name
-        bpy.data.meshes.remove(mesh)
         bpy.data.materials.remove(blank)
-        bpy.data.scenes.remove(stage)
-
-
-def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Generated coordinates, Object Info and attributes of the object."""
-    if hasattr(original.data, "texspace_location"):
-        mesh.use_auto_texspace = False
-        mesh.texspace_location = original.data.texspace_location
-        mesh.texspace_size = original.data.texspace_size
-    item.pass_index, item.color = original.pass_index, original.color
-    for key in original.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
-        if not hasattr(original[key], "as_pointer"):
-            item[key] = original[key]
-    name = original.name  # Object Info's Random is made of it
-    original.name = "material_fit_original"
-    item.name = name
-
-
-def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
-    stage.render.engine = "CYCLES"
-    stage.cycles.device, stage.cycles.shading_system = "CPU", scene.cycles.shading_system
-    stage.cycles.samples = SAMPLES
-    stage.cycles.use_adaptive_sampling = False
-    stage.cycles.use_denoising = False
-    stage.render.resolution_x, stage.render.resolution_y = scene.render.resolution_x, scene.render.resolution_y
-    bake = stage.render.bake
-    bake.target, bake.margin, bake.margin_type = "IMAGE_TEXTURES", MARGIN, "EXTEND"
-    bake.use_clear, bake.use_selected_to_active = True, False
 
 
 def _add_tangents(mesh: bpy.types.Mesh, uv: NDArray[np.float32], matrix: Matrix) -> NDArray[np.float32]:
@@ -250,15 +216,7 @@ class _Bake:
                 made.append((tree, node))
                 node.image = image if slot.material == self._material else blank
                 tree.nodes.active = node
-            with bpy.context.temp_override(
-                scene=self._stage.scene,
-                view_layer=self._stage.scene.view_layers[0],
-                active_object=self._stage.item,
-                object=self._stage.item,
-                selected_objects=[self._stage.item],
-                selected_editable_objects=[self._stage.item],
-            ):
-                bpy.ops.object.bake(type="EMIT")
+            bake(self._stage.stage, "EMIT")
             pixels = np.empty(self._size * self._size * 4, dtype=np.float32)
             image.pixels.foreach_get(pixels)
             return np.ascontiguousarray(pixels.reshape(self._size, self._size, 4)[::-1, :, :3])
@@ -290,21 +248,30 @@ class _Bake:
             for channel, (place, name, _) in enumerate(three):
                 place[name] = self._put(pixels[:, :, channel : channel + 1])
 
-    def local_normal(self, socket: bpy.types.NodeSocket) -> Pixels:
-        """A normal in the frame of the map."""
+    def local_normal(self, socket: bpy.types.NodeSocket | None) -> Pixels:
+        """A normal in the frame of the map; without a `socket` the one that a displacement by bump makes."""
         if self._frame is None:
-            geometry = self._tree.nodes.new("ShaderNodeNewGeometry")
             attribute = self._tree.nodes.new("ShaderNodeAttribute")
             attribute.attribute_name = TANGENT
-            self._frame = self._vector(geometry.outputs["Normal"]), self._vector(attribute.outputs["Vector"])
+            with unbent(self._material):
+                self._frame = self._vector(self._geometry), self._vector(attribute.outputs["Vector"])
         smooth, along = self._frame
-        normal = self._vector(socket)
+        normal = self._vector(socket or self._geometry)
         side = along - smooth * (along * smooth).sum(axis=2, keepdims=True)
         side /= np.maximum(np.linalg.norm(side, axis=2, keepdims=True), 1e-12)
         third = np.cross(smooth, side)
         local = np.stack([(axis * normal).sum(axis=2) for axis in (side, third, smooth)], axis=2)
         lengths = np.linalg.norm(local, axis=2, keepdims=True)
         return np.where(lengths > 0.5, local / np.maximum(lengths, 1e-12), (0.0, 0.0, 1.0)).astype(np.float32)
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether a displacement changes the normals of all lobes."""
+        return bends_normals(self._material)
+
+    @property
+    def _geometry(self) -> bpy.types.NodeSocket:
+        return self._tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
 
     def _vector(self, socket: bpy.types.NodeSocket) -> Pixels:
         """Unit vectors; emission has no negative colours."""

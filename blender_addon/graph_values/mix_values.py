@@ -77,6 +77,8 @@ def _is_default(value: GraphValue | MixValue, target: TargetShader, *, all_leave
 
 def why_no_mix_values(target: TargetShader) -> str | None:
     """What keeps values of a mix from being fitted beside the chosen leaf, as the end of a sentence."""
+    if target.displacement is not None:
+        return "its Displacement has a link"
     for leaf in (target.leaf, *target.others):
         if leaf.node.bl_idname == EMISSION:
             continue

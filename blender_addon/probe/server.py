@@ -28,6 +28,7 @@ COMMANDS = {
     "sockets": ("probe.socket_pictures", "answer"),
     "values": ("probe.value_pictures", "answer"),
     "world": ("bake.requests", "world"),
+    "displaced": ("bake.requests", "displaced"),
     "surfaces": ("bake.requests", "surfaces"),
     "paint": ("bake.requests", "paint"),
 }

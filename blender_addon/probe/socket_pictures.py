@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.images.color_space import to_rec709
+from ..export.nodes.displacement import SHADING_NORMAL
 from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
 from .aov_render import Frame, frame_of, render_outputs, world_to_frame
@@ -27,7 +28,7 @@ from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_
 from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
-DIRECTIONS = ("Normal", "Coat Normal", "Tangent")
+DIRECTIONS = (SHADING_NORMAL, "Normal", "Coat Normal", "Tangent")
 NOT_SEEN = "The camera does not see '{obj}': move it into the frame."
 # Cycles says so on its stderr alone, and shows nothing
 TOO_MANY = "The nodes of '{material}' are too many for Cycles to evaluate at once: leave nodes out."
@@ -275,6 +276,10 @@ def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[st
     inner, shader = node_at(tree, path)
     kinds = {}
     for name, output in outputs.items():
+        if name == SHADING_NORMAL:
+            kinds[name] = "VECTOR"
+            _output(inner, output, inner.nodes.new("ShaderNodeNewGeometry").outputs["Normal"], True)
+            continue
         socket = shader.inputs[name]
         source = source_of(socket)
         if source is None:

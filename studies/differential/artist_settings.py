@@ -222,6 +222,29 @@ def _bumped_box(rig: Rig, _: Draw) -> None:
     tree.links.new(bump.outputs["Normal"], principled(rig.box).inputs["Normal"])
 
 
+def _displaced(draw: Draw, item: Any, method: str) -> None:
+    """Waves on Displacement of an object's material, over enough faces to move."""
+    tree = item.data.materials[0].node_tree
+    waves, moved = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeDisplacement")
+    waves.inputs["Scale"].default_value = float(draw.uniform(1.0, 3.0))
+    moved.inputs["Scale"].default_value = float(draw.uniform(0.05, 0.4))
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], waves.inputs["Vector"])
+    tree.links.new(waves.outputs[0], moved.inputs["Height"])
+    tree.links.new(moved.outputs[0], tree.get_output_node("CYCLES").inputs["Displacement"])
+    item.data.materials[0].displacement_method = method
+    divided = item.modifiers.new("Divided", "SUBSURF")
+    divided.subdivision_type, divided.levels = "SIMPLE", 0
+    divided.render_levels = 4 if len(item.data.polygons) < 100 else 1
+
+
+def _displaced_target(rig: Rig, draw: Draw) -> None:
+    _displaced(draw, rig.target, str(draw.choice(["BUMP", "DISPLACEMENT", "BOTH"])))
+
+
+def _displaced_box(rig: Rig, draw: Draw) -> None:
+    _displaced(draw, rig.box, "DISPLACEMENT")
+
+
 def _lamp_nodes(rig: Rig, draw: Draw) -> None:
     data: Any = rig.light.data
     if data.node_tree is None:
@@ -315,6 +338,7 @@ def _all() -> Iterator[Setting]:
         "mirror modifier": _modifier("MIRROR", use_axis=(False, False, True), use_bisect_axis=(False, False, True)),
         "array modifier": _modifier("ARRAY", count=2, relative_offset_displace=(1.2, 0.3, 0.0)),
         "bevel modifier": _modifier("BEVEL", width=0.2, segments=3),
+        "displaced target": _displaced_target, "displaced box": _displaced_box,
         "solidify modifier": _modifier("SOLIDIFY", thickness=0.1),
     }  # fmt: skip
     yield from (Setting(name, put) for name, put in exported.items())

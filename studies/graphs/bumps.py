@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The series *bumps*: ten kinds of bumps and normal maps on a material that is plain but for them."""
+"""The series *bumps*: bumps, normal maps and displacements on a material that is plain but for them."""
 
 from __future__ import annotations
 
@@ -84,6 +84,37 @@ def _two_bumps(tree: Any, node: Any) -> None:
     tree.links.new(coarse.outputs["Normal"], fine.inputs["Normal"])
 
 
+def _displacement(tree: Any, height: Any, distance: float, *, method: str) -> None:
+    """A Displacement node about the middle of a texture's height."""
+    node = tree.nodes.new("ShaderNodeDisplacement")
+    node.inputs["Scale"].default_value = distance
+    tree.links.new(height, node.inputs["Height"])
+    tree.links.new(node.outputs["Displacement"], tree.get_output_node("CYCLES").inputs["Displacement"])
+    _material_of(tree).displacement_method = method
+
+
+def _material_of(tree: Any) -> Any:
+    import bpy
+
+    return next(each for each in bpy.data.materials if each.node_tree == tree)
+
+
+def _displaced(method: str, kind: str, scale: float, distance: float) -> Build:
+    def build(tree: Any, node: Any) -> None:
+        del node
+        texture = _texture(tree, kind, scale, coordinates="Object")
+        height = next(texture.outputs[n] for n in ("Fac", "Factor", "Distance") if n in texture.outputs)
+        _displacement(tree, height, distance, method=method)
+
+    return build
+
+
+def _map_on_displacement(tree: Any, node: Any) -> None:
+    """A Normal Map beside a displacement by bump, as sets of textures have them."""
+    _normal_map("TANGENT", 0.7, 0.4)(tree, node)
+    _displaced("BUMP", "Noise", 5.0, 0.1)(tree, node)
+
+
 BUMPS: dict[str, Callable[[Any, Any], None]] = {
     "low noise": _height("Noise", 6.0, 0.3, 0.1),
     "noise": _height("Noise", 6.0, 1.0, 0.1),
@@ -95,4 +126,8 @@ BUMPS: dict[str, Callable[[Any, Any], None]] = {
     "weak normal map": _normal_map("TANGENT", 0.4, 0.8),
     "bump above a normal map": _bump_on_map,
     "two bumps": _two_bumps,
+    "displacement by bump": _displaced("BUMP", "Noise", 6.0, 0.1),
+    "displacement by bump and normal map": _map_on_displacement,
+    "displacement": _displaced("DISPLACEMENT", "Noise", 3.0, 0.2),
+    "displacement and bump": _displaced("BOTH", "Noise", 5.0, 0.15),
 }

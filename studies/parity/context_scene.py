@@ -303,6 +303,24 @@ def _normal_map(chance: Random, _floor: Any, wall: Any) -> None:
     principled.inputs["Metallic"].default_value = 0.8
 
 
+def _displaced(method: str, size: float) -> Callable[[Random, Any, Any], None]:
+    """Floor and wall with the height of a noise on Displacement, over a grid where that moves faces."""
+
+    def build(chance: Random, floor: Any, wall: Any) -> None:
+        for item in (floor, wall):
+            nodes, principled = _nodes(item, chance)
+            noise = nodes.new("TexNoise", Vector=nodes.new("TexCoord").outputs["Object"], Scale=1.5)
+            moved = nodes.new("Displacement", Height=noise.outputs[0], Midlevel=0.5, Scale=size)
+            nodes.link(moved.outputs[0], nodes.output.inputs["Displacement"])
+            principled.inputs["Roughness"].default_value = 0.35
+            item.data.materials[0].displacement_method = method
+            if method != "BUMP":
+                grid = item.modifiers.new("Grid", "SUBSURF")
+                grid.subdivision_type, grid.levels, grid.render_levels = "SIMPLE", 6, 6
+
+    return build
+
+
 def _holes(chance: Random, _floor: Any, wall: Any) -> None:
     nodes, principled = _nodes(wall, chance)
     wall.location.y = 2.0
@@ -344,6 +362,9 @@ SURFACES: dict[str, Callable[[Random, Any, Any], None]] = {
     "group floor": _grouped,
     "bumped": _bumped,
     "normal map wall": _normal_map,
+    "displaced by bump": _displaced("BUMP", 0.3),
+    "displaced": _displaced("DISPLACEMENT", 0.4),
+    "displaced and bumped": _displaced("BOTH", 0.4),
     "wall with holes": _holes,
     "painted floor": _attribute,
     "missing image": _missing_image,

@@ -29,12 +29,13 @@ def main() -> None:
     import bpy
 
     from blender_addon.export.job import export_job
+    from studies.graphs.bumps import BUMPS
     from studies.graphs.head import head_scene
     from studies.graphs.materials import GRAPHS
 
     target, node = head_scene(chosen.light, chosen.size)
     if chosen.graph != CONSTANT:
-        GRAPHS[chosen.graph](target.active_material.node_tree, node)
+        (GRAPHS | BUMPS)[chosen.graph](target.active_material.node_tree, node)
     scene = bpy.context.scene
     scene.cycles.samples = chosen.samples
     settings = scene.render.image_settings

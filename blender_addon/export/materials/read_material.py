@@ -26,6 +26,7 @@ from ..images.color_space import to_rec709
 from ..images.image_pixels import without_pixels
 from ..material_model import Material, Socket, grey
 from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
+from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
 from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, UNUSED_SOCKETS, WITHOUT_SPECULAR, inputs_of, only_nearest
 from ..nodes.shader_graph import (
@@ -98,7 +99,22 @@ def read_target(
         found.leaves = tuple(_read_held(material, leaf, findings) for leaf in target.others)
         if not fits_all_leaves(material):
             note_leaves(material.name, target, findings)
+    displacement = displacement_of(material)
+    if displacement is not None:
+        _read_displacement(material, displacement, found, findings)
     return found
+
+
+def _read_displacement(
+    material: bpy.types.Material, displacement: bpy.types.NodeSocket, found: Material, findings: Findings
+) -> None:
+    """Have Cycles tell what a displacement makes of the normals of all that reflects light."""
+    problem = graph_problem(displacement, is_copied=True)
+    if problem is not None:
+        findings.error(f"Displacement of material '{material.name}' is linked to {problem}: mend or unlink it.")
+    for leaf in (found, *found.leaves):
+        if bends_normals(material) and leaf.model == "principled":
+            leaf.sockets[SHADING_NORMAL] = Socket([0.0, 0.0, 0.0], True, by_graph=True)
 
 
 def note_leaves(material: str, target: TargetShader, findings: Findings) -> None:
@@ -279,7 +295,7 @@ def needs_bake(material: bpy.types.Material | None) -> bool:
     node = surface_of(node_tree_of(material)) if material is not None else None
     if node is None:
         return False
-    if node.bl_idname != PRINCIPLED and node.bl_idname not in SIMPLE_SHADERS:
+    if bends_normals(material) or (node.bl_idname != PRINCIPLED and node.bl_idname not in SIMPLE_SHADERS):
         return True
     names = SIMPLE_SHADERS[node.bl_idname][1].values() if node.bl_idname != PRINCIPLED else None
     with without_pixels():
@@ -359,7 +375,7 @@ def _refuse(name: str, place: Place, material: str, findings: Findings, *, is_co
 
 
 def note_volume(material: bpy.types.Material, findings: Findings) -> None:
-    """Name what lies below a surface, or moves it: neither is exported."""
+    """Name what lies below a surface, which is not exported."""
     name_settings(MATERIAL, material, material.name, findings)
     name_settings(MATERIAL_CYCLES, cycles_settings(material), material.name, findings)
     output = active_output(node_tree_of(material))
@@ -367,5 +383,3 @@ def note_volume(material: bpy.types.Material, findings: Findings) -> None:
         return
     if source_of(output.inputs["Volume"]) is not None:
         findings.note(f"Material '{material.name}': its volume is left out.")
-    if source_of(output.inputs["Displacement"]) is not None:
-        findings.note(f"Material '{material.name}': its displacement is left out.")

@@ -46,31 +46,43 @@ def slot_count(evaluated: bpy.types.Object) -> int:
 
 
 def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    corners = np.empty(count * 3, dtype=np.int32)
-    mesh.loop_triangles.foreach_get("loops", corners)
-    slots = np.empty(count, dtype=np.int32)
+    places, corners, is_smooth = corners_of(mesh)
+    slots = np.empty(len(places), dtype=np.int32)
     mesh.loop_triangles.foreach_get("material_index", slots)
-    vertex_of_corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", vertex_of_corner)
-    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
     uvs = np.zeros(len(mesh.loops) * 2, dtype=np.float32)
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if layer is not None:
         layer.uv.foreach_get("vector", uvs)
-    places = positions.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
     return CornerMesh(
         positions=places,
-        normals=_shading_normals(mesh, places, corners, vertex_of_corner),
+        normals=_shading_normals(mesh, places, corners, is_smooth),
         uvs=uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2),
         slots=slots,
     )
 
 
+def corners_of(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.bool_]]:
+    """Of a mesh's triangles the places (triangles, 3, 3), the corners of faces (3 a triangle), and which are smooth."""
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    corners = np.empty(count * 3, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners)
+    is_smooth = np.empty(count, dtype=np.bool_)
+    mesh.loop_triangles.foreach_get("use_smooth", is_smooth)
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    places = positions.reshape(-1, 3)[_vertex_of_corner(mesh)[corners]].reshape(-1, 3, 3)
+    return places, corners, is_smooth
+
+
+def _vertex_of_corner(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    found = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", found)
+    return found
+
+
 def _shading_normals(
-    mesh: bpy.types.Mesh, places: NDArray[np.float32], corners: NDArray[np.int32], vertex_of_corner: NDArray[np.int32]
+    mesh: bpy.types.Mesh, places: NDArray[np.float32], corners: NDArray[np.int32], is_smooth: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
     """Normals as Cycles takes them (measured with Blender 5.0), at three corners a triangle.
 
@@ -80,17 +92,15 @@ def _shading_normals(
     if mesh.normals_domain == "FACE":
         vertex_normals = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
         mesh.vertex_normals.foreach_get("vector", vertex_normals)
-        normals = vertex_normals.reshape(-1, 3)[vertex_of_corner[corners]].reshape(-1, 3, 3)
+        normals = vertex_normals.reshape(-1, 3)[_vertex_of_corner(mesh)[corners]].reshape(-1, 3, 3)
     else:
         normals = corner_normals(mesh)[corners].reshape(-1, 3, 3)
     if mesh.has_custom_normals:
         return normals
-    is_smooth = np.empty(len(places), dtype=np.bool_)
-    mesh.loop_triangles.foreach_get("use_smooth", is_smooth)
-    return np.where(is_smooth[:, None, None], normals, _triangle_normals(places))
+    return np.where(is_smooth[:, None, None], normals, flat_normals(places))
 
 
-def _triangle_normals(places: NDArray[np.float32]) -> NDArray[np.float32]:
+def flat_normals(places: NDArray[np.float32]) -> NDArray[np.float32]:
     """The normal of each triangle at its three corners; zero where it has no area."""
     sides = places[:, 1:].astype(np.float64) - places[:, :1]
     normals = np.cross(sides[:, 0], sides[:, 1])

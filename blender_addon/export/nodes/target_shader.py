@@ -12,6 +12,7 @@ import bpy
 
 from ...versions import PRINCIPLED, node_tree_of
 from .closure_leaves import ClosureError, ClosureLeaf, Groups, by_identifier, closure_leaves
+from .displacement import displacement_in
 from .graph_findings import GROUP_INPUT
 from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, why_not_fitted
 from .shader_graph import Links
@@ -72,6 +73,11 @@ class TargetShader:
         """What the node calls the value `name` of a Principled BSDF."""
         socket = inputs_of(self.node).get(name)
         return name if socket is None else socket.name
+
+    @property
+    def displacement(self) -> bpy.types.NodeSocket | None:
+        """What displaces its material is linked to."""
+        return displacement_in((self.groups[0] if self.groups else self.node).id_data)
 
     @property
     def own_names(self) -> dict[str, str]:

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bake.baker import BakeError
 from ...versions import (
     cycles_settings,
     divides_adaptively,
@@ -33,6 +34,7 @@ from ..meshes.coincident import shared_faces
 from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
 from ..nodes.dependence import deformed_generated
+from ..nodes.displacement import moves_faces
 from ..render_state import (
     background_objects,
     instanced_objects,
@@ -262,7 +264,7 @@ class _Walk:
         item = instance.object
         key = (item.name_full, item.data.as_pointer())
         if key not in self.meshes:
-            self.meshes[key] = read_mesh(item, self.depsgraph)
+            self.meshes[key] = self._read_mesh(instance)
         mesh = self.meshes[key]
         if mesh is None:
             return
@@ -298,6 +300,20 @@ class _Walk:
                 surface = Surface(instance, slot, mesh, slots == slot, matrix)
                 shape = self.bakes.ask_surface(self.data, shape, surface, self.findings)
             self.data.shapes.append(shape)
+
+    def _read_mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> CornerMesh | None:
+        """The mesh of an instance, displaced as its materials say."""
+        item = instance.object
+        mesh = read_mesh(item, self.depsgraph)
+        if mesh is None or self.bakes is None:
+            return mesh
+        if not any(moves_faces(material_of_slot(item, slot)) for slot in range(slot_count(item))):
+            return mesh
+        try:
+            return self.bakes.displaced(instance, mesh)
+        except BakeError as problem:
+            self.findings.note(f"The displacement of '{item.name}' is left out: {problem}")
+            return mesh
 
     def _shadow_transmission(self, item: bpy.types.Object, slot: int) -> float | None:
         if not item.visible_shadow:

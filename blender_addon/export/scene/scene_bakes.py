@@ -39,6 +39,7 @@ MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest mo
 LEAST_SIZE, MOST_SIZE = 256, 2048  # texels along each side
 TEXELS_A_PIXEL = 1.5  # along each side, where a surface is nearest to the camera
 USED = 0.6  # of a map's side by the faces in it, about
+OTHER_FACES = "Its object has other faces in the second Blender."
 POINTS = 2000  # of a surface that are looked at for its size in the picture
 
 
@@ -137,6 +138,20 @@ class SceneBakes:
             self._surfaces[identifier].shown.append(shown)
         return replace(shape, bsdf=identifier)
 
+    def displaced(self, instance: bpy.types.DepsgraphObjectInstance, mesh: CornerMesh) -> CornerMesh:
+        """A mesh with the faces where displacement moves them, waited for.
+
+        Raises
+        ------
+        BakeError
+            If Cycles cannot tell.
+        """
+        answer, folder = self._baker.wait(self._baker.ask("displaced", instance=name_of(instance)))
+        positions, normals = (np.load(folder / answer[key]) for key in ("positions", "normals"))
+        if positions.shape != mesh.positions.shape:
+            raise BakeError(OTHER_FACES)
+        return replace(mesh, positions=positions, normals=normals)
+
     def is_ready(self) -> bool:
         """Whether `finish` would not wait; surfaces are asked for with the first call, when all are known."""
         self._ask_surfaces()
@@ -179,7 +194,7 @@ class SceneBakes:
     def _put_surface(self, data: SceneData, findings: Findings, identifier: str, asked: _Asked, baked: Baked) -> None:
         corners = baked.corners
         if any(len(corners) != len(shown.mesh.uvs) for shown in asked.shown):
-            raise BakeError("Its object has other faces in the second Blender.")
+            raise BakeError(OTHER_FACES)
         pieces = {
             shown.shape: world_mesh(replace(shown.mesh, uvs=corners), shown.faces, shown.matrix)
             for shown in asked.shown

@@ -143,7 +143,7 @@ SCENE = {
     "Material '{}': Tangent has no link, so that Cycles turns the anisotropy about the object's Z axis, and the fit along the UV map: link a Tangent node of direction UV Map.": "Matériau '{}' : Tangent n'a pas de lien, donc Cycles tourne l'anisotropie autour de l'axe Z de l'objet, et l'ajustement le long de la carte UV : lier un nœud Tangent de direction UV Map.",
     "Material '{}': Transparent BSDF is taken for white.": "Matériau '{}' : Transparent BSDF est pris pour blanc.",
     "Material '{}': its anisotropy follows the UV map of the bake.": "Matériau '{}' : son anisotropie suit la carte UV du précalcul.",
-    "Material '{}': its displacement is left out.": "Matériau '{}' : son déplacement est omis.",
+    "The displacement of '{}' is left out: {}": "Le déplacement de '{}' est omis : {}",
     "Material '{}': its volume is left out.": "Matériau '{}' : son volume est omis.",
     "Material '{}': scene.xml has the average of the picture on {}, which Mitsuba's principled cannot take as a picture.": "Matériau '{}' : scene.xml a la moyenne de l'image sur {}, que le principled de Mitsuba ne prend pas comme image.",
     "Material '{}': shaders that add up to {} are approximated by brighter colours.": "Matériau '{}' : des shaders dont la somme est {} sont approchés par des couleurs plus claires.",

@@ -144,7 +144,7 @@ SCENE = {
     "Material '{}': Tangent has no link, so that Cycles turns the anisotropy about the object's Z axis, and the fit along the UV map: link a Tangent node of direction UV Map.": "Material '{}': Tangent hat keine Verbindung, sodass Cycles die Anisotropie um die Z-Achse des Objekts dreht und die Anpassung entlang der UV-Map: einen Tangent-Node der Richtung UV-Map verbinden.",
     "Material '{}': Transparent BSDF is taken for white.": "Material '{}': Transparent BSDF gilt als weiß.",
     "Material '{}': its anisotropy follows the UV map of the bake.": "Material '{}': seine Anisotropie folgt der UV-Map des Backens.",
-    "Material '{}': its displacement is left out.": "Material '{}': sein Displacement wird weggelassen.",
+    "The displacement of '{}' is left out: {}": "Das Displacement von '{}' wird weggelassen: {}",
     "Material '{}': its volume is left out.": "Material '{}': sein Volumen wird weggelassen.",
     "Material '{}': scene.xml has the average of the picture on {}, which Mitsuba's principled cannot take as a picture.": "Material '{}': scene.xml hat das Mittel des Bildes an {}, was Mitsubas principled nicht als Bild annimmt.",
     "Material '{}': shaders that add up to {} are approximated by brighter colours.": "Material '{}': Shader, die zusammen {} ergeben, werden durch hellere Farben angenähert.",

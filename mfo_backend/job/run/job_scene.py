@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...material.principled.principled_dict import DIRECTIONS
 from ...types.result import FitResult
 from ..folder.graph_files import locate_files
 from ..folder.job_folder import JobFolder
@@ -56,7 +57,7 @@ def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
         return (_GRAPH_AVERAGES.format(names=names),)
     if not any("whole light paths" in note for note in result.notes):
         return ()
-    flat = (_GRAPH_FLAT,) if {"Normal", "Coat Normal", "Tangent"} & set(held) else ()
+    flat = (_GRAPH_FLAT,) if set(DIRECTIONS) & set(held) else ()
     return (_GRAPH_UNSEEN.format(names=names, depths=1 if request.graph is None else request.graph.depths), *flat)
 
 

@@ -177,6 +177,10 @@ class ClosureTree(mi.BSDF):
         """The frame of the fitted material's microfacets."""
         return self.fitted.material.bumped_frame(si, active)
 
+    def shading_normal(self, si: mi.SurfaceInteraction3f, active: Any) -> mi.Vector3f:
+        """The mesh's normal on the side of the view, as a displacement by bump has bent it."""
+        return self.fitted.material.shading_normal(si, active)
+
     def directions_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
         """The fitted material's normals at a surface point."""
         return self.fitted.material.directions_at(si, active)

@@ -36,7 +36,8 @@ from ..principled.needed_lobes import needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
 
 PLUGIN_NAME = "blender_principled"
-DIRECTIONS = ("normal", "coat_normal", "tangent")
+DIRECTIONS = ("shading_normal", "normal", "coat_normal", "tangent")
+GIVEN = 0.1  # length of a direction above which there is one
 
 
 @dataclass(frozen=True)
@@ -162,27 +163,14 @@ class BlenderPrincipled(mi.BSDF):
         """The frame of the microfacet lobes at a surface point, the view in it, and the other normals in it by name."""
         view: Any = si.to_world(si.wi)
         side: Any = dr.mulsign(mi.Float(1), si.wi.z)
-        smooth: Any = mi.Vector3f(si.sh_frame.n) * side
-        geometric = _towards(view, si)
-        given = {name: mi.Vector3f(texture.eval(si, active)) for name, texture in self.directions.items()}
-
-        def normal(name: str, instead: mi.Vector3f) -> mi.Vector3f:
-            if name not in given:
-                return instead
-            length = dr.norm(given[name])
-            found = given[name] / dr.maximum(length, 1e-6)
-            if name != "tangent":  # nodes gave it for the side that the camera sees
-                # at silhouettes a point takes its value from one that looks another way, on the same side of the mesh
-                behind = self.directions[name].surface.is_behind(si) & (dr.dot(found, smooth) < 0)
-                # Cycles (kernel/svm): a Normal Map is negated on back faces, a Bump turns their normal by its slope
-                other = -found if self.directions[name].turned else found - 2 * dr.dot(found, smooth) * smooth
-                found = dr.select(behind, other, found)
-            return dr.select(length > 0.1, found, instead)
-
-        bumped = normal("normal", smooth)
-        coat = valid_normal(geometric, view, normal("coat_normal", smooth))
+        geometric, smooth = _towards(view, si), self.shading_normal(si, active)
+        bumped = self._turned_to_view("normal", si, smooth, active)
+        coat = valid_normal(geometric, view, self._turned_to_view("coat_normal", si, smooth, active))
         up = valid_normal(geometric, view, bumped)
-        along = normal("tangent", mi.Vector3f(si.sh_frame.s))
+        along: Any = mi.Vector3f(si.sh_frame.s)
+        if "tangent" in self.directions:
+            given = mi.Vector3f(self.directions["tangent"].eval(si, active))
+            along = dr.select(dr.norm(given) > GIVEN, dr.normalize(given), along)
         n = up * side
         s = dr.normalize(along - n * dr.dot(n, along))
         # a frame turned to the view is left-handed
@@ -191,6 +179,25 @@ class BlenderPrincipled(mi.BSDF):
         frame = mi.Frame3f(s, dr.mulsign(dr.cross(n, s), handed), n)
         others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
         return frame, frame.to_local(view), {name: frame.to_local(other) for name, other in others.items()}
+
+    def shading_normal(self, si: mi.SurfaceInteraction3f, active: Any) -> mi.Vector3f:
+        """The mesh's normal on the side of the view, as a displacement by bump has bent it."""
+        smooth: Any = mi.Vector3f(si.sh_frame.n) * dr.mulsign(mi.Float(1), si.wi.z)
+        return self._turned_to_view("shading_normal", si, smooth, active)
+
+    def _turned_to_view(self, name: str, si: mi.SurfaceInteraction3f, smooth: mi.Vector3f, active: Any) -> mi.Vector3f:
+        """The normal that nodes give, which they did for the side that the camera sees; `smooth` without one."""
+        if name not in self.directions:
+            return smooth
+        texture = self.directions[name]
+        given = mi.Vector3f(texture.eval(si, active))
+        length = dr.norm(given)
+        found: Any = given / dr.maximum(length, 1e-6)
+        # at silhouettes a point takes its value from one that looks another way, on the same side of the mesh
+        behind = texture.surface.is_behind(si) & (dr.dot(found, smooth) < 0)
+        # Cycles (kernel/svm): a Normal Map is negated on back faces, a Bump turns their normal by its slope
+        other = -found if texture.turned else found - 2 * dr.dot(found, smooth) * smooth
+        return dr.select(length > GIVEN, dr.select(behind, other, found), smooth)
 
     def directions_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, mi.Vector3f]:
         """The normals of `bumped_frame`, the axes of its frame in the world, and in that frame the mesh's geometric

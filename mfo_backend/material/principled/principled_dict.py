@@ -11,11 +11,16 @@ from ...types.parameter import Value
 from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 
 # Sockets without effect here: normals and tangents are the mesh's, subsurface is replaced by a diffuse lobe
-_IGNORED = {"Normal", "Coat Normal", "Tangent", "Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR"}
-_IGNORED |= {"Subsurface Anisotropy", "Thin Wall"}
+_IGNORED = {"Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall"}
 _EMISSION = {"Emission Color": [1.0, 1.0, 1.0], "Emission Strength": 0.0}
-# but for those that nodes give as the camera sees them
-DIRECTIONS = {"Normal": "normal", "Coat Normal": "coat_normal", "Tangent": "tangent"}
+# but for those that nodes give as the camera sees them. The first is no socket: it is what a displacement by bump makes
+# of the mesh's normals
+DIRECTIONS = {
+    "Shading Normal": "shading_normal",
+    "Normal": "normal",
+    "Coat Normal": "coat_normal",
+    "Tangent": "tangent",
+}
 
 
 def blender_principled_dict(
@@ -53,7 +58,7 @@ def blender_principled_dict(
     for socket, content in sockets.items():
         if socket in DIRECTIONS and content.get("graph"):
             result[DIRECTIONS[socket]] = projective(content, [0.0, 0.0, 0.0])
-        if socket in _IGNORED:
+        if socket in _IGNORED or socket in DIRECTIONS:
             continue
         if socket not in PARAMETER_OF_SOCKET:
             raise BadInputError(

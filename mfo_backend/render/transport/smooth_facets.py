@@ -45,6 +45,8 @@ class ShadowTerminator:
             )
             self._first = shape_table(lifted, faces, mi.UInt32)
             self._cutoff = shape_table(lifted, [shape_number(s, GEOMETRY_OFFSET) for s in lifted], mi.Float)
+        # Cycles asks the normal that a displacement by bump has bent how far light grazes
+        self._displaced = [(s, s.bsdf()) for s in lifted if "shading_normal" in getattr(s.bsdf(), "directions", ())]
         if self.bends:
             self._frequency = shape_table(
                 bent, [1.0 / (1.0 - 0.5 * shape_number(s, SHADING_OFFSET)) for s in bent], mi.Float
@@ -91,6 +93,8 @@ class ShadowTerminator:
         # as Cycles has them: both turned to the side from which the triangle is seen
         back = dr.dot(si.n, si.to_world(si.wi)) < 0.0
         geometric, shading = (dr.select(back, -a, a) for a in (mi.Vector3f(si.n), dr.normalize(normal)))
+        for each, material in self._displaced:
+            shading = dr.select(si.shape == mi.ShapePtr(each), material.shading_normal(si, on), shading)
         cosine = dr.dot(shading, towards)
         geometric = dr.select(cosine < 0.0, -geometric, geometric)
         cosine, true_cosine = dr.abs(cosine), dr.dot(geometric, towards)

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene of its own for one object of the depsgraph, evaluated and alone, which Cycles bakes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import bpy
+
+
+class Stage(NamedTuple):
+    """The scene that is baked in, and the object in it, whose mesh has all modifiers applied."""
+
+    scene: bpy.types.Scene
+    item: bpy.types.Object
+
+
+@contextmanager
+def staged(
+    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph
+) -> Iterator[Stage]:
+    """A scene with a copy of the instance's evaluated object, whose coordinates are those of the original."""
+    original = instance.object.original
+    stage = bpy.data.scenes.new("material_fit_bake")
+    layers = original.type == "MESH"
+    matrix = instance.matrix_world.copy()
+    mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
+    item = bpy.data.objects.new("material_fit_bake", mesh)
+    window = bpy.context.window
+    before, view_layer, name = window.scene, window.view_layer, original.name
+    try:
+        item.matrix_world = matrix
+        _copy_what_nodes_ask_for(original, item, mesh)
+        stage.collection.objects.link(item)
+        stage.camera = scene.camera
+        stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        _set_up(stage, scene)
+        window.scene = stage
+        yield Stage(stage, item)
+    finally:
+        window.scene, window.view_layer = before, view_layer
+        bpy.data.objects.remove(item)
+        original.name = name
+        bpy.data.meshes.remove(mesh)
+        bpy.data.scenes.remove(stage)
+
+
+def bake(stage: Stage, kind: str) -> None:
+    """Have Cycles bake one pass of the object into what is active of its material's pictures or its attributes.
+
+    Raises
+    ------
+    RuntimeError
+        If Cycles cannot.
+    """
+    with bpy.context.temp_override(
+        scene=stage.scene,
+        view_layer=stage.scene.view_layers[0],
+        active_object=stage.item,
+        object=stage.item,
+        selected_objects=[stage.item],
+        selected_editable_objects=[stage.item],
+    ):
+        bpy.ops.object.bake(type=kind)
+
+
+def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
+    """Generated coordinates, Object Info and attributes of the object."""
+    if hasattr(original.data, "texspace_location"):
+        mesh.use_auto_texspace = False
+        mesh.texspace_location = original.data.texspace_location
+        mesh.texspace_size = original.data.texspace_size
+    item.pass_index, item.color = original.pass_index, original.color
+    for key in original.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
+        if not hasattr(original[key], "as_pointer"):
+            item[key] = original[key]
+    name = original.name  # Object Info's Random is made of it
+    original.name = "material_fit_original"
+    item.name = name
+
+
+def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+    stage.render.engine = "CYCLES"
+    stage.cycles.device, stage.cycles.shading_system = "CPU", scene.cycles.shading_system
+    stage.cycles.use_adaptive_sampling = False
+    stage.cycles.use_denoising = False
+    stage.render.resolution_x, stage.render.resolution_y = scene.render.resolution_x, scene.render.resolution_y
+    stage.render.bake.use_clear, stage.render.bake.use_selected_to_active = True, False

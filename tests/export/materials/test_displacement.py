@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is linked to Displacement: bent normals of the target, faces that move, and both against Cycles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from blender_addon.export.nodes.displacement import bends_normals, moves_faces  # noqa: E402
+from blender_addon.export.nodes.target_shader import target_shader  # noqa: E402
+from blender_addon.graph_values.mix_values import why_no_mix_values  # noqa: E402
+from blender_addon.graph_values.table import graph_values  # noqa: E402
+
+from ..scenes import new_material  # noqa: E402
+from .test_node_graphs import ball, lit_scene, principled, recorded_and_cycles  # noqa: E402
+
+SLOPE = 0.5
+
+
+def displace(material: Any, height: Any, scale: float, method: str) -> Any:
+    """Put a Displacement node with `height` on the output; returns the node."""
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeDisplacement")
+    node.inputs["Midlevel"].default_value, node.inputs["Scale"].default_value = 0.0, scale
+    tree.links.new(height, node.inputs["Height"])
+    tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Displacement"])
+    material.displacement_method = method
+    return node
+
+
+def along_x(material: Any) -> Any:
+    """The x of the object's coordinates."""
+    tree = material.node_tree
+    apart = tree.nodes.new("ShaderNodeSeparateXYZ")
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], apart.inputs[0])
+    return apart.outputs["X"]
+
+
+def noise(material: Any, scale: float) -> Any:
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeTexNoise")
+    node.inputs["Scale"].default_value = scale
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], node.inputs["Vector"])
+    return node.outputs[0]
+
+
+def grid(material: Any) -> Any:
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=16, y_subdivisions=16)
+    item = bpy.context.object
+    item.data.materials.append(material)
+    return item
+
+
+def vertices(report: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and normals of the target."""
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    mesh = mi.traverse(mi.load_dict({"type": "ply", "filename": str(next((report.folder / "meshes").glob("*.ply")))}))
+    return np.array(mesh["vertex_positions"]).reshape(-1, 3), np.array(mesh["vertex_normals"]).reshape(-1, 3)
+
+
+@pytest.mark.parametrize(
+    ("method", "bends", "moves"), [("BUMP", True, False), ("DISPLACEMENT", False, True), ("BOTH", True, True)]
+)
+def test_the_method_says_what_a_displacement_does(scene: Any, method: str, bends: bool, moves: bool) -> None:
+    material = new_material("Target")
+    assert (bends_normals(material), moves_faces(material), bends_normals(None)) == (False, False, False)
+    node = displace(material, along_x(material), SLOPE, method)
+    assert (bends_normals(material), moves_faces(material)) == (bends, moves)
+    node.outputs[0].links[0].is_muted = True
+    assert (bends_normals(material), moves_faces(material)) == (False, False)
+
+
+@pytest.mark.parametrize("method", ["BUMP", "DISPLACEMENT", "BOTH"])
+def test_a_slope_bends_normals_or_moves_faces(scene: Any, export: Any, method: str) -> None:
+    """z = x / 2 has the normal (-1, 0, 2) / sqrt(5); the bump of both is that of the mesh as it was."""
+    lit_scene(scene)
+    material = new_material("Target")
+    displace(material, along_x(material), SLOPE, method)
+    report = export(grid(material))
+    assert report.notes == ()
+    positions, normals = vertices(report)
+    height = 0.0 if method == "BUMP" else SLOPE * positions[:, 0]
+    np.testing.assert_allclose(positions[:, 2], height, atol=1e-4)
+    own = np.array([0.0, 0.0, 1.0]) if method == "BUMP" else np.array([-SLOPE, 0.0, 1.0]) / np.hypot(1.0, SLOPE)
+    np.testing.assert_allclose(normals, np.broadcast_to(own, normals.shape), atol=1e-3)
+    socket = report.request["materials"]["target_bsdf"]["sockets"].get("Shading Normal")
+    assert (socket is None) == (method == "DISPLACEMENT")
+    if socket is not None:
+        given = np.load(report.folder / socket["graph"])
+        given = given[np.linalg.norm(given, axis=2) > 0.5]
+        expected = np.array([-SLOPE, 0.0, 1.0]) / np.hypot(1.0, SLOPE)
+        np.testing.assert_allclose(np.median(given, axis=0), expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("method", ["BUMP", "DISPLACEMENT", "BOTH"])
+@pytest.mark.parametrize("shape", ["smooth", "flat", "mirrored"])
+def test_the_recorded_picture_is_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, method: str, shape: str
+) -> None:
+    """Level and root mean square difference inside the ball; the displacement left out they are 1 to 9 % and 20 %."""
+    lit_scene(scene)
+    scene.cycles.samples = 256
+    material = new_material("Target", Base_Color=(0.4, 0.3, 0.2), Roughness=0.4)
+    displace(material, noise(material, 2.0), 0.4, method)
+    item = ball(material)
+    if shape == "flat":
+        bpy.ops.object.shade_flat()
+    if shape == "mirrored":
+        item.scale, item.rotation_euler = (-0.9, 0.7, 0.8), (0.3, 0.5, 0.7)
+    found, truth = recorded_and_cycles(export, render_cycles, item)
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.004
+    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.025
+
+
+def test_a_normal_map_above_a_displacement_is_that_of_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any
+) -> None:
+    """As sets of textures have them: a picture on Normal and one on Displacement by bump."""
+    lit_scene(scene)
+    material = new_material("Target", Base_Color=(0.4, 0.3, 0.2), Roughness=0.4, Coat_Weight=0.5)
+    tree, shader = material.node_tree, principled(material)
+    bump = tree.nodes.new("ShaderNodeBump")
+    bump.inputs["Distance"].default_value = 0.1
+    tree.links.new(noise(material, 5.0), bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], shader.inputs["Normal"])
+    displace(material, noise(material, 2.0), 0.3, "BUMP")
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
+    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.02
+
+
+def test_values_that_displace_are_held(scene: Any) -> None:
+    """A noise scale that feeds the colour alone is free, one that moves the surface is not; nor are values of a mix."""
+    material = new_material("Target")
+    tree, shader = material.node_tree, principled(material)
+    tree.links.new(noise(material, 3.0), shader.inputs["Roughness"])
+    target = target_shader(material)
+    assert target is not None
+    assert "Noise Texture/Scale" in [value.name for value in graph_values(target)]
+    assert why_no_mix_values(target) is None
+    displace(material, shader.inputs["Roughness"].links[0].from_socket, 0.1, "BUMP")
+    assert "Noise Texture/Scale" not in [value.name for value in graph_values(target)]
+    assert why_no_mix_values(target) == "its Displacement has a link"
+
+
+def test_a_displacement_that_cannot_be_evaluated_is_refused(scene: Any, export: Any, tmp_path: Path) -> None:
+    from blender_addon.export.findings import ExportError
+
+    lit_scene(scene)
+    material = new_material("Target")
+    script = material.node_tree.nodes.new("ShaderNodeGroup")
+    node = displace(material, along_x(material), SLOPE, "BUMP")
+    script.node_tree = bpy.data.node_groups.new("Empty", "ShaderNodeTree")
+    script.node_tree.interface.new_socket("Height", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    material.node_tree.links.new(script.outputs[0], node.inputs["Height"])
+    with pytest.raises(ExportError, match="Displacement of material 'Target' is linked to the group 'Empty' without"):
+        export(grid(material))
