@@ -128,15 +128,11 @@ VIEW_LAYER_CYCLES = Owner(
 )
 
 LAYER_COLLECTION = Owner(
-    exported="children collection exclude",
+    exported="children collection exclude indirect_only",
     no_effect="hide_viewport is_visible name",
     named={
         "holdout": Named(
             False, "Collection '{owner}' is a holdout: Cycles cuts its objects out; in the fit they are objects."
-        ),
-        "indirect_only": Named(
-            False,
-            "Collection '{owner}' is set to Indirect Only: the camera does not see its objects; in the fit it does.",
         ),
     },
 )

@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 from ...bake.baker import BakeError
 from ...versions import (
     cycles_settings,
-    divides_adaptively,
     has_compositor,
     node_tree_of,
     overrides_of,
     shadow_terminator,
 )
-from ..audit.object_table import OBJECT_CYCLES
 from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.bent_normals import share_of_bent_normals
@@ -43,6 +41,7 @@ from ..render_state import (
     rendered_layer,
     rendered_objects,
 )
+from .ray_visibility import camera_misses, note_visibility, shadow_transmission
 from .read_light_paths import BOUNCES, read_light_paths
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
@@ -236,7 +235,7 @@ class _Walk:
             if pieces:
                 each = self.targets[number]
                 terminator = Terminator(*shadow_terminator(each.object))
-                shadow = self._shadow_transmission(each.object, each.slot)
+                shadow = shadow_transmission(each.object, each.slot)
                 names = target_shape(number), target_bsdf(number)
                 self.data.shapes.insert(0, Shape(names[0], joined(pieces), names[1], terminator, shadow))
 
@@ -268,7 +267,8 @@ class _Walk:
         mesh = self.meshes[key]
         if mesh is None:
             return
-        self._note_visibility(item)
+        note_visibility(item, self.findings)
+        hidden = camera_misses(instance, self.depsgraph.view_layer)
         if item.data.has_custom_normals:
             self.custom_normals.add(item.name)
         last = max(slot_count(item) - 1, 0)
@@ -290,10 +290,12 @@ class _Walk:
             self.places.append((item.name, piece))
             if slot in fitted:
                 self.target_pieces[fitted[slot]].append(piece)
+                if hidden:
+                    self.findings.error(f"Object '{item.name}' is hidden from camera rays: let the camera see it.")
                 continue
             name = f"shape_{len(self.data.shapes) + 1:04d}"
-            terminator, shadow = Terminator(*shadow_terminator(item)), self._shadow_transmission(item, slot)
-            shape = Shape(name, piece, bsdf, terminator, shadow)
+            terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(item, slot)
+            shape = Shape(name, piece, bsdf, terminator, shadow, hidden)
             if bsdf in self.baked:
                 self._note_generated(item, slot)
             if self.bakes is not None and bsdf in self.baked:
@@ -314,12 +316,6 @@ class _Walk:
         except BakeError as problem:
             self.findings.note(f"The displacement of '{item.name}' is left out: {problem}")
             return mesh
-
-    def _shadow_transmission(self, item: bpy.types.Object, slot: int) -> float | None:
-        if not item.visible_shadow:
-            return 1.0
-        material = material_of_slot(item, slot)
-        return None if material is None or material.use_transparent_shadow else 0.0
 
     def _note_generated(self, item: bpy.types.Object, slot: int) -> None:
         material = material_of_slot(item, slot)
@@ -374,27 +370,3 @@ class _Walk:
                 return self.bsdfs[key]
             self.data.materials[self.bsdfs[key]] = read_context(original, item.name, self.findings)
         return self.bsdfs[key]
-
-    def _note_visibility(self, item: bpy.types.Object) -> None:
-        name_settings(OBJECT_CYCLES, cycles_settings(item), item.name, self.findings)
-        if any(divides_adaptively(modifier, item) for modifier in item.modifiers):
-            self.findings.note(
-                f"Adaptive Subdivision of '{item.name}' is left out: its mesh has the modifier's level for renders."
-            )
-        for system in item.particle_systems:
-            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
-                self.findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
-        off = [
-            label
-            for name, label in (
-                ("visible_camera", "camera"),
-                ("visible_diffuse", "diffuse"),
-                ("visible_glossy", "glossy"),
-                ("visible_transmission", "transmission"),
-            )
-            if not getattr(item, name)
-        ]
-        if off:
-            self.findings.note(f"Object '{item.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
-        if item.is_holdout or item.is_shadow_catcher:
-            self.findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")

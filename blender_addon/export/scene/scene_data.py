@@ -40,7 +40,8 @@ class Terminator:
 class Shape:
     """One mesh with one material; `identifier` is its id in the scene file.
 
-    `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha.
+    `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha. Where
+    `camera_hidden` rays of the camera pass it as if it were not there.
     """
 
     identifier: str
@@ -48,6 +49,7 @@ class Shape:
     bsdf: str
     terminator: Terminator = Terminator()
     shadow_transmission: float | None = None
+    camera_hidden: bool = False
 
 
 @dataclass(frozen=True)

@@ -147,18 +147,19 @@ def _shape_element(shape: Shape, scene: SceneData, files: SceneFiles) -> Element
     path = f"meshes/{shape.identifier}.ply"
     files.meshes[path] = shape.mesh
     element = add(plugin("shape", "ply", shape.identifier), string("filename", path), reference(shape.bsdf))
-    add(element, *_shadows(shape))
+    add(element, *_numbers(shape))
     material, exposure = scene.materials[shape.bsdf], scene.settings.exposure
     emitter = emission_element(material, exposure, files.texture)
     return element if emitter is None else add(element, emitter)
 
 
-def _shadows(shape: Shape) -> list[Element]:
-    """What the backend reads about shadows: `smooth_facets.py`, `shadow_rays.py` of `mfo_backend/render/transport`."""
+def _numbers(shape: Shape) -> list[Element]:
+    """What the backend reads of a shape: `smooth_facets`, `shadow_rays`, `camera_view` of mfo_backend's transport."""
     numbers = {
         "shadow_geometry_offset": shape.terminator.geometry_offset or None,
         "shadow_shading_offset": shape.terminator.shading_offset or None,
         "shadow_transmission": shape.shadow_transmission,
+        "camera_hidden": 1.0 if shape.camera_hidden else None,
     }
     return [
         add(plugin("texture", "uniform", name=name), scalar("value", value))

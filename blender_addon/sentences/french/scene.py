@@ -79,7 +79,6 @@ SCENE = {
     "View layer '{}' is not rendered; '{}' is exported.": "Le calque de vue '{}' n'est pas rendu ; '{}' est exporté.",
     "View layer '{}' leaves surfaces out (Filter > Surfaces): turn them on.": "Le calque de vue '{}' omet des surfaces (Filtre > Surfaces) : les activer.",
     "Collection '{}' is a holdout: Cycles cuts its objects out; in the fit they are objects.": "La collection '{}' est une réserve : Cycles découpe ses objets ; dans l'ajustement ce sont des objets.",
-    "Collection '{}' is set to Indirect Only: the camera does not see its objects; in the fit it does.": "La collection '{}' est en Indirect seulement : la caméra ne voit pas ses objets ; dans l'ajustement elle les voit.",
     # lights and world
     "The scene has no light: add a light or give the world a colour.": "La scène n'a pas de lumière : ajouter une lumière ou donner une couleur au monde.",
     "The limit of transparent bounces is {}: where light meets as many clear surfaces, this Blender lets it through one more than the fit. Set 8 or more in Render Properties > Light Paths, and render the reference anew.": "La limite des rebonds transparents est {} : là où la lumière rencontre autant de surfaces claires, ce Blender la laisse passer par une de plus que l'ajustement. Mettre 8 ou plus dans Propriétés du rendu > Chemins de lumière, et rendre de nouveau la référence.",
@@ -113,6 +112,7 @@ SCENE = {
     "Object '{}' has {} triangles with corners at NaN, infinite or absurdly far positions; they are left out.": "L'objet '{}' a {} triangles avec des coins à des positions non valides, infinies ou absurdement lointaines ; ils sont omis.",
     "Object '{}' is a holdout or shadow catcher; in the fit it is an object.": "L'objet '{}' est une réserve ou un capteur d'ombres ; dans l'ajustement c'est un objet.",
     "Object '{}' is a {}, which is not exported.": "L'objet '{}' est du type {}, qui n'est pas exporté.",
+    "Object '{}' is hidden from camera rays: let the camera see it.": "L'objet '{}' est caché aux rayons de la caméra : laisser la caméra le voir.",
     "Object '{}' is hidden from {} rays; in the fit it is not.": "L'objet '{}' est caché aux rayons {} ; dans l'ajustement il ne l'est pas.",
     "Object '{}' is not in the view layer '{}' of scene '{}'.": "L'objet '{}' n'est pas dans le calque de vue '{}' de la scène '{}'.",
     "Object '{}' is smooth over few faces, or has custom normals: on {} % of it normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all light.": "L'objet '{}' est lisse sur peu de faces, ou a des normales personnalisées : sur {} % les normales se détournent de la caméra. Là, Cycles ne les plie que pour les reflets, l'ajustement pour toute la lumière.",

@@ -80,7 +80,6 @@ SCENE = {
     "View layer '{}' is not rendered; '{}' is exported.": "View-Layer '{}' wird nicht gerendert; '{}' wird exportiert.",
     "View layer '{}' leaves surfaces out (Filter > Surfaces): turn them on.": "View-Layer '{}' lässt Oberflächen weg (Filter > Oberflächen): sie einschalten.",
     "Collection '{}' is a holdout: Cycles cuts its objects out; in the fit they are objects.": "Collection '{}' ist eine Aussparung: Cycles schneidet ihre Objekte aus; in der Anpassung sind sie Objekte.",
-    "Collection '{}' is set to Indirect Only: the camera does not see its objects; in the fit it does.": "Collection '{}' steht auf Nur indirekt: die Kamera sieht ihre Objekte nicht; in der Anpassung sieht sie sie.",
     # lights and world
     "The scene has no light: add a light or give the world a colour.": "Die Szene hat kein Licht: ein Licht hinzufügen oder der Welt eine Farbe geben.",
     "The limit of transparent bounces is {}: where light meets as many clear surfaces, this Blender lets it through one more than the fit. Set 8 or more in Render Properties > Light Paths, and render the reference anew.": "Die Grenze der transparenten Durchgänge ist {}: wo Licht auf so viele klare Flächen trifft, lässt dieses Blender es durch eine mehr als die Anpassung. Unter Rendereigenschaften > Lichtpfade 8 oder mehr setzen und die Referenz neu rendern.",
@@ -114,6 +113,7 @@ SCENE = {
     "Object '{}' has {} triangles with corners at NaN, infinite or absurdly far positions; they are left out.": "Objekt '{}' hat {} Dreiecke mit Ecken an ungültigen, unendlichen oder absurd fernen Stellen; sie werden weggelassen.",
     "Object '{}' is a holdout or shadow catcher; in the fit it is an object.": "Objekt '{}' ist eine Aussparung oder ein Schattenfänger; in der Anpassung ist es ein Objekt.",
     "Object '{}' is a {}, which is not exported.": "Objekt '{}' ist vom Typ {}, der nicht exportiert wird.",
+    "Object '{}' is hidden from camera rays: let the camera see it.": "Objekt '{}' ist vor Kamerastrahlen verborgen: die Kamera es sehen lassen.",
     "Object '{}' is hidden from {} rays; in the fit it is not.": "Objekt '{}' ist vor {} Strahlen verborgen; in der Anpassung nicht.",
     "Object '{}' is not in the view layer '{}' of scene '{}'.": "Objekt '{}' ist nicht im View-Layer '{}' der Szene '{}'.",
     "Object '{}' is smooth over few faces, or has custom normals: on {} % of it normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all light.": "Objekt '{}' ist glatt über wenigen Flächen oder hat eigene Normalen: auf {} % davon zeigen Normalen von der Kamera weg. Dort biegt Cycles sie nur für Spiegelungen, die Anpassung für alles Licht.",

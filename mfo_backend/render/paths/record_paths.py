@@ -24,6 +24,7 @@ from ..camera.highlight_cells import Highlights, highlight_cells
 from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
+from ..transport.camera_view import CameraView
 from ..transport.even_points import even_points
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
@@ -120,7 +121,7 @@ def record_paths(
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
         every_ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
-        seen = hit = scene.ray_intersect_preliminary(every_ray, coherent=True)
+        seen = hit = CameraView(scene).met(every_ray)
         target = mi.ShapePtr(shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
         on_target = hit.is_valid() & (hit.shape == target)
@@ -188,7 +189,7 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
     if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
         return PrimaryRays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
 
-    target = mi.ShapePtr(shape)
+    target, view = mi.ShapePtr(shape), CameraView(scene)
     dr.make_opaque(target)
 
     def rays_in(cells: PixelCells) -> PrimaryRays:
@@ -196,7 +197,7 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
 
     def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
         ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
-        hit = scene.ray_intersect_preliminary(ray, coherent=True)
+        hit = view.met(ray)
         on_target = hit.is_valid() & (hit.shape == target)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
         return _turned(shape, settings, _facing(shape, settings, si)), on_target

@@ -176,6 +176,8 @@ class MitsubaRenderer:
         import drjit as dr
         import mitsuba as mi
 
+        from ..transport.camera_view import CameraView  # can be imported when a variant is set
+
         width, height = (int(n) for n in self._sensor.film().crop_size())
         # one pixel's rays follow each other: the nearer the rays of a packet, the quicker
         number, columns = dr.arange(mi.UInt32, _MASK_RAYS**2 * width * height), dr.opaque(mi.UInt32, width)
@@ -188,7 +190,7 @@ class MitsubaRenderer:
             along = (0.5 + mi.Float(of_pixel) * step for step in _PLASTIC)
             on_lens = mi.Point2f(*(number - dr.floor(number) for number in along))
         ray, _ = self._sensor.sample_ray(0.5, 0.5, position, on_lens)
-        surface = self._scene.ray_intersect_preliminary(ray, coherent=True)
+        surface = CameraView(self._scene).met(ray)
         target = mi.ShapePtr(self.shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
         hit = surface.is_valid() & (surface.shape == target)

@@ -28,6 +28,7 @@ from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
+from ..transport.camera_view import CameraView
 from ..transport.cycles_path import DIFFUSE, TRANSMITS, seen_world
 from ..transport.path_random import PathRandom
 from ..transport.shadow_rays import ShadowRays, left_of, sample_light
@@ -65,7 +66,7 @@ class TracedPaths:
         if self._hide and renderer.shape.is_emitter():
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self._light_paths = renderer.light_paths
-        self._lamps, self._shadows = SceneLamps(scene), ShadowRays(scene)
+        self._lamps, self._shadows, self._view = SceneLamps(scene), ShadowRays(scene), CameraView(scene)
         self._terminator = self._shadows.terminator
         self._camera_world = getattr(integrator, "camera_world", None)
         # a mix tells by its other leaves what goes through it; of those this one's alpha is taken as it is
@@ -166,7 +167,12 @@ class TracedPaths:
 
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
-            si = seen_side(scene.ray_intersect(ray, active))
+            straight = depth == s["passages"]
+            if self._view.hides:
+                first = self._view.met(ray, active, straight=straight)
+                si = seen_side(first.compute_surface_interaction(ray, mi.RayFlags.All, active))
+            else:
+                si = seen_side(scene.ray_intersect(ray, active))
             last = mi.Bool(self._shadows.ends(si, s["passages"]))  # its own light still counts
             blur = self._blur(s)
             if blur is not None:
@@ -175,7 +181,6 @@ class TracedPaths:
             ds = met_light(scene, si, s["before"])
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
             seen = dr.select(s["delta"], 1.0, self._share(s["density"], light))
-            straight = depth == s["passages"]
             if self._hide:
                 seen = dr.select(straight, 0.0, seen)
             emission = mi.Color3f(emitter.eval(si, active))

@@ -22,6 +22,7 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
+from .camera_view import CameraView
 from .shadow_rays import ShadowRays, sample_light
 from .smooth_facets import leaves_on, met_light, seen_side
 
@@ -69,7 +70,7 @@ class CyclesPath(RBIntegrator):
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
-        terminator = shadows.terminator
+        terminator, view = shadows.terminator, CameraView(scene)
         context = mi.BSDFContext()
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
@@ -93,8 +94,11 @@ class CyclesPath(RBIntegrator):
         hidden = self.hide_emitters and before is None
 
         while dr.hint(active, label=f"cycles_path ({mode.name})"):
+            straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
             if dr.hint(known, mode="scalar"):
                 si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
+            elif dr.hint(view.hides, mode="scalar"):
+                si = view.met(ray, active, straight=straight).compute_surface_interaction(ray, mi.RayFlags.All, active)
             else:
                 si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=bounce == 0, active=active)
             if dr.hint(hidden, mode="scalar"):
@@ -114,7 +118,6 @@ class CyclesPath(RBIntegrator):
             seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
             emission = ds.emitter.eval(si, seen)
-            straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
             if dr.hint(self.camera_world is not None, mode="scalar"):
                 behind_all = straight & seen & ~si.is_valid()
                 emission = dr.select(behind_all, seen_world(self.camera_world, ray.d, behind_all), emission)
