@@ -15,7 +15,7 @@ FARTHEST = 1e18  # metres; the square of a distance must fit into a float32
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, near 2**64 over the golden ratio (Knuth, TAOCP 3, 6.4)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CornerMesh:
     """One triangulated mesh in its own space: three corners a triangle and the material slot of each triangle."""
 

@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bake.baker import BakeError
 from ...versions import (
     cycles_settings,
     has_compositor,
@@ -263,7 +262,10 @@ class _Walk:
         item = instance.object
         key = (item.name_full, item.data.as_pointer())
         if key not in self.meshes:
-            self.meshes[key] = self._read_mesh(instance)
+            self.meshes[key] = mesh = read_mesh(item, self.depsgraph)
+            displaces = any(moves_faces(material_of_slot(item, slot)) for slot in range(slot_count(item)))
+            if mesh is not None and displaces and self.bakes is not None:
+                self.bakes.displaced.ask(instance, mesh)
         mesh = self.meshes[key]
         if mesh is None:
             return
@@ -288,12 +290,14 @@ class _Walk:
             if not len(piece.triangles):
                 continue
             self.places.append((item.name, piece))
+            name = target_shape(fitted[slot]) if slot in fitted else f"shape_{len(self.data.shapes) + 1:04d}"
+            if self.bakes is not None:
+                self.bakes.displaced.place(name, mesh, slots == slot, matrix)
             if slot in fitted:
                 self.target_pieces[fitted[slot]].append(piece)
                 if hidden:
                     self.findings.error(f"Object '{item.name}' is hidden from camera rays: let the camera see it.")
                 continue
-            name = f"shape_{len(self.data.shapes) + 1:04d}"
             terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(item, slot)
             shape = Shape(name, piece, bsdf, terminator, shadow, hidden)
             if bsdf in self.baked:
@@ -302,20 +306,6 @@ class _Walk:
                 surface = Surface(instance, slot, mesh, slots == slot, matrix)
                 shape = self.bakes.ask_surface(self.data, shape, surface, self.findings)
             self.data.shapes.append(shape)
-
-    def _read_mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> CornerMesh | None:
-        """The mesh of an instance, displaced as its materials say."""
-        item = instance.object
-        mesh = read_mesh(item, self.depsgraph)
-        if mesh is None or self.bakes is None:
-            return mesh
-        if not any(moves_faces(material_of_slot(item, slot)) for slot in range(slot_count(item))):
-            return mesh
-        try:
-            return self.bakes.displaced(instance, mesh)
-        except BakeError as problem:
-            self.findings.note(f"The displacement of '{item.name}' is left out: {problem}")
-            return mesh
 
     def _note_generated(self, item: bpy.types.Object, slot: int) -> None:
         material = material_of_slot(item, slot)

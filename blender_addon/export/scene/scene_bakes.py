@@ -33,13 +33,13 @@ from ..meshes.mesh_arrays import CornerMesh, world_mesh
 from ..meshes.read_mesh import material_of_slot
 from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
+from .displaced_meshes import OTHER_FACES, DisplacedMeshes
 from .scene_data import SceneData, Shape
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
 LEAST_SIZE, MOST_SIZE = 256, 2048  # texels along each side
 TEXELS_A_PIXEL = 1.5  # along each side, where a surface is nearest to the camera
 USED = 0.6  # of a map's side by the faces in it, about
-OTHER_FACES = "Its object has other faces in the second Blender."
 POINTS = 2000  # of a surface that are looked at for its size in the picture
 
 
@@ -91,6 +91,7 @@ class SceneBakes:
 
     def __init__(self, context: bpy.types.Context, probe: Probe | None = None) -> None:
         self._baker = Baker(context.scene.name, rendered_layer(context.scene, context.view_layer).name, probe)
+        self.displaced = DisplacedMeshes(self._baker)
         self._world: tuple[int, bpy.types.World] | None = None
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
@@ -138,20 +139,6 @@ class SceneBakes:
             self._surfaces[identifier].shown.append(shown)
         return replace(shape, bsdf=identifier)
 
-    def displaced(self, instance: bpy.types.DepsgraphObjectInstance, mesh: CornerMesh) -> CornerMesh:
-        """A mesh with the faces where displacement moves them, waited for.
-
-        Raises
-        ------
-        BakeError
-            If Cycles cannot tell.
-        """
-        answer, folder = self._baker.wait(self._baker.ask("displaced", instance=name_of(instance)))
-        positions, normals = (np.load(folder / answer[key]) for key in ("positions", "normals"))
-        if positions.shape != mesh.positions.shape:
-            raise BakeError(OTHER_FACES)
-        return replace(mesh, positions=positions, normals=normals)
-
     def is_ready(self) -> bool:
         """Whether `finish` would not wait; surfaces are asked for with the first call, when all are known."""
         self._ask_surfaces()
@@ -169,6 +156,7 @@ class SceneBakes:
         """Wait for everything that was asked and put it into `data`; what failed is an error in `findings`."""
         for sentence in self._failed:
             findings.error(sentence)
+        self.displaced.finish(data, findings)
         if self._world is not None:
             self._put_world(data, findings, *self._world)
         if self._surfaces:
@@ -196,7 +184,7 @@ class SceneBakes:
         if any(len(corners) != len(shown.mesh.uvs) for shown in asked.shown):
             raise BakeError(OTHER_FACES)
         pieces = {
-            shown.shape: world_mesh(replace(shown.mesh, uvs=corners), shown.faces, shown.matrix)
+            shown.shape: world_mesh(replace(self.displaced.of(shown.mesh), uvs=corners), shown.faces, shown.matrix)
             for shown in asked.shown
         }
         if len(asked.shown) > 1 and baked.place:

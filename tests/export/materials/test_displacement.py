@@ -162,3 +162,20 @@ def test_a_displacement_that_cannot_be_evaluated_is_refused(scene: Any, export: 
     material.node_tree.links.new(script.outputs[0], node.inputs["Height"])
     with pytest.raises(ExportError, match="Displacement of material 'Target' is linked to the group 'Empty' without"):
         export(grid(material))
+
+
+def test_a_displacement_that_cycles_cannot_bake_is_named(
+    scene: Any, export: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from blender_addon.bake.baker import BakeError, Baker
+
+    def ask(self: Baker, command: str, **request: Any) -> int:
+        raise BakeError("No Blender answers.")
+
+    monkeypatch.setattr(Baker, "ask", ask)
+    lit_scene(scene)
+    material = new_material("Target")
+    displace(material, along_x(material), SLOPE, "DISPLACEMENT")
+    report = export(grid(material))
+    assert report.notes == ("The displacement of 'Grid' is left out: No Blender answers.",)
+    assert np.abs(vertices(report)[0][:, 2]).max() == 0.0
