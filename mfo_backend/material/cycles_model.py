@@ -28,6 +28,9 @@ class CyclesModel:
     film_fourier
         Thin film through the Fourier transform of the colour matching functions and also on metal (from 5.0); before,
         through Gaussian fits of them and on dielectrics only.
+    bumps_shade
+        What nodes bend of a diffuse lobe's normal shades light as bumps of a microfacet surface would (from 4.5);
+        before, the light fades towards the plane of the mesh.
     shader
         The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "glass" tints what it reflects
         and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
@@ -38,6 +41,7 @@ class CyclesModel:
     coat_compensation: bool = True
     diffuse_roughness: bool = True
     film_fourier: bool = True
+    bumps_shade: bool = True
     shader: str = "principled"
 
 
@@ -63,5 +67,6 @@ def cycles_model(
         coat_compensation=major_minor >= (4, 5),
         diffuse_roughness=major_minor >= (4, 3),
         film_fourier=major_minor >= (5, 0),
+        bumps_shade=major_minor >= (4, 5),
         shader=shader,
     )

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What Cycles does with a normal that nodes give: which one each lobe takes, and what is lost at the mesh's own.
 
-All directions lie on the side of the view. Sources: Cycles' treatment of linked normals (Blender 5.0), checked against
-its pictures; the terminator is Chiang, Li, Burley, "Taming the Shadow Terminator" (2019), in Estevez' form of a
-microfacet surface that shades the bumps.
+All directions lie on the side of the view. Sources: Cycles' treatment of linked normals (Blender 4.3 and 5.0), checked
+against its pictures; the terminator is that of Estevez, Lecocq, Stein, "A Microfacet-Based Shadowing Function to Solve
+the Bump Terminator Problem" (2019), and before Blender 4.5 that of Chiang, Li, Burley, "Taming the Shadow Terminator"
+(2019).
 """
 
 from __future__ import annotations
@@ -27,25 +28,36 @@ TERMINATOR = 0.125  # alpha^2 of the bumps by the squared tangent of the angle b
 
 @dataclass(frozen=True)
 class BumpedNormals:
-    """The mesh's `smooth` normal, that of diffuse lobes and that of the coat, in the frame of the layers."""
+    """The mesh's `smooth` normal, that of diffuse lobes and that of the coat, in the frame of the layers.
+
+    `shade` says which terminator there is, as `CyclesModel.bumps_shade`.
+    """
 
     smooth: Any
     diffuse: Any
     coat: Any
+    shade: bool = True
 
     @staticmethod
-    def of(parameters: Mapping[str, Any], turn: Any) -> BumpedNormals | None:
+    def of(parameters: Mapping[str, Any], turn: Any, *, shade: bool = True) -> BumpedNormals | None:
         """Those among the parameters, through `turn` into the layers' frame; None for a surface without."""
         if "bumped_normal" not in parameters:
             return None
-        return BumpedNormals(*(turn(parameters[p.name]) for p in BUMPED_NORMALS))
+        return BumpedNormals(*(turn(parameters[p.name]) for p in BUMPED_NORMALS), shade)
 
     def lit(self, normal: Any, wo: Any) -> Any:
         """Whether a lobe about `normal` sees light from `wo`: on the same side of the mesh as of its own plane."""
         return (dr.dot(normal, wo) > 0) & (dr.dot(self.smooth, wo) * dr.dot(self.smooth, normal) >= 0)
 
     def terminator(self, wo: Any) -> Any:
-        """Share of the light from `wo` on a diffuse lobe that other bumps leave, the G1 of a GGX surface."""
+        """Share of the light from `wo` on a diffuse lobe that other bumps leave, the G1 of a GGX surface.
+
+        Before Blender 4.5 it is a cubic of the cosines' ratio g, 1 where that is above 1.
+        """
+        if not self.shade:
+            lowered = dr.dot(self.diffuse, wo) * dr.dot(self.smooth, self.diffuse)
+            g = dr.clip(dr.dot(self.smooth, wo) / dr.maximum(lowered, 1e-6), 0, 1)
+            return g + g * g - g * g * g
         ci, cd = dr.abs(dr.dot(self.smooth, wo)), dr.abs(dr.dot(self.smooth, self.diffuse))
         alpha2 = dr.minimum(TERMINATOR * _tangent2(cd), 1)
         return 2 / (1 + dr.sqrt(1 + alpha2 * _tangent2(ci)))

@@ -125,7 +125,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
     w = colour(saturate(p["alpha"])) if lobes.alpha else colour(1)
     stack["transparency"] = 1 - saturate(p["alpha"]) if lobes.alpha else number(0)
     frame = Layers(view, cosine, sine, wi.z, 0, 0, ax, ay)
-    stack["normals"] = normals = BumpedNormals.of(parameters, frame.to_frame)
+    stack["normals"] = normals = BumpedNormals.of(parameters, frame.to_frame, shade=model.bumps_shade)
     if lobes.sheen:
         w = _add_sheen(stack, p, w, view if normals is None else about(normals.diffuse, view))
     if lobes.coat:

@@ -50,6 +50,19 @@ def test_the_terminator_is_smiths_masking() -> None:
     np.testing.assert_allclose(normals.terminator(light).numpy(), wanted, rtol=2e-4)
 
 
+def test_the_terminator_before_blender_4_5_fades_towards_the_meshs_plane() -> None:
+    """All light on the side that bumps do not shade, none from below the mesh, g + g^2 - g^3 between."""
+    light, normal = directions(2), mi.Vector3f(0.6, 0.0, 0.8)
+    normals = BumpedNormals(mi.Vector3f(*UP), normal, mi.Vector3f(*UP), shade=False)
+    x, _, z = light.numpy()
+    g = z / ((0.6 * x + 0.8 * z) * 0.8)
+    seen = 0.6 * x + 0.8 * z > 0.01
+    wanted = np.where(g > 1.0, 1.0, np.where(g < 0.0, 0.0, g + g**2 - g**3))
+    assert (g[seen] > 1.0).any()
+    assert ((g[seen] > 0.0) & (g[seen] < 1.0)).any()
+    np.testing.assert_allclose(normals.terminator(light).numpy()[seen], wanted[seen], atol=1e-5)
+
+
 def test_about_keeps_lengths_and_angles() -> None:
     normal, a, b = directions(3), directions(4), directions(5)
     np.testing.assert_allclose(about(normal, normal).z.numpy(), 1.0, atol=1e-5)

@@ -105,6 +105,7 @@ def test_versions_differ_as_documented() -> None:
     old, middle, new = cycles_model((4, 2)), cycles_model((4, 5, 3)), cycles_model((5, 2))
     assert (old.coat_compensation, old.diffuse_roughness, old.film_fourier) == (False, False, False)
     assert (middle.coat_compensation, middle.diffuse_roughness, middle.film_fourier) == (True, True, False)
+    assert (cycles_model((4, 4)).bumps_shade, middle.bumps_shade) == (False, True)
     assert new == cycles_model((5, 0))
     assert not cycles_model((5, 0), "GGX").multiple_scattering
 
