@@ -38,6 +38,14 @@ class Frame:
     bottom: int
     full: tuple[int, int]  # the whole picture, in subpixels
 
+    @property
+    def coarse(self) -> Frame:
+        """The same part in pixels."""
+        left, top, right, bottom, width, height = (
+            side // self.scale for side in (self.left, self.top, self.right, self.bottom, *self.full)
+        )
+        return Frame(1, left, top, right, bottom, (width, height))
+
 
 @dataclass(frozen=True)
 class Outputs:
@@ -86,19 +94,48 @@ def render_outputs(
     names: Iterable[tuple[str, bool]],
     frame: Frame,
     samples: int,
+    *,
+    by_pixels: bool = False,
 ) -> Outputs:
     """Render the AOVs of these names and kinds (True for a colour); the nodes that write them are there already.
+
+    With `by_pixels` rays are as wide as the picture's pixels: each of a pixel's subpixels is a picture of its own, by a
+    camera that is shifted.
 
     Raises
     ------
     RuntimeError
         If Blender cannot render.
     """
-    with tempfile.TemporaryDirectory(prefix="aov_") as folder, _settings(scene, layer, frame, samples) as put:
+    wanted = list(names)
+    if not by_pixels or frame.scale == 1:
+        return Outputs(_rendered(scene, layer, wanted, frame, samples), frame)
+    scale, found = frame.scale, dict[str, NDArray[np.float32]]()
+    for row in range(scale):
+        for column in range(scale):
+            for name, values in _rendered(scene, layer, wanted, frame, samples, (column, row)).items():
+                height, width, size = values.shape
+                whole = found.setdefault(name, np.empty((height * scale, width * scale, size), np.float32))
+                whole[row::scale, column::scale] = values
+    return Outputs(found, frame)
+
+
+def _rendered(
+    scene: bpy.types.Scene,
+    layer: bpy.types.ViewLayer,
+    wanted: list[tuple[str, bool]],
+    frame: Frame,
+    samples: int,
+    subpixel: tuple[int, int] | None = None,
+) -> dict[str, NDArray[np.float32]]:
+    """The AOVs of a frame, or one subpixel of each of its pixels."""
+    pixels = frame if subpixel is None else frame.coarse
+    with tempfile.TemporaryDirectory(prefix="aov_") as folder, _settings(scene, layer, pixels, samples) as put:
+        if subpixel is not None:
+            _look_at(scene, subpixel, frame, put)
         aovs = layer.aovs
         while len(aovs):  # the file is a copy; the scene's own outputs are not asked for
             aovs.remove(aovs[0])
-        wanted = list(names)
         for name, is_color in wanted:
             aov = aovs.add()
             aov.name, aov.type = name, "COLOR" if is_color else "VALUE"
@@ -107,11 +144,25 @@ def render_outputs(
         bpy.ops.render.render(write_still=True, scene=scene.name, layer=layer.name)
         channels = read_plain_exr(path)
     found = {name: _joined(channels, name) for name, _ in wanted}
-    rows, columns = slice(frame.top, frame.bottom), slice(frame.left, frame.right)
-    height, width = frame.bottom - frame.top, frame.right - frame.left
+    rows, columns = slice(pixels.top, pixels.bottom), slice(pixels.left, pixels.right)
+    height, width = pixels.bottom - pixels.top, pixels.right - pixels.left
     if next(iter(found.values())).shape[:2] != (height, width):  # the whole frame, black outside of the border
         found = {name: values[rows, columns] for name, values in found.items()}
-    return Outputs(found, frame)
+    return found
+
+
+def _look_at(scene: bpy.types.Scene, subpixel: tuple[int, int], frame: Frame, put: Any) -> None:
+    """Shift the camera, so that a subpixel's column and row lie in the middle of each pixel, and look there alone."""
+    camera, render, scale = scene.camera.data, scene.render, frame.scale
+    put(scene.cycles, "pixel_filter_type", "GAUSSIAN")  # a box has no width to set
+    put(scene.cycles, "filter_width", 1.0 / scale)
+    width, height = (size // scale * aspect for size, aspect in zip(
+        frame.full, (render.pixel_aspect_x, render.pixel_aspect_y), strict=True
+    ))  # fmt: skip
+    side = {"AUTO": max(width, height), "HORIZONTAL": width, "VERTICAL": height}[camera.sensor_fit]
+    right, down = ((index + 0.5) / scale - 0.5 for index in subpixel)
+    put(camera, "shift_x", camera.shift_x + right * render.pixel_aspect_x / side)
+    put(camera, "shift_y", camera.shift_y - down * render.pixel_aspect_y / side)
 
 
 @contextmanager

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.images.color_space import to_rec709
-from ..export.nodes.displacement import SHADING_NORMAL
+from ..export.nodes.displacement import SHADING_NORMAL, displacement_in
 from ..export.nodes.shader_graph import source_of
-from ..versions import active_output
+from ..versions import active_output, bumps_look_at_pixels
 from .aov_render import Frame, frame_of, render_outputs, world_to_frame
 from .closure_tree import ClosureTree, Leaf
 from .depths import at_depth, peeled
@@ -28,6 +28,7 @@ from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_
 from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
+BUMP = "ShaderNodeBump"
 DIRECTIONS = (SHADING_NORMAL, "Normal", "Coat Normal", "Tangent")
 NOT_SEEN = "The camera does not see '{obj}': move it into the frame."
 # Cycles says so on its stderr alone, and shows nothing
@@ -188,7 +189,8 @@ class Target:
         try:
             self.slot.link = "OBJECT"  # the mesh may belong to other objects too
             self.slot.material = copy
-            return render_outputs(self.scene, self.layer, wanted, frame, samples).values
+            by_pixels = bumps_look_at_pixels() and asks_beside(copy.node_tree)
+            return render_outputs(self.scene, self.layer, wanted, frame, samples, by_pixels=by_pixels).values
         except RuntimeError as error:
             raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{material.name}': {error}") from error
         finally:
@@ -295,10 +297,15 @@ def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, i
     tree.links.new(source, node.inputs["Color" if is_color else "Value"])
 
 
+def asks_beside(tree: bpy.types.NodeTree) -> bool:
+    """Whether nodes look at points beside the one that they are asked for, for a bump."""
+    return displacement_in(tree) is not None or any(node.bl_idname == BUMP for node in nodes_of(tree))
+
+
 def widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
     """Let Bump nodes take their differences over the width of a pixel, which is `scale` subpixels."""
     for node in nodes_of(tree):
-        width = node.inputs.get("Filter Width") if node.bl_idname == "ShaderNodeBump" else None
+        width = node.inputs.get("Filter Width") if node.bl_idname == BUMP else None
         if width is not None and not width.is_linked:
             width.default_value *= scale
 

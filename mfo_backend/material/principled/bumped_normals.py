@@ -43,7 +43,8 @@ class BumpedNormals:
         """Those among the parameters, through `turn` into the layers' frame; None for a surface without."""
         if "bumped_normal" not in parameters:
             return None
-        return BumpedNormals(*(turn(parameters[p.name]) for p in BUMPED_NORMALS), shade)
+        smooth, diffuse, coat = (turn(parameters[p.name]) for p in BUMPED_NORMALS)
+        return BumpedNormals(smooth, diffuse, coat, shade)
 
     def lit(self, normal: Any, wo: Any) -> Any:
         """Whether a lobe about `normal` sees light from `wo`: on the same side of the mesh as of its own plane."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from blender_addon.probe.aov_render import frame_of  # noqa: E402
+from blender_addon.probe.aov_render import frame_of, render_outputs  # noqa: E402
 
 
 @pytest.fixture
@@ -41,3 +42,39 @@ def test_the_frame_is_the_object_and_two_pixels_around(scene: Any) -> None:
 def test_many_outputs_are_rendered_at_a_smaller_scale(scene: Any, outputs: int, scale: int) -> None:
     """24 or 25 pixels each way, 16 bytes a subpixel, two gigabytes: 3125 outputs or more at scale 8, 12500 at 4."""
     assert frame_of(scene, bpy.context.object, 8, outputs).scale == scale
+
+
+@pytest.mark.parametrize("lens", ["ORTHO", "PERSP"])
+@pytest.mark.parametrize("fit", ["AUTO", "VERTICAL", "HORIZONTAL"])
+def test_subpixels_by_a_shifted_camera_are_those_of_a_fine_picture(scene: Any, lens: str, fit: str) -> None:
+    """Positions on a turned square, to a tenth of a subpixel in the mean; the picture is wider than high."""
+    scene.render.resolution_x, scene.render.resolution_y = 48, 32
+    scene.camera.data.sensor_fit = fit
+    scene.camera.data.type, scene.camera.location = lens, (2.0, 1.0, 6.0)
+    scene.camera.data.shift_x = 0.05
+    item = bpy.context.object
+    item.rotation_euler = (0.4, 0.3, 0.2)
+    material = bpy.data.materials.new("Square")
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    output = tree.nodes.new("ShaderNodeOutputAOV")
+    output.aov_name = "place"
+    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], output.inputs["Color"])
+    item.data.materials.append(material)
+    bpy.context.view_layer.update()
+    frame = frame_of(scene, item, 4, 1)
+    before = scene.camera.data.shift_x, scene.cycles.filter_width
+    fine, shifted = (
+        render_outputs(scene, bpy.context.view_layer, [("place", True)], frame, 16, by_pixels=by_pixels).values["place"]
+        for by_pixels in (False, True)
+    )
+    assert (scene.camera.data.shift_x, scene.cycles.filter_width) == before
+    assert fine.shape == shifted.shape
+    inner = np.abs(fine).max(axis=2) > 0.0
+    inner[1:-1, 1:-1] &= inner[:-2, 1:-1] & inner[2:, 1:-1] & inner[1:-1, :-2] & inner[1:-1, 2:]
+    inner[[0, -1]] = inner[:, [0, -1]] = False
+    steps = np.linalg.norm(np.diff(fine, axis=1), axis=2)[:, 1:][inner[:, 2:]]
+    assert inner.sum() > 500
+    assert np.abs((shifted - fine)[inner].mean(axis=0)).max() < 0.1 * np.median(steps)
+    assert np.linalg.norm((shifted - fine)[inner], axis=1).mean() < 0.5 * np.median(steps)
