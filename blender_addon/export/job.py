@@ -13,7 +13,6 @@ from typing import Any, TypeAlias, TypeVar
 import bpy
 
 from ..graph_values.place import holder_of, is_there
-from ..graph_values.table import GraphValue
 from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
 from ..versions import PRINCIPLED
@@ -22,10 +21,11 @@ from .findings import ExportError, Findings
 from .fitted_slot import FittedSlot, check_slots
 from .leaves_by_pictures import leaves_by_pictures
 from .material_model import Material
-from .materials.chosen_leaves import chosen_mix_values, name_shares, named_mix_values, with_mix_values
-from .materials.chosen_values import COPY, by_graph, chosen_graph_values, request_of, write_copy
+from .materials.chosen_leaves import chosen_mix_values, name_shares, with_mix_values
+from .materials.chosen_values import COPY, by_graph, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
+from .materials.wanted_values import WantedValues, fits_of_each, wanted_values
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import PictureSetup, check_setups, named, shown
@@ -35,7 +35,7 @@ from .request import WholeRequest, parameter_of
 from .scene.candidates import candidates
 from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
-from .scene.scene_data import TARGET_BSDF, SceneData, target_bsdf
+from .scene.scene_data import SceneData, target_bsdf
 from .scene.scene_file import scene_files
 
 MITSUBA = "mitsuba_principled"
@@ -124,7 +124,7 @@ def export_job(
                 first.request["more_pictures"] = paths[1:]
             else:
                 notes += [f"Picture {setup.label}: {note}" for note in part.findings.notes if note not in notes]
-                if part.values != first.values:
+                if _moves(first.values, part.values):
                     notes.append(MOVING_VALUES.format(label=setup.label))
                     part.request["notes"].append(MOVING_VALUES.format(label=setup.label))
                 part.write_request(here)
@@ -141,8 +141,19 @@ def export_job(
 
 def _check_names(obj: bpy.types.Object, fit: dict[str, Any], targets: Sequence[FittedSlot]) -> None:
     """Raise `ExportError` where `fit` names a value that there is not, or that cannot be fitted."""
-    wanted = fit if targets else named_mix_values(obj, fit)[1]
-    chosen_graph_values(obj, wanted, Findings(), alone=not targets)
+    fitted = targets or [FittedSlot.active(obj)]
+    for each, own in zip(fitted, _fits_of(fitted, targets, fit), strict=True):
+        wanted_values(each, own, Findings())
+
+
+def _moves(first: Mapping[Any, Any], other: Mapping[Any, Any]) -> bool:
+    """Whether a value that two pictures have is not the same in both."""
+    return any(first[name] != other[name] for name in first.keys() & other.keys())
+
+
+def _fits_of(fitted: Sequence[FittedSlot], targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dict[str, Any]]:
+    """What the fit asks of each material."""
+    return fits_of_each(targets, fit) if targets else [fit for _ in fitted]
 
 
 def export_steps(
@@ -190,12 +201,19 @@ class PartialExport:
 
     @property
     def values(self) -> dict[tuple[str, str], Any]:
-        """The values of what is fitted by material and socket or name, without what is linked."""
-        fitted = [one["target"]["bsdf_id"] for one in self.more.values()] or [TARGET_BSDF]
-        found = {bsdf: self.request["materials"].get(bsdf, {"sockets": {}})["sockets"] for bsdf in fitted}
-        inside = {("graph", each["name"]): each["value"] for each in self.request.get("graph", {}).get("values", ())}
-        plain = {(b, n): s["value"] for b, sockets in found.items() for n, s in sockets.items() if not s["linked"]}
-        return inside | plain
+        """The values of what is fitted by material and socket or name, without what is linked.
+
+        Those inside the nodes of a material are there where the picture shows it.
+        """
+        each = list(self.more.values()) or [self.request]
+        found = {}
+        for request in each:
+            bsdf = request["target"]["bsdf_id"]
+            sockets = self.request["materials"].get(bsdf, {"sockets": {}})["sockets"]
+            found |= {(bsdf, name): socket["value"] for name, socket in sockets.items() if not socket["linked"]}
+            inside = request.get("graph", {}).get("values", ())
+            found |= {(bsdf, value["name"]): value["value"] for value in inside}
+        return found
 
     def write_request(self, folder: Path) -> None:
         """Write request.json, and those of further materials into their folders."""
@@ -227,16 +245,17 @@ def partial_export(
     findings = Findings(of_mitsuba=fit.get("model") == MITSUBA)
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
-    of_mix, wanted = ([], fit) if targets else named_mix_values(obj, fit)
+    asked = _fits_of(fitted, targets, fit)
+    wanted = [wanted_values(each, own, findings) for each, own in zip(fitted, asked, strict=True)]
     may_miss = bool(targets) and several  # one of the materials, in this picture
-    values, fit = chosen_graph_values(obj, wanted, findings, alone=not targets)
-    with probe_for(fitted, always=bool(values)) as probe:
+    with probe_for(fitted, always=any(each.values for each in wanted)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
         if leaves is None:
             leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
-        if leaves and leaves[0] is not None:  # whose numbers and values are others
-            values, fit = chosen_graph_values(obj, wanted, Findings(), alone=not targets, leaf=leaves[0])
+        for number, leaf in enumerate(leaves):
+            if leaf is not None:  # whose numbers and values are others
+                wanted[number] = wanted_values(fitted[number], asked[number], Findings(), leaf)
         with SceneBakes(context, probe) as bakes:
             fitted = [replace(each, leaf=own) for each, own in zip(fitted, leaves, strict=True)]
             leaf = leaves[0] if leaves else None
@@ -246,15 +265,14 @@ def partial_export(
             assert obj is not None
             fits = []
             for number, each in enumerate(fitted):
-                fits.append(_read_values(data, context, each, number, fit, values, of_mix, findings))
+                fits.append(_read_values(data, context, each, number, wanted[number], findings))
             tell(0.4)
             size = (data.camera.width, data.camera.height)
             picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
-            target = target_shader(obj.active_material, leaves[0])
-            inside_request = request_of(context, obj, target, values) if values and target is not None else {}
-            with_copy = bool(values) and is_first  # which all pictures are evaluated in
+            inside = [_inside_of(context, each, own) for each, own in zip(fitted, wanted, strict=True)]
+            with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
             while not bakes.is_ready():
@@ -265,7 +283,7 @@ def partial_export(
         unseen = set(data.unseen)
         for number, each in enumerate(fitted):
             described = data.materials[target_bsdf(number)]
-            if probe is not None and (described.asks_graph or (number == 0 and values)):
+            if probe is not None and (described.asks_graph or wanted[number].values):
                 described, graphs[number] = yield from evaluate_graph(
                     probe, context, each, described, number, may_miss=may_miss
                 )
@@ -289,13 +307,14 @@ def partial_export(
             for each in requests.values():
                 each["reference"] = reference_entry
                 each["generator"]["reference"] = reference.name  # what the user calls it
-        for path, graph in zip(paths, graphs, strict=True):
+        for path, graph, own in zip(paths, graphs, inside, strict=True):
             if path:
                 link_files(folder, folder / path)
             if graph is not None:
-                requests[path]["graph"] = graph.request() | inside_request
+                requests[path]["graph"] = graph.request() | own
                 graph.write(folder / path)
         if with_copy:
+            (folder / GRAPH_FOLDER).mkdir(exist_ok=True)
             (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
     return PartialExport(requests.pop(""), findings, requests, tuple(leaves), frozenset(unseen))
 
@@ -305,12 +324,10 @@ def _read_values(
     context: bpy.types.Context,
     fitted: FittedSlot,
     number: int,
-    fit: dict[str, Any],
-    values: Sequence[GraphValue],
-    of_mix: Sequence[str],
+    wanted: WantedValues,
     findings: Findings,
 ) -> dict[str, Any]:
-    """Let chosen `values` of its graph be evaluated and those `of_mix` be free, say what an apply cannot do.
+    """Let the wanted values of its graph be evaluated and those of its mix be free, say what an apply cannot do.
 
     Returns the fit of this material.
     """
@@ -320,18 +337,24 @@ def _read_values(
     assert target is not None  # it was read
     if unwritable(material):
         findings.note(f"The values cannot be applied as it is. {unwritable(material)}", explains=False)
-    data.materials[bsdf] = by_graph(data.materials[bsdf], target, values, findings)
+    data.materials[bsdf] = by_graph(data.materials[bsdf], target, wanted.values, findings)
     findings.raise_first()
-    chosen = chosen_mix_values(material, target, of_mix, fit, findings)
+    chosen = chosen_mix_values(material, target, wanted.of_mix, wanted.fit, findings)
     data.materials[bsdf] = with_mix_values(data.materials[bsdf], target, chosen)
-    fit = _fit_of(target, data.materials[bsdf], fit, alone=not (values or chosen))
+    fit = _fit_of(target, data.materials[bsdf], wanted.fit, alone=not (wanted.values or chosen))
     unlinked = {n: s for n, s in target.sockets.items() if hasattr(s, VALUE) and not s.is_linked}
     named = {target.own_name(name): (socket, VALUE) for name, socket in unlinked.items()}
     tree = material.node_tree
-    named |= {v.name: holder_of(tree, v.place) for v in (*values, *chosen) if is_there(tree, v.place)}
+    named |= {v.name: holder_of(tree, v.place) for v in (*wanted.values, *chosen) if is_there(tree, v.place)}
     for said in animation_notes(named, context.scene.frame_current):
         findings.note(said, explains=False)
     return fit
+
+
+def _inside_of(context: bpy.types.Context, fitted: FittedSlot, wanted: WantedValues) -> dict[str, Any]:
+    """What the entry `graph` of a material's request has besides for values inside its nodes."""
+    target = target_shader(fitted.material, fitted.leaf)
+    return request_of(context, fitted, target, wanted.values) if wanted.values and target is not None else {}
 
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:

@@ -19,7 +19,7 @@ from ..nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 MOST_UNKNOWN = 0.5  # share of a mix that a shader without an exact model may have
 
 
-def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple[list[str], dict[str, Any]]:
+def named_mix_values(material: bpy.types.Material | None, fit: dict[str, Any]) -> tuple[list[str], dict[str, Any]]:
     """The values of a mix that `fit` names beside its fitted leaf, and the fit without them.
 
     Those inside nodes stay in it. The fitted leaf's own values may be named after its node, too.
@@ -30,7 +30,7 @@ def named_mix_values(obj: bpy.types.Object | None, fit: dict[str, Any]) -> tuple
         If one is named that the mix does not have, or that no fit can change.
     """
     asked = fit.get("parameters", "all")
-    target = None if obj is None else target_shader(obj.active_material)
+    target = target_shader(material)
     if target is None or not target.is_mixed or isinstance(asked, str):
         return [], fit
     label = one_word(target.node.label or target.node.name)

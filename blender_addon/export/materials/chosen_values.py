@@ -17,6 +17,7 @@ from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, pl
 from ...probe.own_blender import save_copy
 from ..camera.read_camera import picture_size
 from ..findings import ExportError, Findings
+from ..fitted_slot import FittedSlot
 from ..material_model import Material
 from ..nodes.graph_findings import graph_problem
 from ..nodes.leaf_kinds import KINDS
@@ -29,16 +30,11 @@ ON_RECORDED_LIGHT = ("fast", "balanced", "best")
 
 
 def chosen_graph_values(
-    obj: bpy.types.Object | None,
-    fit: dict[str, Any],
-    findings: Findings,
-    *,
-    alone: bool = True,
-    leaf: str | None = None,
+    material: bpy.types.Material | None, fit: dict[str, Any], findings: Findings, *, leaf: str | None = None
 ) -> tuple[list[GraphValue], dict[str, Any]]:
-    """The values inside the graph that `fit` asks for, and the fit of the sockets alone.
+    """The values inside the material's graph that `fit` asks for, and the fit of the sockets alone.
 
-    `alone` says that no other material is fitted with it, and `leaf` names the fitted one of a mix.
+    `leaf` names the fitted one of a mix.
 
     Raises
     ------
@@ -48,19 +44,18 @@ def chosen_graph_values(
     wanted = fit.get("parameters", "all")
     names = () if isinstance(wanted, str) else tuple(name for name in wanted if "/" in str(name))
     rest = fit if isinstance(wanted, str) else fit | {"parameters": [name for name in wanted if name not in names]}
-    target = None if obj is None else target_shader(obj.active_material, leaf)
-    if obj is None or target is None or (isinstance(wanted, str) and wanted != "all"):
+    target = target_shader(material, leaf)
+    if material is None or target is None or (isinstance(wanted, str) and wanted != "all"):
         return [], rest
     values = [value for value in inside_values(target) if isinstance(value, GraphValue)]
-    by_all = default_values(target, all_leaves=fits_all_leaves(obj.active_material))
+    by_all = default_values(target, all_leaves=fits_all_leaves(material))
     try:
         chosen = named(values, names) if names else [v for v in by_all if v in values] if wanted == "all" else []
     except GraphValueError as error:
         raise ExportError(str(error)) from error
     _check_not_nodes(rest.get("parameters", "all"), target, values)
-    reason = _not_fitted(target, fit) if alone else "a fit of several materials changes the values of sockets alone"
+    reason = _not_fitted(target, fit)
     if reason is None:
-        material = obj.active_material
         for name in shared_groups(material, [value.place for value in chosen]):
             findings.note(
                 f"The group '{name}' of material '{material.name}' is used elsewhere too: an apply gives the material "
@@ -71,7 +66,8 @@ def chosen_graph_values(
         return chosen, rest
     if names:
         raise ExportError(f"{', '.join(names)} cannot be fitted: {reason}.")
-    findings.note(f"Values inside nodes ({', '.join(value.name for value in chosen)}) stay as they are: {reason}.")
+    held = ", ".join(value.name for value in chosen)
+    findings.note(f"Values inside nodes of material '{material.name}' ({held}) stay as they are: {reason}.")
     return [], rest
 
 
@@ -133,10 +129,10 @@ def _numbers_of_leaves(target: TargetShader) -> list[int]:
 
 
 def request_of(
-    context: bpy.types.Context, obj: bpy.types.Object, target: TargetShader, values: Sequence[GraphValue]
+    context: bpy.types.Context, fitted: FittedSlot, target: TargetShader, values: Sequence[GraphValue]
 ) -> dict[str, Any]:
     """What the entry `graph` of request.json has besides for these values."""
-    tree = obj.active_material.node_tree
+    tree = fitted.material.node_tree
     used = dict.fromkeys(name for value in values for name in value.sockets)
     numbers = _numbers_of_leaves(target)
 
@@ -148,8 +144,8 @@ def request_of(
     return {
         "values": [value.request(read(tree, value.place)) for value in values],
         "evaluate": {
-            "scene": context.scene.name, "layer": context.view_layer.name, "object": obj.name,
-            "slot": obj.active_material_index, "sockets": {name: path(name) for name in used},
+            "scene": context.scene.name, "layer": context.view_layer.name, "object": fitted.object.name,
+            "slot": fitted.slot, "sockets": {name: path(name) for name in used},
             "view": _view(context.scene),
         },
     }  # fmt: skip

@@ -20,6 +20,7 @@ from ...types.status import Status
 from ...types.verdict import Verdict, worst
 from ..folder.job_folder import JobFolder, clear_outputs
 from ..folder.request import Request
+from .graph_blender import HELD, GraphsOfMaterial, evaluated_graphs, refusal_of
 from .job_outcome import JobOutcome
 from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
 from .more_pictures import JobPicture, told_of_first
@@ -41,8 +42,16 @@ ONE_CLASS = (
 )
 
 
-def fit_materials(pictures: Sequence[JobPicture], *, listener: Listener, should_stop: Callable[[], bool]) -> JobOutcome:
+def fit_materials(
+    pictures: Sequence[JobPicture],
+    *,
+    blender: Sequence[str] = (),
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> JobOutcome:
     """Fit the materials of the first request's `targets` together, to all pictures; the outcome has one for each.
+
+    `blender` is the command line of the Blender that evaluates their nodes while values inside them are fitted.
 
     Raises
     ------
@@ -56,13 +65,39 @@ def fit_materials(pictures: Sequence[JobPicture], *, listener: Listener, should_
     request = pictures[0].request
     if request.fit.model not in ("auto", _MODEL):
         raise BadInputError(f"Several materials are fitted with the model {_MODEL!r} alone: choose that.")
+    with evaluated_graphs(pictures, blender) as inside:
+        return _fit(pictures, _without_refused(request, inside), listener=listener, should_stop=should_stop)
+
+
+def _without_refused(request: Request, inside: Sequence[GraphsOfMaterial]) -> list[GraphsOfMaterial]:
+    """Those that Blender can evaluate; of the others it is said why not."""
+    found = []
+    for (_, each), of_one in zip(request.targets, inside, strict=True):
+        try:
+            # pictures that do not show it have those of one that does
+            refused = refusal_of(list(dict.fromkeys(of_one.graphs)), each.fit.parameters)
+        except BadInputError as error:
+            raise BadInputError(f"Material '{each.target.material}': {error}") from error
+        found.append(of_one if refused is None else GraphsOfMaterial(notes=(HELD.format(why=refused),)))
+    return found
+
+
+def _fit(
+    pictures: Sequence[JobPicture],
+    inside: Sequence[GraphsOfMaterial],
+    *,
+    listener: Listener,
+    should_stop: Callable[[], bool],
+) -> JobOutcome:
+    """The fit with what nodes give each of the materials."""
+    request = pictures[0].request
     variant = load_native_code()
     from ...fit.materials.judged_materials import fit_together
     from ...fit.materials.rounds import Member
     from ...fit.pictures.one_sheet import one_sheet
 
     inner = [(JobFolder.open(pictures[0].folder.root / path), each) for path, each in request.targets]
-    renderers = _load(pictures)
+    renderers = _load(pictures, inside)
     shown, display, notes = pictures[0].reference, pictures[0].view, ()
     of_materials: Sequence[MitsubaRenderer | SheetRenderer] = renderers[0]
     sheet = None
@@ -81,10 +116,12 @@ def fit_materials(pictures: Sequence[JobPicture], *, listener: Listener, should_
         begin=lambda: [clear_outputs(place) for place, _ in inner],
     )  # fmt: skip
     found = []
-    for (_, each), outcome in zip(inner, together.outcomes, strict=True):
+    for (_, each), outcome, of_graph in zip(inner, together.outcomes, inside, strict=True):
         result = outcome.result
         alone = () if result.judgement is None or result.judgement.verdict is Verdict.SAME else (ONE_CLASS,)
-        result = replace(result, notes=(*notes, *result.notes, *graph_notes(each, result), *alone), **named(each))
+        result = replace(
+            result, notes=(*notes, *of_graph.notes, *result.notes, *graph_notes(each, result), *alone), **named(each)
+        )
         found.append(JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant, sheet))
     whole = _whole([(each.target.material, one.result) for (_, each), one in zip(inner, found, strict=True)],
                    [int(one.counted.sum()) for one in found])  # fmt: skip
@@ -95,7 +132,7 @@ def fit_materials(pictures: Sequence[JobPicture], *, listener: Listener, should_
     return JobOutcome(whole, found[0].start_image, found[0].result_image, counted, variant, sheet, tuple(found))
 
 
-def _load(pictures: Sequence[JobPicture]) -> list[list[MitsubaRenderer]]:
+def _load(pictures: Sequence[JobPicture], inside: Sequence[GraphsOfMaterial]) -> list[list[MitsubaRenderer]]:
     """Each picture's renderers of all materials; values are those of the first, nodes as each camera sees them."""
     from ...render.pictures.mitsuba_renderer import load_renderers_together
 
@@ -103,7 +140,7 @@ def _load(pictures: Sequence[JobPicture]) -> list[list[MitsubaRenderer]]:
     # what nodes give a material that a picture does not show lights it as the first one that shows it has it
     seen = {bsdf: found for here in reversed(own) for bsdf, (found, is_seen) in here.items() if is_seen}
     found = []
-    for picture, here in zip(pictures, own, strict=True):
+    for number, (picture, here) in enumerate(zip(pictures, own, strict=True)):
         request = picture.request
         materials = request_materials(picture.folder, request)
         for bsdf, (material, is_seen) in here.items():
@@ -115,6 +152,7 @@ def _load(pictures: Sequence[JobPicture]) -> list[list[MitsubaRenderer]]:
             [(each.target.shape_id, free) for (_, each), free in zip(request.targets, parameters, strict=True)],
             materials=materials,
             light_paths=request.light_paths,
+            graphs=[each.graphs[number] if each.graphs else None for each in inside],
         )
         for renderer in renderers:
             renderer.table = narrowed(renderer.table, pictures[0].request.fit.bounds)

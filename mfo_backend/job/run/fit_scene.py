@@ -22,7 +22,7 @@ from ..folder.job_folder import JobFolder
 from ..folder.request import Request
 from .class_trials import Fitted, with_other_classes, with_plainer_glow
 from .fit_materials import fit_materials
-from .graph_blender import evaluated_graphs
+from .graph_blender import HELD, evaluated_graphs, refusal_of
 from .job_outcome import JobOutcome
 from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
 from .material_classes import (
@@ -101,10 +101,10 @@ def fit_scene(
     """
     pictures = (JobPicture(folder, request, reference, view), *more)
     if request.targets:
-        return fit_materials(pictures, listener=listener, should_stop=should_stop)
-    with evaluated_graphs(pictures, blender) as (graphs, notes):
-        variant = load_native_code()
-        job = _OneMaterial(pictures, _materials_of(pictures), graphs, listener, should_stop)
+        return fit_materials(pictures, blender=blender, listener=listener, should_stop=should_stop)
+    with evaluated_graphs(pictures, blender) as (inside,):
+        variant, notes = load_native_code(), inside.notes
+        job = _OneMaterial(pictures, _materials_of(pictures), inside.graphs, listener, should_stop)
         if request.fit.preset == "paper":
             fitted = job.fit_on_own_thread()
         else:
@@ -236,10 +236,8 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
     """
     request, notes = job.request, ()
     renderers = job.load(request.fit.parameters, job.graphs)
-    if (refused := next(filter(None, (graph.refusal() for graph in job.graphs)), None)) is not None:
-        if not request.fit.parameters:
-            raise BadInputError(refused)
-        notes = (f"Values inside nodes stayed as they were. {refused}",)
+    if (refused := refusal_of(job.graphs, request.fit.parameters)) is not None:
+        notes = (HELD.format(why=refused),)
         renderers = job.load(request.fit.parameters, ())
     fitted, names = job.fit(renderers), renderers[0].table.names
     del renderers  # their scenes are large

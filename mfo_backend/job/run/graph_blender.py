@@ -17,7 +17,7 @@ import subprocess
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,12 +28,14 @@ from ...render.machine.temporary_folder import make_folder
 from ...render.models.graph_pictures import Evaluated, GraphPictures, Picture, Variant
 from ...types.errors import BadInputError, MfoError
 from ..folder.graph_request import COPY, NodeGraph
+from ..folder.request import Request
 from .more_pictures import JobPicture
 
 # one render of many variants takes a second; a big file opens in a minute, and a loaded machine is ten times slower
 ANSWER_SECONDS = 300.0
 END_SECONDS = 2.0  # Blender may take to end when nobody asks any more
 LOG_BYTES = 2000  # of the end of its log that are looked at for a last line
+HELD = "Values inside nodes stayed as they were. {why}"
 _NO_BLENDER = (
     "Values inside nodes ({names}) stayed as they were: no Blender was given that evaluates the nodes, or the preset "
     "fits the values of sockets alone."
@@ -181,54 +183,102 @@ class GraphBlender:
             self._process.wait(END_SECONDS)
 
 
-@contextmanager
-def evaluated_graphs(
-    pictures: Sequence[JobPicture], blender: Sequence[str]
-) -> Iterator[tuple[tuple[GraphPictures, ...], tuple[str, ...]]]:
-    """The free values of the target's graph as each picture shows them, and what is said of them.
+@dataclass(frozen=True)
+class GraphsOfMaterial:
+    """The free values inside a material's nodes as each picture shows them, none where they stay as they are, and what
+    is said of them. A picture that does not show the material has those of the first one that does."""
 
-    One Blender evaluates them and lives as long as the block. There are none where these values stay as they are.
+    graphs: tuple[GraphPictures, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@contextmanager
+def evaluated_graphs(pictures: Sequence[JobPicture], blender: Sequence[str]) -> Iterator[tuple[GraphsOfMaterial, ...]]:
+    """What nodes give each material of a job for free values inside them.
+
+    One Blender evaluates all of them and lives as long as the block.
 
     Raises
     ------
     BadInputError
-        If they are all that is to be fitted and cannot be, or a picture does not say how it shows them.
+        If they are all that is to be fitted of a material and cannot be, or a picture does not say how it shows them.
     """
-    first = pictures[0].request
-    asked = first.graph
-    if asked is None or not asked.values:
-        yield (), ()
+    materials = list(zip(*(_each_material(picture.request) for picture in pictures), strict=True))
+    held = [_why_held(shown, pictures[0], blender) for shown in materials]
+    if all(why is not None for why in held):
+        yield tuple(GraphsOfMaterial(notes=(why,) if why else ()) for why in held)
         return
-    names = ", ".join(value.name for value in asked.values)
-    if not blender or first.fit.preset == "paper":
-        if not first.fit.parameters:
-            raise BadInputError(f"{names} are inside nodes, and need a Blender: run the fit there, or by `mfo blend`.")
-        yield (), (_NO_BLENDER.format(names=names),)
-        return
-    folder = pictures[0].folder
-    if not (folder.root / COPY).exists():
-        if not first.fit.parameters:
-            raise BadInputError(_NO_COPY.format(names=names))
-        yield (), (_NO_COPY.format(names=names),)
-        return
-    copy = folder.file(COPY, what="request.json: graph.values, and the copy of the file")
-    linked = first.materials[first.target.bsdf_id].graph_names
+    copy = pictures[0].folder.file(COPY, what="request.json: graph.values, and the copy of the file")
     with GraphBlender(blender, copy) as evaluate:
-        yield (
-            tuple(
-                GraphPictures(asked.values, partial(evaluate, own), linked, size.width * size.height, own.scale)
-                for own, size in ((_as_shown(asked, picture), picture.request) for picture in pictures)
-            ),
-            (),
+        yield tuple(
+            GraphsOfMaterial(_graphs(shown, pictures, evaluate, several=len(materials) > 1))
+            if why is None
+            else GraphsOfMaterial(notes=(why,) if why else ())
+            for shown, why in zip(materials, held, strict=True)
         )
 
 
-def _as_shown(first: NodeGraph, picture: JobPicture) -> NodeGraph:
-    """The first picture's values as a picture shows them."""
-    own = picture.request.graph
-    if own is None or own.evaluate is None:
-        raise BadInputError(_NOT_THIS_PICTURE.format(label=picture.label))
-    return replace(own, values=first.values)
+def refusal_of(graphs: Sequence[GraphPictures], parameters: str | Sequence[str]) -> str | None:
+    """Why Blender cannot evaluate these values, as a sentence; None where it can.
+
+    Raises
+    ------
+    BadInputError
+        If it cannot, and there are no other `parameters` to fit.
+    """
+    refused = next(filter(None, (graph.refusal() for graph in graphs)), None)
+    if refused is not None and not parameters:
+        raise BadInputError(refused)
+    return refused
+
+
+def _each_material(request: Request) -> list[Request]:
+    return [each for _, each in request.targets] or [request]
+
+
+def _first_shown(shown: Sequence[Request]) -> Request:
+    """A material as the first picture has it that has values inside its nodes, if there is one."""
+    return next((each for each in shown if each.graph is not None and each.graph.values), shown[0])
+
+
+def _why_held(shown: Sequence[Request], first: JobPicture, blender: Sequence[str]) -> str | None:
+    """Why values inside a material's nodes are held, as a sentence; an empty one where there are none, None where they
+    are fitted."""
+    graph = _first_shown(shown).graph
+    if graph is None or not graph.values:
+        return ""
+    names = ", ".join(value.name for value in graph.values)
+    has_blender = blender and first.request.fit.preset != "paper"
+    if has_blender and (first.folder.root / COPY).exists():
+        return None
+    if shown[0].fit.parameters:
+        return (_NO_COPY if has_blender else _NO_BLENDER).format(names=names)
+    if has_blender:
+        raise BadInputError(_NO_COPY.format(names=names))
+    raise BadInputError(f"{names} are inside nodes, and need a Blender: run the fit there, or by `mfo blend`.")
+
+
+def _graphs(
+    shown: Sequence[Request], pictures: Sequence[JobPicture], evaluate: GraphBlender, *, several: bool
+) -> tuple[GraphPictures, ...]:
+    """Those of one material; of `several` each need not be in every picture."""
+    first = _first_shown(shown)
+    assert first.graph is not None  # it has values
+    linked = first.materials[first.target.bsdf_id].graph_names
+
+    def made(request: Request, label: str) -> GraphPictures:
+        own = request.graph
+        if own is None or own.evaluate is None:
+            raise BadInputError(_NOT_THIS_PICTURE.format(label=label))
+        own, values = replace(own, values=first.graph.values), first.graph.values
+        return GraphPictures(values, partial(evaluate, own), linked, request.width * request.height, own.scale)
+
+    found = [
+        None if several and request.graph is None else made(request, picture.label)
+        for request, picture in zip(shown, pictures, strict=True)
+    ]
+    of_first = next(graph for graph in found if graph is not None)
+    return tuple(graph or of_first for graph in found)
 
 
 def _root() -> Path:

@@ -270,8 +270,11 @@ def load_renderers_together(
     *,
     materials: Materials,
     light_paths: LightPaths | None = None,
+    graphs: Sequence[GraphPictures | None] | None = None,
 ) -> list[MitsubaRenderer]:
     """One loaded scene with the materials of several shapes open to change, each with its parameters, as renderers.
+
+    `graphs` are the free values inside the nodes of each, None of one that has none.
 
     Each changes its own material: the pictures of all of them show what every other one has shown last. The model is
     Blender's. Errors are those of `renderer.load_renderer`.
@@ -282,7 +285,10 @@ def load_renderers_together(
     prepare_for_fit(document)
     prepared = prepare_several_blender_principled(document, found, materials)
     scene, light_paths = _loaded(document, scene_xml, light_paths)
-    return [MitsubaRenderer("blender_principled", material, scene, light_paths) for material in prepared]
+    return [
+        MitsubaRenderer("blender_principled", material, scene, light_paths, graph)
+        for material, graph in zip(prepared, graphs or [None] * len(prepared), strict=True)
+    ]
 
 
 def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) -> tuple[Any, LightPaths | None]:

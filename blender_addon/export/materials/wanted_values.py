@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a fit is to change of each material: the values inside its nodes, those of its mix, and its own sockets'."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from ...graph_values.mix_values import inside_values
+from ...graph_values.table import GraphValue, one_word, plain_name
+from ..findings import ExportError, Findings
+from ..fitted_slot import FittedSlot
+from ..nodes.target_shader import target_shader
+from .chosen_leaves import named_mix_values
+from .chosen_values import chosen_graph_values
+
+
+@dataclass(frozen=True)
+class WantedValues:
+    """The values of a material's graph, the names of those of its mix beside the fitted leaf, and the fit without
+    them."""
+
+    values: list[GraphValue]
+    of_mix: list[str]
+    fit: dict[str, Any]
+
+
+def wanted_values(fitted: FittedSlot, fit: dict[str, Any], findings: Findings, leaf: str | None = None) -> WantedValues:
+    """What `fit` asks of a material; `leaf` names the fitted shader of a mix.
+
+    Raises
+    ------
+    ExportError
+        If it names a value that there is not, or that cannot be fitted.
+    """
+    of_mix, rest = named_mix_values(fitted.material, fit)
+    values, of_sockets = chosen_graph_values(fitted.material, rest, findings, leaf=leaf)
+    return WantedValues(values, of_mix, of_sockets)
+
+
+def fits_of_each(targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dict[str, Any]]:
+    """What a fit of several materials asks of each: a name is for all that have such a value, or for the one whose name
+    and a slash are before it, as in ``"Paint/Color Ramp/Stop 0"`` or ``"Paint/Roughness"``.
+
+    Raises
+    ------
+    ExportError
+        If none of them has a value of that name.
+    """
+    asked = fit.get("parameters", "all")
+    if isinstance(asked, str):
+        return [fit for _ in targets]
+    materials = ["" if each.material is None else plain_name(each.material.name) for each in targets]
+    inside = [_names_inside(each) for each in targets]
+    own: list[list[str]] = [[] for _ in targets]
+    for name in map(str, asked):
+        of_one = [n for n, material in enumerate(materials) if plain_name(name).startswith(f"{material}/")]
+        # the longest, where a material is called as another one and more
+        of_one = sorted(of_one, key=lambda n: len(materials[n]))[-1:]
+        having = [n for n, names in enumerate(inside) if plain_name(name) in names]
+        if of_one:
+            own[of_one[0]].append(plain_name(name).removeprefix(f"{materials[of_one[0]]}/"))
+        elif "/" in name and not having:
+            raise ExportError(_nowhere(name, inside))
+        else:
+            for number in having if "/" in name else range(len(targets)):
+                own[number].append(name)
+    return [fit | {"parameters": list(dict.fromkeys(names))} for names in own]
+
+
+def _names_inside(fitted: FittedSlot) -> dict[str, str]:
+    """All that a name with a slash may mean of a material, by how it is compared: of a mix the fitted leaf's, too."""
+    target = target_shader(fitted.material, fitted.leaf)
+    if target is None:
+        return {}
+    label = one_word(target.node.label or target.node.name)
+    of_leaf = [f"{label}/{target.own_name(name)}" for name in target.places] if target.is_mixed else []
+    return {plain_name(name): name for name in (*(value.name for value in inside_values(target)), *of_leaf)}
+
+
+def _nowhere(name: str, inside: Sequence[dict[str, str]]) -> str:
+    known = {plain: shown for names in inside for plain, shown in names.items()}
+    near = get_close_matches(plain_name(name), known, n=1, cutoff=0.3)
+    guess = f" (the nearest is '{known[near[0]]}')" if near else ""
+    return f"None of the materials has a value '{name}'{guess}: name a node and its value, or leave it out."
