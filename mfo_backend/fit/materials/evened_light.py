@@ -27,8 +27,8 @@ def evened_light(
 ) -> list[NDArray[np.float64]]:
     """Vectors whose targets have the mean radiance of the picture `light` (height, width, 3); the scene shows them.
 
-    All but the base colours is as in the scene. The values are no estimate of a material: they make up for whatever
-    else differs, and serve as the surroundings of the others' first fits alone.
+    All but the base colours, and the colours that nodes make them of, is as in the scene. The values are no estimate of
+    a material: they make up for whatever else differs, and serve as the surroundings of the others' first fits alone.
     """
     present = [renderer.start.copy() for renderer in renderers]
     wanted = [light[mask].mean(axis=0, dtype=np.float64) for mask in masks]
@@ -38,12 +38,17 @@ def evened_light(
             renderer.show(vector)
         image = renderers[0].image(present[0], seed=seed, spp=SAMPLES)
         for renderer, vector, mask, mean in zip(renderers, present, masks, wanted, strict=True):
-            if COLOR not in renderer.table.names:
-                continue
             shown = image[mask].mean(axis=0, dtype=np.float64)
-            entries = renderer.table.slice_of(COLOR)
-            vector[entries] *= np.clip((mean + dim) / (shown + dim), 1.0 / MOST, MOST)
+            for name in _colors(renderer):
+                vector[renderer.table.slice_of(name)] *= np.clip((mean + dim) / (shown + dim), 1.0 / MOST, MOST)
             vector[:] = renderer.table.clip(vector)
     for renderer, vector in zip(renderers, present, strict=True):
         renderer.show(vector)
     return present
+
+
+def _colors(renderer: MitsubaRenderer | SheetRenderer) -> tuple[str, ...]:
+    """What the base colour of a target is made of: itself, or colours in its nodes, which it is mostly linear in."""
+    if COLOR in renderer.table.names:
+        return (COLOR,)
+    return () if renderer.graph is None else renderer.graph.colors_of(COLOR)

@@ -13,7 +13,6 @@ import numpy as np
 
 from ...metrics.display.tone_mapping import View
 from ...render.models.graph_pictures import GraphPictures
-from ...types.errors import BadInputError
 from ...types.event import Listener
 from ...types.image import Image
 from ...types.parameter_bounds import narrowed

@@ -16,6 +16,7 @@ steps of the cosine between ray and normal, 0 to 1. A block is as `filename` in 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
@@ -43,7 +44,8 @@ class ProjectiveTexture(mi.Texture):
             raise RuntimeError(f"{props['filename']} has the shape {values.shape}: it does not fit its positions")
         self.size, self.turned = values.shape[2], bool(props.get("turned", False))
         outside = props.get("outside", 0.0)
-        self.outside = mi.Color3f(outside if isinstance(outside, (int, float)) else mi.ScalarColor3f(outside))
+        is_number = isinstance(outside, (int, float))
+        self._set_outside([float(outside)] if is_number else [float(v) for v in mi.ScalarColor3f(outside)])
         self.values = own_memory(values, mi.Float)
         self._elsewhere = _Elsewhere(np.load(str(props["elsewhere"])), self.surface) if "elsewhere" in props else None
         dr.eval(self.values)
@@ -58,13 +60,30 @@ class ProjectiveTexture(mi.Texture):
         """The values as an array (height, width, 1 or 3)."""
         return self.values.numpy().reshape(self.surface.rows, self.surface.width, self.size)
 
-    def show(self, picture: NDArray[np.float32], elsewhere: NDArray[np.float32] | None = None) -> None:
-        """Take other values (height, width, 1 or 3) of the same subpixels, and those for other rays."""
+    @property
+    def outside(self) -> NDArray[np.float32]:
+        """The value of points that the camera does not see, (3,)."""
+        return self._outside.numpy().ravel()
+
+    def _set_outside(self, value: Sequence[float]) -> None:
+        # opaque: a kernel that held its digits would be compiled anew for each
+        self._outside = mi.Color3f(*(dr.opaque(mi.Float, float(v)) for v in (*value, *value[:1], *value[:1])[:3]))
+
+    def show(
+        self,
+        picture: NDArray[np.float32],
+        elsewhere: NDArray[np.float32] | None = None,
+        outside: NDArray[np.float32] | None = None,
+    ) -> None:
+        """Take other values (height, width, 1 or 3) of the same subpixels, those for other rays, and the value of
+        points that the camera does not see, which stays without one."""
         if picture.shape != (self.surface.rows, self.surface.width, self.size):
             raise ValueError(f"a picture of {picture.shape} does not fit {self}")
         self.values = own_memory(picture, mi.Float)
         self._elsewhere = None if elsewhere is None else _Elsewhere(elsewhere, self.surface)
         dr.eval(self.values)
+        if outside is not None:
+            self._set_outside(outside.tolist())
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
         """Three values at the surface point."""
@@ -73,7 +92,7 @@ class ProjectiveTexture(mi.Texture):
             found = dr.gather(mi.Color3f, self.values, index, seen)
         else:
             found = mi.Color3f(dr.gather(mi.Float, self.values, index, seen))
-        found = dr.select(seen, found, self.outside)
+        found = dr.select(seen, found, self._outside)
         if self._elsewhere is None:
             return found
         return dr.select(self.surface.is_from_camera(si), found, self._elsewhere.at(index, seen, si, active))

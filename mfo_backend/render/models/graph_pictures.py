@@ -51,10 +51,12 @@ class Evaluated:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a texture shows: the picture that the camera sees, and that for other rays where it hangs on the ray."""
+    """What a texture shows: the picture that the camera sees, that for other rays where it hangs on the ray, and the
+    mean of a parameter, for points that the camera does not see."""
 
     picture: Picture
     elsewhere: Picture | None = None
+    outside: NDArray[np.float32] | None = None
 
 
 class Evaluate(Protocol):
@@ -158,6 +160,12 @@ class GraphPictures:
         """Entries of the vector that have many minima."""
         return tuple(j for j, (value, _) in enumerate(self._components) if value.scanned)
 
+    def colors_of(self, name: str) -> tuple[str, ...]:
+        """The colours among the values that change a parameter of the material."""
+        return tuple(
+            value.name for value in self._values if value.parameter.size == 3 and name in map(name_of, value.sockets)
+        )
+
     def plain(self, vectors: Sequence[Vector]) -> list[Mapping[str, NDArray[np.float32]]]:
         """Flat pictures by parameter at each vector, without derivatives."""
         self.renders += 1
@@ -206,9 +214,11 @@ class GraphPictures:
             self.renders += 1
             variants = [(self._as_values(vector), self._sockets)]
             found = self._evaluate(variants, scale=self._fine_scale, samples=FINE_SAMPLES, elsewhere=True)
+            seen = np.isfinite(found.positions).all(axis=2).ravel()
             self._fine[key] = {
-                name_of(socket): Shown(picture, found.elsewhere.get(socket))
-                for socket, picture in found.pictures[0].items()
+                # of a direction that nobody knows the mesh's own is taken
+                name_of(s): Shown(p, found.elsewhere.get(s), None if s in DIRECTIONS else _flat(p, seen)[-1])
+                for s, p in found.pictures[0].items()
             }
             if len(self._fine) > RECALLED:
                 self._fine.popitem(last=False)

@@ -67,7 +67,7 @@ class MitsubaRenderer:
         self._params.keep(list(self._keys.values()))
         if graph is not None:
             textures = {name: self._texture(name) for name in graph.varying}
-            graph.note(graph.table.pack({}), {k: Shown(t.picture, t.elsewhere) for k, t in textures.items()})
+            graph.note(graph.table.pack({}), {k: Shown(t.picture, t.elsewhere, t.outside) for k, t in textures.items()})
         self._mask: NDArray[np.bool_] | None = None
         self._of_pixels: PixelPictures | None = None
 
@@ -218,7 +218,7 @@ class MitsubaRenderer:
         if self.graph is not None:
             of_graph = np.asarray(vector, np.float64)[self.table.length - self.graph.table.length :]
             for name, shown in self.graph.fine(of_graph).items():
-                self._texture(name).show(shown.picture, shown.elsewhere)
+                self._texture(name).show(shown.picture, shown.elsewhere, shown.outside)
         return theta
 
     def _texture(self, name: str) -> Any:

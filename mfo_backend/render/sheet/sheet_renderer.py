@@ -36,7 +36,7 @@ class SheetRenderer:
         first = renderers[0]
         self.renderers = tuple(renderers)
         self.model, self.table, self.start = first.model, first.table, first.start
-        self.light_paths, self.counter = first.light_paths, first.counter
+        self.light_paths, self.counter, self.graph = first.light_paths, first.counter, first.graph
         for renderer in renderers:
             renderer.table, renderer.start, renderer.counter = self.table, self.start, self.counter
         sizes = tuple((len(mask), mask.shape[1]) for mask in (renderer.target_mask() for renderer in renderers))
