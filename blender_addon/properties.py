@@ -363,6 +363,11 @@ def toggle_node_value(settings: bpy.types.PropertyGroup, name: str) -> None:
         settings.node_values.add().name = name
 
 
+def node_value_key(settings: bpy.types.PropertyGroup, material: bpy.types.Material, name: str) -> str:
+    """What a value inside a material's nodes is chosen by: where several are listed with the material's name before."""
+    return f"{material.name}/{name}" if settings.targets else name
+
+
 def crossed_limits(settings: bpy.types.PropertyGroup) -> list[str]:
     """Labels of the chosen values whose least is not below their most."""
     labels = {key: label for key, label, *_ in SOCKET_ITEMS}

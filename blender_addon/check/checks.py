@@ -34,7 +34,7 @@ from ..export.reference.turned_picture import turn_notes
 from ..export.render_state import instanced_objects, rendered_objects
 from ..export.scene.read_scene import MESH_TYPES
 from ..graph_values.mix_values import default_values, inside_values
-from ..properties import SOCKET_ITEMS, crossed_limits
+from ..properties import SOCKET_ITEMS, crossed_limits, node_value_key
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
 from ..result.overlay import background_of
@@ -136,7 +136,8 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
     inside = _inside(settings, target, material)
     if settings.parameter_set == "chosen" and settings.model == "blender_principled":
         chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets and name in sockets}
-        if not chosen - set(linked) and not inside:
+        of_others = bool(settings.targets) and len(settings.node_values) > 0
+        if not chosen - set(linked) and not inside and not of_others:
             fix = (Fix("all_parameters"),)
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
@@ -158,7 +159,8 @@ def _inside(settings: bpy.types.PropertyGroup, target: TargetShader, material: b
     if settings.model != "blender_principled" or settings.parameter_set == "reduced" or settings.preset == "paper":
         return []
     if settings.parameter_set == "chosen":
-        return [value.name for value in inside_values(target) if value.name in settings.node_values]
+        keys = {value.name: node_value_key(settings, material, value.name) for value in inside_values(target)}
+        return [name for name, key in keys.items() if key in settings.node_values]
     return [value.name for value in default_values(target, all_leaves=fits_all_leaves(material))]
 
 

@@ -23,7 +23,7 @@ from ..export.reference.reference import Picture
 from ..export.reference.reference_view import REFERENCE_VIEWS
 from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
-from ..properties import chosen_of, crossed_limits
+from ..properties import chosen_of, crossed_limits, node_value_key
 from ..result.local_copy import unwritable
 from ..result.write_back import WriteBackError, fitted_shader
 from ..running import fit_queue, running_job
@@ -104,7 +104,7 @@ class FitOptions:
         folder = Path(given) if given else new_job_folder(context, material.name)
         is_new = not folder.exists()
         name = f"{len(materials)} materials" if targets else material.name
-        uids, chosen = tuple(each.session_uid for each in materials), self._fit(settings, obj)
+        uids, chosen = tuple(each.session_uid for each in materials), self._fit(settings, obj, targets)
         if targets and settings.queue:
             chosen["queue"] = True
         try:
@@ -121,14 +121,17 @@ class FitOptions:
         picture = folder / report.request["reference"]["path"]
         return PreparedFit(python, folder, name, uids, picture, report.notes, is_new)
 
-    def _fit(self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> dict[str, Any]:
+    def _fit(
+        self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object, targets: Sequence[FittedSlot]
+    ) -> dict[str, Any]:
         model = self.model or settings.model
         parameters: object = self.parameters or settings.parameter_set
         if parameters == "chosen":
-            parameters = ",".join([*_chosen(settings, model), *_chosen_inside(obj, settings, model)])
+            inside = _chosen_inside(targets or [FittedSlot.active(obj)], settings, model, several=bool(targets))
+            parameters = [*_chosen(settings, model), *inside]
             if not parameters:
                 raise FitError("No parameter is chosen: choose at least one, or All.")
-        if parameters not in ("all", "reduced"):
+        elif parameters not in ("all", "reduced"):
             parameters = [name.strip() for name in str(parameters).split(",") if name.strip()]
             if not parameters:
                 raise FitError(f"parameters is {self.parameters!r}: give 'all', 'reduced' or names with commas.")
@@ -244,12 +247,17 @@ def counted_part(picture: Path | bpy.types.Image, part: bpy.types.PropertyGroup)
     return picture if part.is_whole else CountedPart(picture, part.crop, part.mask, part.use_alpha)
 
 
-def _chosen_inside(obj: bpy.types.Object, settings: bpy.types.PropertyGroup, model: str) -> list[str]:
-    """The chosen values inside the nodes of the object's active material, which may be another than when they were."""
-    target = target_shader(obj.active_material)
-    if model != "blender_principled" or target is None or not settings.node_values:
-        return []
-    return [value.name for value in inside_values(target) if value.name in settings.node_values]
+def _chosen_inside(
+    fitted: Sequence[FittedSlot], settings: bpy.types.PropertyGroup, model: str, *, several: bool
+) -> list[str]:
+    """The chosen values inside the nodes of these materials; of `several` with the material's name before."""
+    found = []
+    for material, target in ((each.material, target_shader(each.material)) for each in fitted):
+        if model != "blender_principled" or material is None or target is None or not settings.node_values:
+            continue
+        keys = {value.name: node_value_key(settings, material, value.name) for value in inside_values(target)}
+        found += [key if several else name for name, key in keys.items() if key in settings.node_values]
+    return found
 
 
 def _pictures(settings: bpy.types.PropertyGroup, first: Picture) -> list[PictureSetup]:

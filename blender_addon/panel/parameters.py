@@ -11,7 +11,8 @@ from ..export.nodes.target_shader import ALL, TargetShader, fits_all_leaves, fit
 from ..graph_values.mix_values import MixValue, inside_values
 from ..graph_values.place import holder_of, is_there
 from ..graph_values.table import GraphValue
-from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of
+from ..operators.materials import ticked_slots
+from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of, node_value_key
 from ..running import running_job
 from ..sentences.translated import word
 from .layout import BOX, BUTTON, ICON, NAMED_NUMBER, NUMBER, UNIT, fits, names_of, room, side_by_side
@@ -47,11 +48,14 @@ class Parameters:
             return
         column = layout.column(align=True)
         if settings.model == "blender_principled":
-            target = target_shader(context.object.active_material if context.object else None)
+            material = context.object.active_material if context.object else None
+            target = None if settings.targets else target_shader(material)
             for key, name, *_ in SOCKET_ITEMS:
                 _draw_value(column, context, settings, key, name, target)
-            if target is not None:
-                _draw_nodes(layout, context, settings, target)
+            if settings.targets:
+                _draw_nodes_of_each(layout, context)
+            elif material is not None and target is not None:
+                _draw_nodes(layout, context, material, target)
         else:
             for key, name, *_ in PARAMETER_ITEMS:
                 column.prop_enum(settings, chosen_of(settings.model), key, text=name)
@@ -117,30 +121,42 @@ def _cells(
     return layout.row(align=True), layout.row(align=True)
 
 
+def _draw_nodes_of_each(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The values inside the nodes of each material that is ticked, to unfold below its name."""
+    for each in ticked_slots(context.scene):
+        material, target = each.material, target_shader(each.material)
+        if material is None or target is None or not inside_values(target):
+            continue
+        header, body = layout.panel(f"mfo_values_{material.session_uid}", default_closed=True)
+        header.label(text=material.name, icon="MATERIAL", translate=False)
+        if body is not None:
+            _draw_nodes(body, context, material, target)
+
+
 def _draw_nodes(
-    layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup, target: TargetShader
+    layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material, target: TargetShader
 ) -> None:
     """The values inside the target's nodes, or of a mix those of the others, under their nodes' labels."""
-    tree = (target.groups[0] if target.groups else target.node).id_data
     for (_, label), values in groupby(inside_values(target), lambda value: (value.place.path, value.label)):
         box = layout.box().column(align=True)
         box.label(text=label, icon="NODE")
         for value in values:
-            _draw_node_value(box, context, settings, tree, value)
+            _draw_node_value(box, context, material, value)
 
 
 def _draw_node_value(
     layout: bpy.types.UILayout,
     context: bpy.types.Context,
-    settings: bpy.types.PropertyGroup,
-    tree: bpy.types.NodeTree,
+    material: bpy.types.Material,
     value: GraphValue | MixValue,
 ) -> None:
     """A box that unlocks the value, its name within the node, and the value itself."""
-    is_chosen = value.name in settings.node_values
+    settings, tree = context.scene.mfo, material.node_tree
+    key = node_value_key(settings, material, value.name)
+    is_chosen = key in settings.node_values
     text, icon = word(value.name.rpartition("/")[2]), "CHECKBOX_HLT" if is_chosen else "LOCKED"
     box, number = _cells(layout, context, room(context) - BOX, text)
-    box.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen, translate=False).name = value.name
+    box.operator("mfo.choose_node_value", text=text, icon=icon, depress=is_chosen, translate=False).name = key
     if not is_there(tree, value.place):
         number.label(text="new node")
         return

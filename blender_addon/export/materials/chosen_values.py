@@ -132,7 +132,9 @@ def request_of(
     context: bpy.types.Context, fitted: FittedSlot, target: TargetShader, values: Sequence[GraphValue]
 ) -> dict[str, Any]:
     """What the entry `graph` of request.json has besides for these values."""
-    tree = fitted.material.node_tree
+    material = fitted.material
+    assert material is not None  # its values were found
+    tree = material.node_tree
     used = dict.fromkeys(name for value in values for name in value.sockets)
     numbers = _numbers_of_leaves(target)
 

@@ -52,22 +52,27 @@ def fits_of_each(targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dic
     asked = fit.get("parameters", "all")
     if isinstance(asked, str):
         return [fit for _ in targets]
-    materials = ["" if each.material is None else plain_name(each.material.name) for each in targets]
     inside = [_names_inside(each) for each in targets]
     own: list[list[str]] = [[] for _ in targets]
     for name in map(str, asked):
-        of_one = [n for n, material in enumerate(materials) if plain_name(name).startswith(f"{material}/")]
-        # the longest, where a material is called as another one and more
-        of_one = sorted(of_one, key=lambda n: len(materials[n]))[-1:]
-        having = [n for n, names in enumerate(inside) if plain_name(name) in names]
-        if of_one:
-            own[of_one[0]].append(plain_name(name).removeprefix(f"{materials[of_one[0]]}/"))
+        of_one = {number: rest for number, each in enumerate(targets) if (rest := _after_material(each, name))}
+        having = [number for number, names in enumerate(inside) if plain_name(name) in names]
+        if of_one:  # the longest name, where a material is called as another one and more
+            number = min(of_one, key=lambda n: len(of_one[n]))
+            own[number].append(of_one[number])
         elif "/" in name and not having:
             raise ExportError(_nowhere(name, inside))
         else:
             for number in having if "/" in name else range(len(targets)):
                 own[number].append(name)
     return [fit | {"parameters": list(dict.fromkeys(names))} for names in own]
+
+
+def _after_material(fitted: FittedSlot, name: str) -> str:
+    """What follows the material's name and a slash in a name, empty where that does not begin so."""
+    material = "" if fitted.material is None else plain_name(fitted.material.name)
+    slashes = [place for place, letter in enumerate(name) if letter == "/"]
+    return next((name[place + 1 :].strip() for place in slashes if plain_name(name[:place]) == material), "")
 
 
 def _names_inside(fitted: FittedSlot) -> dict[str, str]:

@@ -168,7 +168,7 @@ SCENE = {
     "The group '{}' of material '{}' is used elsewhere too: an apply gives the material a copy of its own.": "Le groupe '{}' du matériau '{}' est utilisé ailleurs aussi : une application donne au matériau sa propre copie.",
     "The group '{}' is used elsewhere too: material '{}' got a copy of its own.": "Le groupe '{}' est utilisé ailleurs aussi : le matériau '{}' a reçu sa propre copie.",
     "The values cannot be applied as it is. {}": "Les valeurs ne peuvent pas être appliquées ainsi. {}",
-    "Values inside nodes ({}) stay as they are: {}.": "Les valeurs dans les nœuds ({}) restent telles quelles : {}.",
+    "Values inside nodes of material '{}' ({}) stay as they are: {}.": "Les valeurs dans les nœuds du matériau '{}' ({}) restent telles quelles : {}.",
     "{} cannot be fitted: {}.": "{} ne peut pas être ajusté : {}.",
     "{} is fitted with the model blender_principled alone: choose that.": "{} n'est ajusté qu'avec le modèle blender_principled : le choisir.",
     "{} of material '{}' is linked to {}, which cannot be exported; the socket's own value is used.": "{} du matériau '{}' est lié à {}, qui ne peut pas être exporté ; la valeur propre de l'entrée est utilisée.",
@@ -218,4 +218,5 @@ SCENE = {
     "{} of '{}' has no link any more.": "{} de '{}' n'a plus de lien.",
     "{} was not written": "{} n'a pas été écrit",
     "The material's nodes have no value '{}'{}: they have {}{}.": "Les nœuds du matériau n'ont pas de valeur '{}'{} : ils ont {}{}.",
+    "None of the materials has a value '{}'{}: name a node and its value, or leave it out.": "Aucun des matériaux n'a de valeur '{}'{} : nommer un nœud et sa valeur, ou l'omettre.",
 }

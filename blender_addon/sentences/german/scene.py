@@ -169,7 +169,7 @@ SCENE = {
     "The group '{}' of material '{}' is used elsewhere too: an apply gives the material a copy of its own.": "Die Gruppe '{}' von Material '{}' wird auch anderswo verwendet: Anwenden gibt dem Material eine eigene Kopie.",
     "The group '{}' is used elsewhere too: material '{}' got a copy of its own.": "Die Gruppe '{}' wird auch anderswo verwendet: Material '{}' bekam eine eigene Kopie.",
     "The values cannot be applied as it is. {}": "Die Werte können so nicht angewendet werden. {}",
-    "Values inside nodes ({}) stay as they are: {}.": "Werte in Nodes ({}) bleiben, wie sie sind: {}.",
+    "Values inside nodes of material '{}' ({}) stay as they are: {}.": "Werte in Nodes von Material '{}' ({}) bleiben, wie sie sind: {}.",
     "{} cannot be fitted: {}.": "{} kann nicht angepasst werden: {}.",
     "{} is fitted with the model blender_principled alone: choose that.": "{} wird nur mit dem Modell blender_principled angepasst: dieses wählen.",
     "{} of material '{}' is linked to {}, which cannot be exported; the socket's own value is used.": "{} von Material '{}' ist verbunden mit: {}. Das kann nicht exportiert werden; der eigene Wert des Eingangs wird verwendet.",
@@ -219,4 +219,5 @@ SCENE = {
     "{} of '{}' has no link any more.": "{} von '{}' hat keine Verbindung mehr.",
     "{} was not written": "{} wurde nicht geschrieben",
     "The material's nodes have no value '{}'{}: they have {}{}.": "Die Nodes des Materials haben keinen Wert '{}'{}: sie haben {}{}.",
+    "None of the materials has a value '{}'{}: name a node and its value, or leave it out.": "Keines der Materialien hat einen Wert '{}'{}: einen Node und seinen Wert nennen, oder ihn weglassen.",
 }

@@ -264,14 +264,14 @@ def _graphs(
     """Those of one material; of `several` each need not be in every picture."""
     first = _first_shown(shown)
     assert first.graph is not None  # it has values
-    linked = first.materials[first.target.bsdf_id].graph_names
+    values, linked = first.graph.values, first.materials[first.target.bsdf_id].graph_names
 
     def made(request: Request, label: str) -> GraphPictures:
         own = request.graph
         if own is None or own.evaluate is None:
             raise BadInputError(_NOT_THIS_PICTURE.format(label=label))
-        own, values = replace(own, values=first.graph.values), first.graph.values
-        return GraphPictures(values, partial(evaluate, own), linked, request.width * request.height, own.scale)
+        as_shown = partial(evaluate, replace(own, values=values))
+        return GraphPictures(values, as_shown, linked, request.width * request.height, own.scale)
 
     found = [
         None if several and request.graph is None else made(request, picture.label)

@@ -178,9 +178,75 @@ def test_a_material_in_none_of_the_pictures_is_refused_by_name(apart: dict[str, 
 
 def test_what_is_named_wrongly_is_said_of_no_picture(apart: dict[str, Any], export: Any) -> None:
     slots, pictures = [FittedSlot(apart["Floor"], 0), FittedSlot(apart["Floor"], 1)], pictures_from("Right", "Left")
-    with pytest.raises(ExportError, match=r"^Noise Texture/Scale cannot be fitted: a fit of several materials changes"):
-        export(apart["Floor"], targets=slots, reference=pictures, fit={"parameters": ["Noise Texture/Scale"]})
+    paper = {"parameters": ["Wood/Noise Texture/Scale"], "preset": "paper"}
+    for name, said in (
+        ("Nose/Scale", "None of the materials has a value 'Nose/Scale' (the nearest is 'Noise Texture/Scale')"),
+        ("Wood/Noise Texture/Size", "The material's nodes have no value 'Noise Texture/Size'"),
+    ):
+        with pytest.raises(ExportError, match="^" + re.escape(said)):
+            export(apart["Floor"], targets=slots, reference=pictures, fit={"parameters": [name]})
+    with pytest.raises(ExportError, match=r"^Noise Texture/Scale cannot be fitted: the preset paper"):
+        export(apart["Floor"], targets=slots, reference=pictures, fit=paper)
     with pytest.raises(ExportError, match=r"^Slot 1 of 'Floor' .material 'Wood'. is named twice"):
         export(apart["Floor"], targets=[*slots, slots[0]], reference=pictures)
     with pytest.raises(ExportError, match=r"^The material's nodes have no value 'Nose/Scale'"):
         export(apart["Floor"], reference=pictures, fit={"parameters": ["Nose/Scale"]})
+
+
+@pytest.fixture
+def patterned(room: dict[str, Any]) -> dict[str, Any]:
+    """The floor's two materials, each with colours inside its nodes, and a table without."""
+    for name in ("Wood", "Rug"):
+        tree = bpy.data.materials[name].node_tree
+        shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+        ramp, noise = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("ValToRGB", "TexNoise"))
+        tree.links.new(noise.outputs[0], ramp.inputs[0])
+        tree.links.new(ramp.outputs[0], shader.inputs["Base Color"])
+    bpy.context.view_layer.update()
+    return room
+
+
+def values_by_material(folder: Any) -> dict[str, list[str]]:
+    """Names of what is fitted of each material: sockets' and those inside nodes."""
+    found = {}
+    for path in sorted(folder.glob("targets/*/request.json")):
+        request = json.loads(path.read_text("utf-8"))
+        inside = [value["name"] for value in request.get("graph", {}).get("values", ())]
+        parameters = request["fit"].get("parameters", "all")
+        found[request["target"]["material"]] = [*([] if isinstance(parameters, str) else parameters), *inside]
+    return found
+
+
+def test_values_inside_the_nodes_of_each_are_asked_for(patterned: dict[str, Any], export: Any) -> None:
+    """*All* takes the colours of both; a name is for all that have it, or for the one that is named before it."""
+    slots = [FittedSlot(patterned["Floor"], 0), FittedSlot(patterned["Floor"], 1), FittedSlot(patterned["Table"], 0)]
+    colors = ["Color Ramp/Stop 0", "Color Ramp/Stop 1"]
+    image = bpy.data.images.new("Picture", 32, 32, float_buffer=True)
+    image.pixels[:] = [0.5, 0.4, 0.3, 1.0] * 32**2
+    report = export(patterned["Floor"], targets=slots, reference=image)
+    assert values_by_material(report.folder) == {"Wood": colors, "Rug": colors, "Glass": []}
+    assert "graph" not in report.request
+    assert sorted(path.relative_to(report.folder).parts[0] for path in report.folder.rglob("*.blend")) == ["graph"]
+    request = read_request(JobFolder.open(report.folder))
+    evaluated = [each.graph.evaluate for _, each in request.targets if each.graph is not None]
+    assert [(entry["object"], entry["slot"]) for entry in evaluated if entry] == [("Floor", 0), ("Floor", 1)]
+
+    names = ["color ramp/stop 0", "Rug/Color Ramp/Position 1", "rug/noise texture/scale", "Glass/Roughness", "Metallic"]
+    report = export(patterned["Floor"], targets=slots, fit={"parameters": names})
+    assert values_by_material(report.folder) == {
+        "Wood": ["Metallic", "Color Ramp/Stop 0"],
+        "Rug": ["Metallic", "Color Ramp/Stop 0", "Color Ramp/Position 1", "Noise Texture/Scale"],
+        "Glass": ["Roughness", "Metallic"],
+    }
+
+
+def test_one_that_lets_light_through_keeps_its_nodes_and_is_named(patterned: dict[str, Any], export: Any) -> None:
+    tree = bpy.data.materials["Rug"].node_tree
+    next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED").inputs["Transmission Weight"].default_value = 0.5
+    slots = [FittedSlot(patterned["Floor"], number) for number in (0, 1)]
+    report = export(patterned["Floor"], targets=slots)
+    assert values_by_material(report.folder) == {"Wood": ["Color Ramp/Stop 0", "Color Ramp/Stop 1"], "Rug": []}
+    said = (
+        "Values inside nodes of material 'Rug' (Color Ramp/Stop 0, Color Ramp/Stop 1) stay as they are: a fit of them"
+    )
+    assert [note for note in report.notes if note.startswith(said)]

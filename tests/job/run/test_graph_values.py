@@ -143,7 +143,7 @@ def test_a_program_that_is_not_there() -> None:
 def picture(folder: Path, graph: Any, parameters: tuple[str, ...] = (), **words: Any) -> Any:
     """A picture of a job, as far as its nodes are asked about."""
     request = SimpleNamespace(
-        graph=graph, fit=SimpleNamespace(preset="fast", parameters=parameters), width=3, height=2,
+        graph=graph, fit=SimpleNamespace(preset="fast", parameters=parameters), width=3, height=2, targets=(),
         target=SimpleNamespace(bsdf_id="a"), materials={"a": SimpleNamespace(graph_names=["Base Color"])},
     )  # fmt: skip
     return SimpleNamespace(folder=JobFolder(folder), request=request, label="2 (b.exr)", **words)
@@ -158,10 +158,10 @@ def test_one_blender_answers_for_each_picture_as_it_shows_the_copy(tmp_path: Pat
     (tmp_path / "graph").mkdir()
     (tmp_path / "graph" / "scene.blend").touch()
     words = server(ANSWERS.format(value="asked['view']['frame']"))
-    with graph_blender.evaluated_graphs([picture(tmp_path, graph) for graph in graphs], words) as (found, notes):
-        start = found[0].table.pack({})
-        assert [float(each.state(start).pictures["base_color"].mean()) for each in found] == [1.0, 9.0]
-        assert notes == ()
+    with graph_blender.evaluated_graphs([picture(tmp_path, graph) for graph in graphs], words) as (found,):
+        start = found.graphs[0].table.pack({})
+        assert [float(each.state(start).pictures["base_color"].mean()) for each in found.graphs] == [1.0, 9.0]
+        assert found.notes == ()
     old = graph_from_json({key: ENTRY[key] for key in ("camera", "positions")}, "request.json")
     both = graph_blender.evaluated_graphs([picture(tmp_path, graph) for graph in (graphs[0], old)], words)
     with pytest.raises(BadInputError, match=r"Picture 2 \(b.exr\) does not say how its camera sees"), both:
@@ -177,7 +177,56 @@ def test_a_job_whose_copy_is_gone_says_so(tmp_path: Path) -> None:
             with pytest.raises(BadInputError, match="copy of the file that"), found:
                 pass
             continue
-        with found as (pictures, notes):
-            assert pictures == ()
-            assert "Color Ramp/Stop 0, Noise Texture/Scale" in notes[0]
-            assert "Export the job anew" in notes[0]
+        with found as (of_one,):
+            assert of_one.graphs == ()
+            assert "Color Ramp/Stop 0, Noise Texture/Scale" in of_one.notes[0]
+            assert "Export the job anew" in of_one.notes[0]
+
+
+def shown_at(frame: float) -> Any:
+    entry = copy.deepcopy(ENTRY)
+    entry["evaluate"]["view"] = {"camera": "Side", "frame": frame, "width": 3, "height": 2}
+    return graph_from_json(entry, "request.json")
+
+
+def together(folder: Path, *graphs: Any) -> Any:
+    """A picture of several materials, whose graphs are these, None of one that it does not show."""
+    shown = picture(folder, None)
+    each = [picture(folder / str(number), graph).request for number, graph in enumerate(graphs)]
+    shown.request.targets = [(str(number), request) for number, request in enumerate(each)]
+    return shown
+
+
+def test_several_materials_have_one_blender_and_each_its_own_pictures(tmp_path: Path) -> None:
+    """A picture that does not show a material has what the first that does gives it; a plain material has nothing."""
+    (tmp_path / "graph").mkdir()
+    (tmp_path / "graph" / "scene.blend").touch()
+    words = server(ANSWERS.format(value="asked['view']['frame']"))
+    pictures = [together(tmp_path, shown_at(2.0), None, None), together(tmp_path, shown_at(3.0), shown_at(4.0), None)]
+    with graph_blender.evaluated_graphs(pictures, words) as (first, second, plain):
+        start = first.graphs[0].table.pack({})
+        for found, frames in ((first, [2.0, 3.0]), (second, [4.0, 4.0])):
+            assert [float(g.state(start).pictures["base_color"].mean()) for g in found.graphs] == frames
+        assert second.graphs[0] is second.graphs[1]
+        assert (plain.graphs, plain.notes) == ((), ())
+        assert graph_blender.refusal_of(first.graphs, ()) is None
+
+
+def test_of_several_materials_those_stay_whose_nodes_blender_refuses(tmp_path: Path) -> None:
+    from mfo_backend.job.run.fit_materials import _without_refused
+
+    (tmp_path / "graph").mkdir()
+    (tmp_path / "graph" / "scene.blend").touch()
+    answers = ANSWERS.format(value="1.0")
+    refuses = "print(json.dumps({'status': 'bad_input', 'sentence': 'Too many nodes.'}), flush=True)"
+    words = server(f"exec({refuses!r} if asked['view']['frame'] == 2.0 else {answers!r})")
+    shown = together(tmp_path, shown_at(2.0), shown_at(3.0))
+    for (_, each), name in zip(shown.request.targets, ("Paint", "Wood"), strict=True):
+        each.target.material, each.fit.parameters = name, ("roughness",)
+    with graph_blender.evaluated_graphs([shown], words) as inside:
+        first, second = _without_refused(shown.request, inside)
+        assert (first.graphs, first.notes) == ((), ("Values inside nodes stayed as they were. Too many nodes.",))
+        assert second is inside[1]
+        shown.request.targets[0][1].fit.parameters = ()
+        with pytest.raises(BadInputError, match="Material 'Paint': Too many nodes"):
+            _without_refused(shown.request, inside)
