@@ -93,6 +93,33 @@ def test_both_are_fitted_shown_applied_and_kept(two: SimpleNamespace, monkeypatc
     assert (rough(two, "Wood"), rough(two, "Glaze")) == before
 
 
+def test_values_inside_nodes_are_chosen_for_each_material(two: SimpleNamespace) -> None:
+    """Both have nodes of the same names; a press in the panel is for one of them."""
+    bpy, settings = two.bpy, two.bpy.context.scene.mfo
+    for name in ("Wood", "Glaze"):
+        tree = bpy.data.materials[name].node_tree
+        shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+        noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+        tree.links.new(noise.outputs[0], ramp.inputs[0])
+        tree.links.new(ramp.outputs[0], shader.inputs["Base Color"])
+    settings.parameter_set, settings.sockets = "chosen", set()
+    assert bpy.ops.mfo.choose_node_value(name="Glaze/Color Ramp/Stop 1") == {"FINISHED"}
+    assert bpy.ops.mfo.choose_node_value(name="Wood/Color Ramp/Stop 0") == {"FINISHED"}
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    found = {}
+    for path in Path(two.job).glob("targets/*/request.json"):
+        request = json.loads(path.read_text("utf-8"))
+        inside = [value["name"] for value in request["graph"]["values"]]
+        found[request["target"]["material"]] = (request["fit"]["parameters"], inside)
+    assert found == {"Wood": ([], ["Color Ramp/Stop 0"]), "Glaze": ([], ["Color Ramp/Stop 1"])}
+
+    settings.targets[0].use = False  # the cube is the active object and alone
+    bpy.context.view_layer.objects.active = bpy.data.objects["Väse"]
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    request = json.loads((Path(two.job) / "request.json").read_text("utf-8"))
+    assert [value["name"] for value in request["graph"]["values"]] == ["Color Ramp/Stop 1"]
+
+
 def test_one_that_does_not_match_stays_until_it_is_forced(
     two: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

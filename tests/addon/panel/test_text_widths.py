@@ -226,6 +226,12 @@ def with_several_pictures(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) ->
     for view in settings.bl_rna.properties["parameter_set"].enum_items:
         settings.parameter_set = view.identifier
         yield
+    tree = scene.bpy.data.materials["Glaze"].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    tree.links.new(ramp.outputs[0], shader.inputs["Base Color"])
+    settings.parameter_set = "chosen"  # below the name of each material
+    yield
 
 
 def with_the_backend(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -37,6 +38,7 @@ class Wall:
             + [Parameter(f"v{k}", 1, 0.0, 1.0, 0.5) for k in range(values - 3)]
         )
         self.model, self.counter, self.passes = "wall", PassCounter(), 0.0
+        self.graph: SimpleNamespace | None = None
         self.start = self.table.pack({})
         self._shown, self._name, self._mask = shown, name, mask
         self.show(self.start)
@@ -72,6 +74,17 @@ def test_colours_are_evened_with_the_light_that_the_walls_give_each_other() -> N
     found = evened_light(pair, [LEFT, ~LEFT], light_of(*truth), 0)  # type: ignore[arg-type]
     alone = light_of(*truth)[0, 7] / light_of(*(wall.start[:3] for wall in walls()))[0, 7] * 0.5
     assert np.abs(alone - truth[1]).max() > 0.1  # what one step, or a fit beside walls as they were, would say
+    for vector, colour in zip(found, truth, strict=True):
+        assert vector[:3] == pytest.approx(colour, abs=0.01)
+
+
+def test_colours_inside_nodes_are_evened_too() -> None:
+    """A wall whose colour a ramp gives, beside one whose colour is its own."""
+    truth = np.array([0.8, 0.3, 0.1]), np.array([0.15, 0.6, 0.9])
+    pair = walls()
+    pair[0].table = ParameterTable([Parameter("Color Ramp/Stop 0", 3, 0.0, 1.0, (0.5, 0.5, 0.5))])
+    pair[0].graph = SimpleNamespace(colors_of=lambda name: ("Color Ramp/Stop 0",) if name == "base_color" else ())
+    found = evened_light(pair, [LEFT, ~LEFT], light_of(*truth), 0)  # type: ignore[arg-type]
     for vector, colour in zip(found, truth, strict=True):
         assert vector[:3] == pytest.approx(colour, abs=0.01)
 

@@ -53,6 +53,18 @@ def test_behind_it_beside_it_and_outside_of_the_picture_nothing_is_seen(texture:
     np.testing.assert_array_equal(found, [[7, 8, 9]] * 4)
 
 
+def test_other_values_have_their_own_for_what_is_not_seen(texture: Any) -> None:
+    """What a fit shows next: beside the surface there is the mean of the new values, or what was there before."""
+    values = np.full((HEIGHT, WIDTH, 3), 0.5, np.float32)
+    texture.show(values)
+    np.testing.assert_array_equal(at(texture, (0.5, 0.5, 0.0), (5.9, 1.5, 0.0)), [[0.5] * 3, [7, 8, 9]])
+    np.testing.assert_array_equal(texture.outside, [7, 8, 9])
+    texture.show(values, outside=np.array((0.25, 0.5, 0.75), np.float32))
+    np.testing.assert_array_equal(at(texture, (0.5, 0.5, 0.0), (5.9, 1.5, 0.0)), [[0.5] * 3, [0.25, 0.5, 0.75]])
+    texture.show(values, outside=np.array((0.125,), np.float32))  # of one number
+    np.testing.assert_array_equal(at(texture, (5.9, 1.5, 0.0)), [[0.125] * 3])
+
+
 PERSPECTIVE = "1,0,0,0, 0,1,0,0, 0,0,1,5"  # from z = -5
 
 

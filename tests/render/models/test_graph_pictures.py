@@ -62,6 +62,24 @@ def test_pictures_and_derivatives() -> None:
     np.testing.assert_allclose(state.pictures["roughness"][-1], (NOISE[1:] ** 2).mean(), rtol=1e-5)
 
 
+def test_what_a_scene_shows_has_the_mean_for_what_the_camera_does_not_see() -> None:
+    pictures = graph(Nodes())
+    assert (pictures.colors_of("base_color"), pictures.colors_of("roughness")) == (("Mix/A",), ())
+    shown = pictures.fine(np.array([0.2, 0.3, 1.0, 2.0]))
+    assert shown["roughness"].outside == pytest.approx([(NOISE[1:] ** 2).mean()])  # beside the target nothing counts
+    wanted = [(NOISE[1:] * color + (1.0 - NOISE[1:]) * 0.5).mean() for color in (0.2, 0.3, 1.0)]
+    assert shown["base_color"].outside == pytest.approx(wanted)
+
+
+def test_a_direction_that_nobody_sees_stays_that_of_the_mesh() -> None:
+    def nodes(variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
+        up = np.broadcast_to(np.array((0.0, 0.0, 1.0), np.float32), (2, 2, 3))
+        return Evaluated([{"Normal": up}], np.zeros((2, 2, 3), np.float32), np.zeros((3, 4)))
+
+    pictures = GraphPictures((value("Bump/Strength", 0.5, ("Normal",)),), nodes, ("Normal",))
+    assert pictures.fine(np.array([0.5]))["normal"].outside is None
+
+
 def test_what_is_linear_is_evaluated_twice_and_never_again() -> None:
     nodes = Nodes()
     pictures = graph(nodes)
