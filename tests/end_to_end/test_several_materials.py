@@ -59,7 +59,37 @@ if "mixed" in argv:  # the wall: its paint beside patches of dark ones, which a 
         (mix.outputs[0], output.inputs["Surface"]),
     ):
         tree.links.new(source, sink)
+stops = []
+if "patterned" in argv:  # colours of both in nodes; the ramp of each lies in a group that both have
+    group = bpy.data.node_groups.new("Pattern", "ShaderNodeTree")
+    group.interface.new_socket("Low", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    noise, ramp, mix = (group.nodes.new("ShaderNode" + kind) for kind in ("TexNoise", "ValToRGB", "Mix"))
+    entry, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    mix.data_type, noise.inputs["Scale"].default_value = "RGBA", 2.0
+    place = group.nodes.new("ShaderNodeTexCoord")
+    low, high = ramp.color_ramp.elements
+    low.position, high.position = 0.4, 0.6
+    high.color = (0.8, 0.8, 0.8, 1.0)
+    for source, sink in (
+        (place.outputs["Object"], noise.inputs["Vector"]), (noise.outputs[0], ramp.inputs[0]),
+        (ramp.outputs[0], mix.inputs["Factor"]), (entry.outputs["Low"], mix.inputs[6]), (mix.outputs[2], end.inputs[0]),
+    ):
+        group.links.new(source, sink)
+    mix.inputs[7].default_value = (0.5, 0.5, 0.5, 1.0)  # one value for both, in the file
+    for inputs in nodes:
+        tree = inputs[0].id_data
+        own = tree.nodes.new("ShaderNodeGroup")
+        own.node_tree, own.inputs[0].default_value = group, (0.5, 0.5, 0.5, 1.0)
+        tree.links.new(own.outputs[0], inputs["Base Color"])
+        stops.append(own)
 bpy.ops.wm.save_as_mainfile(filepath=argv[0], copy=True)
+if stops:
+    stops[1].node_tree = group.copy()  # the truth: another one for each
+    lows, highs = ((0.75, 0.2, 0.1, 1.0), (0.25, 0.6, 0.8, 1.0)), ((0.1, 0.4, 0.1, 1.0), (0.7, 0.6, 0.1, 1.0))
+    for own, low, high in zip(stops, lows, highs):
+        own.inputs[0].default_value = low
+        next(n for n in own.node_tree.nodes if n.type == "MIX").inputs[7].default_value = high
 for inputs, color, rough in zip(nodes, ((0.75, 0.2, 0.1, 1.0), (0.25, 0.6, 0.8, 1.0)), (0.35, 0.6)):
     inputs["Base Color"].default_value, inputs["Roughness"].default_value = color, rough
 settings = scene.render.image_settings
@@ -169,6 +199,43 @@ def test_two_pictures_show_both_and_one_of_them_only_the_floor(corner: Path, tmp
         own = json.loads((job / found["folder"] / "result.json").read_text("utf-8"))
         assert own["recovered"]["base_color"] != answer["materials"][[*TRUTH].index(name)]["recovered"]["base_color"]
         np.testing.assert_allclose(own["recovered"]["base_color"], TRUTH[name], atol=0.05)
+
+
+SHOW = """
+import json
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+found = {}
+for name in ("Floor", "Wall"):
+    own = next(n for n in bpy.data.objects[name].active_material.node_tree.nodes if n.type == "GROUP")
+    mix = next(n for n in own.node_tree.nodes if n.type == "MIX")
+    found[name] = {"Group/Low": list(own.inputs[0].default_value)[:3], "Mix/B": list(mix.inputs[7].default_value)[:3]}
+open(argv[1], "w").write(json.dumps(found))
+"""
+INSIDE = {"Floor": ((0.75, 0.2, 0.1), (0.1, 0.4, 0.1)), "Wall": ((0.25, 0.6, 0.8), (0.7, 0.6, 0.1))}
+
+
+def test_colours_inside_the_nodes_of_both_are_found_and_written(tmp_path: Path) -> None:
+    """In two pictures, the first of which does not show the wall; the group that both have becomes one for each."""
+    start, both, side, saved = (tmp_path / name for name in ("start.blend", "both.exr", "side.exr", "fitted.blend"))
+    run_bpy(BUILD, start, both, side, "patterned")
+    done = run_mfo(
+        "blend", start, "--object", "Floor", "--object", "Wall", "--preset", "fast", "--parameters",
+        "roughness, Group/Low, Wall Paint/Mix/B, Floor Paint/Mix/B",
+        "--reference", f"{side}@camera=Side", "--reference", f"{both}@camera=Camera",
+        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    assert [each["verdict"] for each in done.answer["materials"]] == ["same", "same"]
+    for found in done.answer["materials"]:
+        for name, truth in zip(("Group/Low", "Mix/B"), INSIDE[found["object"]], strict=True):
+            np.testing.assert_allclose(found["recovered"][name], truth, atol=0.03)
+            assert found["certainty"][name]["level"] == "determined"
+    assert not list((tmp_path / "job").rglob("*.blend"))
+    run_bpy(SHOW, saved, tmp_path / "read.json")
+    written = json.loads((tmp_path / "read.json").read_text("utf-8"))
+    for found in done.answer["materials"]:
+        for name, value in written[found["object"]].items():
+            assert value == pytest.approx(found["recovered"][name], abs=1e-5)
 
 
 def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(tmp_path: Path) -> None:
