@@ -142,18 +142,13 @@ def export_job(
 def _check_names(obj: bpy.types.Object, fit: dict[str, Any], targets: Sequence[FittedSlot]) -> None:
     """Raise `ExportError` where `fit` names a value that there is not, or that cannot be fitted."""
     fitted = targets or [FittedSlot.active(obj)]
-    for each, own in zip(fitted, _fits_of(fitted, targets, fit), strict=True):
+    for each, own in zip(fitted, fits_of_each(fitted, fit, several=bool(targets)), strict=True):
         wanted_values(each, own, Findings())
 
 
 def _moves(first: Mapping[Any, Any], other: Mapping[Any, Any]) -> bool:
     """Whether a value that two pictures have is not the same in both."""
     return any(first[name] != other[name] for name in first.keys() & other.keys())
-
-
-def _fits_of(fitted: Sequence[FittedSlot], targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dict[str, Any]]:
-    """What the fit asks of each material."""
-    return fits_of_each(targets, fit) if targets else [fit for _ in fitted]
 
 
 def export_steps(
@@ -245,7 +240,7 @@ def partial_export(
     findings = Findings(of_mitsuba=fit.get("model") == MITSUBA)
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
-    asked = _fits_of(fitted, targets, fit)
+    asked = fits_of_each(fitted, fit, several=bool(targets))
     wanted = [wanted_values(each, own, findings) for each, own in zip(fitted, asked, strict=True)]
     may_miss = bool(targets) and several  # one of the materials, in this picture
     with probe_for(fitted, always=any(each.values for each in wanted)) as probe:
@@ -271,7 +266,7 @@ def partial_export(
             picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
-            inside = [_inside_of(context, each, own) for each, own in zip(fitted, wanted, strict=True)]
+            inside = [request_of(context, each, own.values) for each, own in zip(fitted, wanted, strict=True)]
             with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
@@ -349,12 +344,6 @@ def _read_values(
     for said in animation_notes(named, context.scene.frame_current):
         findings.note(said, explains=False)
     return fit
-
-
-def _inside_of(context: bpy.types.Context, fitted: FittedSlot, wanted: WantedValues) -> dict[str, Any]:
-    """What the entry `graph` of a material's request has besides for values inside its nodes."""
-    target = target_shader(fitted.material, fitted.leaf)
-    return request_of(context, fitted, target, wanted.values) if wanted.values and target is not None else {}
 
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:

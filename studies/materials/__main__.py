@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rooms of six unknown materials, fitted together to one picture by Cycles and judged in Cycles: one row for each.
 
-    python -m studies.materials OUT.jsonl --numbers 0-9 --size 96 --preset balanced
+    python -m studies.materials OUT.jsonl --numbers 0-9 --size 96 --preset balanced [--nodes]
 
 A row has for each material the mean FLIP of Cycles' picture of the fitted room and that of the floor, a second picture
 of the truth: both against the reference, on the pixels that see the material. The goal is a difference of at most 0.01.
+With `--nodes` what is fitted is inside nodes, and a row has the error, deviation and level of each value, too.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ def main() -> None:
     parser.add_argument("--numbers", default="0-9", help="first-last")
     parser.add_argument("--size", type=int, default=96, help="pixels along a side")
     parser.add_argument("--preset", default="balanced")
+    parser.add_argument("--nodes", action="store_true", help="values inside nodes")
     chosen = parser.parse_args()
     first, last = map(int, chosen.numbers.split("-"))
     text = chosen.rows.read_text("utf-8") if chosen.rows.exists() else ""
@@ -54,7 +56,7 @@ def main() -> None:
         if number in {row["number"] for row in rows}:
             continue
         with tempfile.TemporaryDirectory() as folder:
-            rows.append(measure(number, Path(folder), chosen.size, chosen.preset))
+            rows.append(measure(number, Path(folder), chosen.size, chosen.preset, nodes=chosen.nodes))
         with chosen.rows.open("a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")
     print(summary(rows))

@@ -22,14 +22,17 @@ OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
 ROOMS = "studies.materials.scene"
 
 
-def measure(number: int, folder: Path, size: int, preset: str) -> dict[str, Any]:
-    """The row of one room."""
-    run_module(ROOMS, "build", number, folder, "--size", size)
+def measure(number: int, folder: Path, size: int, preset: str, *, nodes: bool = False) -> dict[str, Any]:
+    """The row of one room, whose values are inside `nodes` or of sockets alone."""
+    run_module(ROOMS, "build", number, folder, "--size", size, *(["--nodes"] if nodes else []))
+    truth = json.loads((folder / "truth.json").read_text("utf-8"))
+    names = [f"{name}/{value}" for name, values in truth.items() for value in values]
     pictures = {}
     for name, file, seed in (("reference", "truth", 3), ("floor", "truth", 4)):
         pictures[name] = folder / f"{name}.exr"
         run_module(ROOMS, "render", folder / f"{file}.blend", pictures[name], seed)
     words = [word for name in OBJECTS for word in ("--object", name)]
+    words += ["--parameters", ", ".join(names)] if nodes else []
     began, cpu = time.monotonic(), _child_seconds()
     result = run_module(
         "mfo_backend", "blend", folder / "start.blend", *words, "--reference", pictures["reference"],
@@ -41,6 +44,7 @@ def measure(number: int, folder: Path, size: int, preset: str) -> dict[str, Any]
     run_module(ROOMS, "render", folder / "fitted.blend", pictures["fitted"], 5)
     images = {name: read_image(path, None) for name, path in pictures.items()}
     row: dict[str, Any] = {"number": number, "size": size, "preset": preset, "seconds": seconds, "cpu": cpu}
+    row["nodes"], row["truth"] = nodes, truth
     row["fit_seconds"], row["verdict"], row["materials"] = result["seconds"], result["verdict"], {}
     for found in result["materials"]:
         seen = read_image(folder / "job" / found["folder"] / "pictures" / "counted.png", None).pixels[..., 0] > 0.5
@@ -49,8 +53,22 @@ def measure(number: int, folder: Path, size: int, preset: str) -> dict[str, Any]
             "pixels": int(seen.sum()), "floor": floor, "fitted": fitted, "verdict": found["verdict"],
             "recovered": found["recovered"],
         }  # fmt: skip
-    row["truth"] = json.loads((folder / "truth.json").read_text("utf-8"))
+        if nodes:
+            row["materials"][found["object"]]["values"] = _errors(truth[found["object"]], found)
     return row
+
+
+def _errors(truth: dict[str, Any], found: dict[str, Any]) -> dict[str, list[Any]]:
+    """Of each value its error and its deviation as shares of the range it is fitted in, and how sure it is called."""
+    errors = {}
+    for name, value in truth.items():
+        key = name if "/" in name else name.lower().replace(" ", "_")
+        low, high = found["bounds"][key]
+        error = np.abs(np.subtract(found["recovered"][key], value)).max() / (high - low)
+        sure = found["certainty"].get(key, {"sd": [0.0], "level": ""})
+        spread = max((sd for sd in sure["sd"] if sd is not None), default=0.0) / (high - low)
+        errors[name] = [round(float(error), 4), round(spread, 5), sure["level"]]
+    return errors
 
 
 def _flip(reference: Image, test: Image, mask: np.ndarray) -> float:

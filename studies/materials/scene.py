@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rooms of `studies.materials`, run by a Python with `bpy`.
 
-    python -m studies.materials.scene build NUMBER FOLDER [--size PIXELS]
+    python -m studies.materials.scene build NUMBER FOLDER [--size PIXELS] [--nodes]
     python -m studies.materials.scene render FILE PICTURE SEED [--samples COUNT]
 
 `build` writes truth.blend, start.blend and truth.json: a room of six materials, under a lamp in a shade and one or two
-others. `render` shows a file in Cycles.
+others. With `--nodes` each has a graph of `studies.graphs`, whose values are drawn, instead of those of sockets alone.
+`render` shows a file in Cycles.
 """
 
 from __future__ import annotations
@@ -19,10 +20,14 @@ from typing import Any
 import bpy
 from mathutils import Vector  # pyright: ignore[reportMissingImports]  # part of bpy
 
+from ..graphs.materials import GRAPHS
+from ..graphs.values import FITTED, Drawn
+
+NODES = {"Floor": "ramp", "Walls": "bump", "Chest": "checker", "Ball": "hue", "Vase": "roughness", "Shade": "mixed"}
 OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
 
 
-def build(number: int, folder: Path, size: int) -> None:
+def build(number: int, folder: Path, size: int, *, nodes: bool = False) -> None:
     """Write both files and the truth."""
     folder.mkdir(parents=True, exist_ok=True)
     draw = random.Random(number)
@@ -38,6 +43,12 @@ def build(number: int, folder: Path, size: int) -> None:
     _lights(draw)
     _camera()
     inputs = {name: _material(scene.objects[name], name) for name in OBJECTS}
+    write = _write_nodes if nodes else _write_sockets
+    (folder / "truth.json").write_text(json.dumps(write(inputs, folder, draw)), "utf-8")
+
+
+def _write_sockets(inputs: dict[str, bpy.types.NodeInputs], folder: Path, draw: random.Random) -> dict[str, Any]:
+    """Write both files with values of sockets; returns the truth."""
     for name in OBJECTS:
         for socket, value in _drawn_start(draw).items():
             inputs[name][socket].default_value = value
@@ -47,7 +58,24 @@ def build(number: int, folder: Path, size: int) -> None:
         for socket, value in sockets.items():
             inputs[name][socket].default_value = value
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "truth.blend"), copy=True)
-    (folder / "truth.json").write_text(json.dumps(truth), "utf-8")
+    return truth
+
+
+def _write_nodes(inputs: dict[str, bpy.types.NodeInputs], folder: Path, draw: random.Random) -> dict[str, Any]:
+    """The same with values inside nodes, and of sockets without a link."""
+    drawn = {}
+    for name, graph in NODES.items():
+        material = bpy.data.materials[name]
+        shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        GRAPHS[graph](material.node_tree, shader)
+        drawn[name] = Drawn(bpy.context.scene.objects[name], shader, FITTED[graph])
+    truth = {name: each.draw(draw) for name, each in drawn.items()}
+    starts = {name: each.draw(draw, near=truth[name]) for name, each in drawn.items()}
+    for file, values in (("truth", truth), ("start", starts)):
+        for name, each in drawn.items():
+            each.put(values[name])
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{file}.blend"), copy=True)
+    return truth
 
 
 def render(file: Path, picture: Path, seed: int, samples: int) -> None:
@@ -157,6 +185,7 @@ if __name__ == "__main__":
     one.add_argument("number", type=int)
     one.add_argument("folder", type=Path)
     one.add_argument("--size", type=int, default=96)
+    one.add_argument("--nodes", action="store_true")
     one = commands.add_parser("render")
     one.add_argument("file", type=Path)
     one.add_argument("picture", type=Path)
@@ -164,6 +193,6 @@ if __name__ == "__main__":
     one.add_argument("--samples", type=int, default=256)
     chosen = parser.parse_args()
     if chosen.command == "build":
-        build(chosen.number, chosen.folder, chosen.size)
+        build(chosen.number, chosen.folder, chosen.size, nodes=chosen.nodes)
     else:
         render(chosen.file, chosen.picture, chosen.seed, chosen.samples)

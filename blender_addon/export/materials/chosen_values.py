@@ -128,12 +128,11 @@ def _numbers_of_leaves(target: TargetShader) -> list[int]:
     return [position for position, leaf in enumerate(target.others) if leaf.node.bl_idname in KINDS]
 
 
-def request_of(
-    context: bpy.types.Context, fitted: FittedSlot, target: TargetShader, values: Sequence[GraphValue]
-) -> dict[str, Any]:
-    """What the entry `graph` of request.json has besides for these values."""
-    material = fitted.material
-    assert material is not None  # its values were found
+def request_of(context: bpy.types.Context, fitted: FittedSlot, values: Sequence[GraphValue]) -> dict[str, Any]:
+    """What the entry `graph` of request.json has besides for these values; nothing where there are none."""
+    material, target = fitted.material, target_shader(fitted.material, fitted.leaf)
+    if not values or material is None or target is None:
+        return {}
     tree = material.node_tree
     used = dict.fromkeys(name for value in values for name in value.sockets)
     numbers = _numbers_of_leaves(target)

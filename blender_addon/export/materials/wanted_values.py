@@ -40,9 +40,11 @@ def wanted_values(fitted: FittedSlot, fit: dict[str, Any], findings: Findings, l
     return WantedValues(values, of_mix, of_sockets)
 
 
-def fits_of_each(targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dict[str, Any]]:
-    """What a fit of several materials asks of each: a name is for all that have such a value, or for the one whose name
-    and a slash are before it, as in ``"Paint/Color Ramp/Stop 0"`` or ``"Paint/Roughness"``.
+def fits_of_each(fitted: Sequence[FittedSlot], fit: dict[str, Any], *, several: bool) -> list[dict[str, Any]]:
+    """What a fit asks of each material.
+
+    Of `several` a name is for all that have such a value, or for the one whose name and a slash are before it, as in
+    ``"Paint/Color Ramp/Stop 0"`` or ``"Paint/Roughness"``.
 
     Raises
     ------
@@ -50,12 +52,12 @@ def fits_of_each(targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dic
         If none of them has a value of that name.
     """
     asked = fit.get("parameters", "all")
-    if isinstance(asked, str):
-        return [fit for _ in targets]
-    inside = [_names_inside(each) for each in targets]
-    own: list[list[str]] = [[] for _ in targets]
+    if not several or isinstance(asked, str):
+        return [fit for _ in fitted]
+    inside = [_names_inside(each) for each in fitted]
+    own: list[list[str]] = [[] for _ in fitted]
     for name in map(str, asked):
-        of_one = {number: rest for number, each in enumerate(targets) if (rest := _after_material(each, name))}
+        of_one = {number: rest for number, each in enumerate(fitted) if (rest := _after_material(each, name))}
         having = [number for number, names in enumerate(inside) if plain_name(name) in names]
         if of_one:  # the longest name, where a material is called as another one and more
             number = min(of_one, key=lambda n: len(of_one[n]))
@@ -63,7 +65,7 @@ def fits_of_each(targets: Sequence[FittedSlot], fit: dict[str, Any]) -> list[dic
         elif "/" in name and not having:
             raise ExportError(_nowhere(name, inside))
         else:
-            for number in having if "/" in name else range(len(targets)):
+            for number in having if "/" in name else range(len(fitted)):
                 own[number].append(name)
     return [fit | {"parameters": list(dict.fromkeys(names))} for names in own]
 
