@@ -24,12 +24,17 @@ from .start import Started
 from .where_to_look import all_groups, fewer_groups, finer_grid, solution_grid
 
 EVALUATIONS_EXACT = 15
-MOST_RECORDINGS = 3  # at the solution, until it holds still
+MOST_RECORDINGS = 5  # at the solution, until it holds still
 # After a solve its recording is too old if the tiles changed by this share, or if its own noise grew by this factor.
 # The first is what mends fits that began far away, though most of those keep their samples; the second finds a lobe
 # that became narrow in few tiles.
 MOVED = 0.15
 NOISIER = 1.25
+# The same where a part of the light comes over other surfaces, and may come from the target itself: that part is still
+# what the material gave which the recording was made for. Light walls of a room, 4.1 % off and called determined
+# without it, are 0.8 % off; with twice as much 1.1 % (docs/notebook/several_materials.md). Smaller: recordings that
+# follow noise.
+OWN_LIGHT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +132,17 @@ def _recorded_near(
         few = _problems(recording, start, make, weigh).refined.few
         x = solve(setting, few, start, NEAR_EVALUATIONS, stage=stage).x
         before, after = few.own_noise(start), few.own_noise(x)
-        moved = few.change(start, x) > MOVED or after > NOISIER * before
+        moved = _is_old(few.change(start, x), setting.scene.needs.indirect) or after > NOISIER * before
         finer = finer_grid(grid, after, few.own_share(x), plan, finest)
         if not (moved or finer > grid) or number == last or setting.course.should_stop():
             return recording, x, grid
         del few, recording
         start, grid = x, finer
+
+
+def _is_old(change: float, indirect: float) -> bool:
+    """Whether tiles that changed by a share ask for a new recording, given the light over other surfaces."""
+    return change > MOVED or change * indirect / (1.0 + indirect) > OWN_LIGHT
 
 
 def _problems(

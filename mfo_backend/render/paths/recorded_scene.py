@@ -55,11 +55,15 @@ DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, an
 
 @dataclass(frozen=True)
 class SceneNeeds:
-    """What a recording of this scene has to hold, and why something is left out (sentences for the report)."""
+    """What a recording of this scene has to hold, and why something is left out (sentences for the report).
+
+    `indirect` is the light over other surfaces that it holds, relative to the direct light.
+    """
 
     sampled: bool
     depth: int
     notes: tuple[str, ...]
+    indirect: float = 0.0
 
 
 class RecordedScene:
@@ -135,7 +139,7 @@ class RecordedScene:
         if share < NEGLIGIBLE_INDIRECT:
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, DIRECT, (note,))
-        return SceneNeeds(True, depth, ())
+        return SceneNeeds(True, depth, (), share)
 
     def record(
         self,

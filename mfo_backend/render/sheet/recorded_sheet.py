@@ -74,7 +74,7 @@ class RecordedSheet:
         found = [scene.needs for scene in self._scenes]
         depth = max(needs.depth for needs in found)
         notes = found[0].notes if depth == 2 else ()
-        return SceneNeeds(any(needs.sampled for needs in found), depth, notes)
+        return SceneNeeds(any(n.sampled for n in found), depth, notes, max(n.indirect for n in found))
 
     def record(
         self,

@@ -63,6 +63,16 @@ def test_a_recording_that_is_too_old_is_made_anew(refined):
         assert error < 0.3 * stale, guards
 
 
+def test_light_that_the_target_gives_itself_makes_a_recording_old_sooner():
+    from mfo_backend.fit.recorded.refine import _is_old
+
+    # nothing over other surfaces; half as much as directly, a third of all; as in a closed room of light walls
+    limits = {
+        indirect: [c for c in (0.01, 0.02, 0.04, 0.14, 0.16) if _is_old(c, indirect)] for indirect in (0.0, 0.5, 2.0)
+    }
+    assert limits == {0.0: [0.16], 0.5: [0.04, 0.14, 0.16], 2.0: [0.02, 0.04, 0.14, 0.16]}
+
+
 def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):
     coarse = RecordedPlan(grid_last=2, too_noisy=NEVER, most_own=1.0)
     noisy, recordings = refined(coarse, MOVED=NEVER, NOISIER=NEVER)
