@@ -118,8 +118,7 @@ class FitOptions:
                 )
         except ExportError as error:
             raise FitError(str(error)) from error
-        picture = folder / report.request["reference"]["path"]
-        return PreparedFit(python, folder, name, uids, picture, report.notes, is_new)
+        return PreparedFit(python, folder, name, uids, report.notes, is_new)
 
     def _fit(
         self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object, targets: Sequence[FittedSlot]

@@ -25,7 +25,7 @@ class Compare:
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
         if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
             draw_sentence(layout, context, f"Of material {runtime.material}", "MATERIAL")
-        draw_pictures(layout, context, ("reference", "start", "result"), clickable=True)
+        draw_pictures(layout, context, ("reference", "result", "start"), clickable=True)
         _draw_each_picture(layout)
         column = layout.column(align=True)
         row = buttons_side_by_side(column, context, "Side by Side", "Split")

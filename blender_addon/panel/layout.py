@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pieces the panels are made of: sentences that wrap, buttons beside or below each other, pictures with a name below.
+"""Pieces the panels are made of: sentences that wrap, buttons beside or below each other, pictures with their names.
 
 Blender cuts a text that is wider than its label or button, so what stands beside what is chosen by the texts' widths.
 All widths are in pixels at a scale of 1. What margins and icons take was measured in windows of Blender 5.2: texts of
@@ -24,6 +24,8 @@ LABEL = 3.0  # margins of a label
 BOX = 16.0  # margins of a box
 _AROUND = 52.0  # margins of a panel and the tabs of the sidebar
 _LEAST = 100.0  # of a panel in a region that has no width yet
+_LARGEST = 10.0  # rows that a picture takes
+_LARGEST_PAIR = 15.0  # rows that two take: no more than a thumbnail of a fit that runs has pixels
 _LABELS = {
     "current": "Preliminary",
     "cycles": "In Cycles",
@@ -96,27 +98,58 @@ def names_of(data: bpy.types.bpy_struct, choice: str) -> list[str]:
 def draw_pictures(
     layout: bpy.types.UILayout, context: bpy.types.Context, names: tuple[str, ...], *, clickable: bool = False
 ) -> None:
-    """Pictures side by side; with `clickable` their names are buttons that show them at full size."""
-    row = layout.row(align=True)
-    scale = _icon_scale(context, len(names))
+    """Pictures, of which the first two are compared; with `clickable` their names are buttons that show each in full.
+
+    Blender draws a picture into a square. The two share one where that leaves less of it empty, as large as the panel
+    is wide, and of the others there are the buttons; else all have one each, side by side.
+    """
+    pair = previews.pair(*names[:2])
+    if pair is None:
+        row, labels = layout.row(align=True), _labels(context, names)
+        for name, label in zip(names, labels, strict=True):
+            column = row.column(align=True)
+            if previews.icon(name):
+                column.template_icon(icon_value=previews.icon(name), scale=_rows(context, len(names), _LARGEST))
+            _draw_name(column, name, label, clickable=clickable)
+        return
+    icon, is_stacked = pair
+    column, scale = layout.column(align=True), _rows(context, 1, _LARGEST_PAIR)
+    if is_stacked:
+        first, second = _labels(context, names[:1]) + _labels(context, names[1:2])
+        _draw_name(column, names[0], first, clickable=clickable)
+        column.template_icon(icon_value=icon, scale=scale)
+        _draw_name(column, names[1], second, clickable=clickable)
+    else:
+        column.template_icon(icon_value=icon, scale=scale)
+        row = column.row(align=True)
+        for name, label in zip(names, _labels(context, names[:2]), strict=False):
+            _draw_name(row.column(), name, label, clickable=clickable)
+    if clickable:
+        row = layout.row(align=True)
+        for name, label in zip(names[2:], _labels(context, names[2:]), strict=True):
+            _draw_name(row, name, label, clickable=True)
+
+
+def _labels(context: bpy.types.Context, names: tuple[str, ...]) -> list[str]:
+    """What pictures beside each other are called, shorter where that would be cut."""
     labels = [translated(_LABELS.get(name, name.title())) for name in names]
-    if not fits(context, room(context) / len(names) - BUTTON, *labels):
-        labels = [translated(_SHORT.get(name, name.title())) for name in names]
-    for name, label in zip(names, labels, strict=True):
-        column = row.column(align=True)
-        if previews.icon(name):
-            column.template_icon(icon_value=previews.icon(name), scale=scale)
-        if clickable:
-            column.operator("mfo.show_pictures", text=label).show = name
-        else:
-            line = column.row()
-            line.alignment = "CENTER"
-            line.label(text=label)
+    if fits(context, room(context) / len(names) - BUTTON, *labels):
+        return labels
+    return [translated(_SHORT.get(name, name.title())) for name in names]
 
 
-def _icon_scale(context: bpy.types.Context, pictures: int) -> float:
-    """Height of an icon, in rows of the interface, that is as wide as its share of the region: no empty bands."""
-    return min(max(room(context) / pictures / UNIT, 2.0), 10.0)
+def _draw_name(layout: bpy.types.UILayout, name: str, label: str, *, clickable: bool) -> None:
+    if clickable:
+        layout.operator("mfo.show_pictures", text=label).show = name
+        return
+    line = layout.row()
+    line.alignment = "CENTER"
+    line.label(text=label)
+
+
+def _rows(context: bpy.types.Context, pictures: int, largest: float) -> float:
+    """Height of a square that is as wide as its share of the panel, in rows of the interface."""
+    return min(max(room(context) / pictures / UNIT, 2.0), largest)
 
 
 def draw_numbers(layout: bpy.types.UILayout, rows: bpy.types.bpy_prop_collection) -> None:

@@ -4,21 +4,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import bpy.utils.previews
 import numpy as np
+from numpy.typing import NDArray
 
-from ..export.files.png_file import write_png
-from ..process.temporary_folder import temporary_folder
+from .thumbnail import Thumbnail, is_wide, opaque, paired, read_thumbnail
+
+# names of pictures that are compared with each other
+PAIRS = (("reference", "current"), ("reference", "result"), ("reference", "cycles"), ("cycles", "engine"))
 
 _collection: Any = None
 _shown: dict[str, str] = {}
+_thumbnails: dict[str, Thumbnail] = {}
 _serial = 0
-_is_warm = False
 _SWATCH = 16  # pixels
-_SMALL = 300_000  # bytes of a PNG that is read within some milliseconds
 
 
 def register() -> None:
@@ -30,44 +33,53 @@ def register() -> None:
 def unregister() -> None:
     """Free every icon."""
     global _collection
-    _shown.clear()
+    clear()
     if _collection is not None:
         bpy.utils.previews.remove(_collection)
         _collection = None
 
 
-def warm_up() -> None:
-    """Load a picture of one pixel: the first picture of a session costs Blender some 50 ms more than any other.
+def show(name: str, pictures: Path) -> None:
+    """Make the picture of this name in a job's folder of pictures an icon, replacing an earlier one.
 
-    An operator can afford them, the timer that shows the pictures of a running fit cannot.
+    A thumbnail is there at once. Where there is none, Blender loads the picture itself after its first draw and shows
+    an empty place meanwhile.
     """
-    global _is_warm
-    if _collection is None or bpy.app.background or _is_warm:
+    if _collection is None or bpy.app.background:
         return
-    _is_warm = True
-    with temporary_folder("pixel") as folder:
-        path = folder / "pixel.png"
-        write_png(path, np.zeros((1, 1, 3), np.uint8))
-        show("pixel", path, now=True)
+    with suppress(OSError):
+        show_thumbnail(name, pictures / "thumbnails" / f"{name}.ppm")
+        return
+    path = pictures / f"{name}.png"
+    if path.is_file():
+        _thumbnails.pop(name, None)
+        key = _next_key(name)
+        _collection.load(key, str(path), "IMAGE")
+        _replace(name, key)
 
 
-def show(name: str, path: Path, *, now: bool = False) -> None:
-    """Make the picture at `path` the icon called `name`, replacing an earlier one.
+def show_thumbnail(name: str, path: Path) -> None:
+    """Make a thumbnail the icon called `name`, and one with each picture that it is compared with.
 
-    Blender loads it after its first draw and shows an empty place meanwhile; with `now` a small one is loaded at once.
+    Raises
+    ------
+    OSError
+        If it cannot be read.
     """
-    global _serial
-    if _collection is None or bpy.app.background or not path.is_file():
-        return
-    _serial += 1
-    key = f"{name} {_serial}"  # a new key each time: Blender keeps the picture of a known one
-    picture = _collection.load(key, str(path), "IMAGE")
-    if now and path.stat().st_size < _SMALL:
-        _ = picture.image_size[0]  # asking loads it
-    old = _shown.get(name)
-    _shown[name] = key
-    if old is not None:
-        del _collection[old]
+    picture = read_thumbnail(path)
+    _thumbnails[name] = picture
+    _make(name, opaque(picture))
+    for first, second in PAIRS:
+        if name in (first, second) and first in _thumbnails and second in _thumbnails:
+            both = paired(_thumbnails[first], _thumbnails[second])
+            if both is not None:
+                _make(f"{first} {second}", both)
+
+
+def pair(first: str, second: str) -> tuple[int, bool] | None:
+    """Icon number of two pictures in one, and whether the first is above (else left); None where there is no such icon."""
+    number = icon(f"{first} {second}")
+    return (number, is_wide(_thumbnails[first])) if number and first in _thumbnails else None
 
 
 def swatch(color: Sequence[float]) -> str:
@@ -90,6 +102,7 @@ def _linear_to_srgb(value: float) -> float:
 def clear() -> None:
     """Forget all icons."""
     _shown.clear()
+    _thumbnails.clear()
     if _collection is not None:
         _collection.clear()
 
@@ -98,3 +111,28 @@ def icon(name: str) -> int:
     """Icon number for `UILayout.template_icon`, 0 where there is none."""
     key = _shown.get(name)
     return _collection[key].icon_id if _collection is not None and key in _collection else 0
+
+
+def _make(name: str, pixels: NDArray[np.uint8]) -> None:
+    """An icon of a picture (height, width, 4), first row at the top."""
+    if _collection is None or bpy.app.background:
+        return
+    key = _next_key(name)
+    made = _collection.new(key)
+    made.image_size = pixels.shape[1::-1]
+    made.image_pixels.foreach_set(np.ascontiguousarray(pixels[::-1]).view(np.int32).ravel())
+    _replace(name, key)
+
+
+def _next_key(name: str) -> str:
+    """A new key each time: Blender keeps the picture of a known one."""
+    global _serial
+    _serial += 1
+    return f"{name} {_serial}"
+
+
+def _replace(name: str, key: str) -> None:
+    old = _shown.get(name)
+    _shown[name] = key
+    if old is not None:
+        del _collection[old]

@@ -45,7 +45,7 @@ def show(found: JobResult, uid: int) -> None:
         if note not in runtime.messages:
             add_message(runtime, note, "INFO")
     for name in PICTURES:
-        previews.show(name, found.folder / "pictures" / f"{name}.png")
+        previews.show(name, found.folder / "pictures")
 
 
 def show_all(found: list[tuple[JobResult, int]]) -> None:

@@ -66,7 +66,7 @@ def check_result(job: Path, material: str, python: Path) -> None:
         runtime.cycles_flip = flips[0]
         if shown_result.result is not None and shown_result.result.folder == job:
             for name in shown_result.CHECKED[: 2 * len(flips)]:
-                previews.show(name, job / "pictures" / f"{name}.png")
+                previews.show(name, job / "pictures")
 
     folder = make_folder("check")
     engine = engine_name(bpy.context.scene.render.engine)

@@ -21,7 +21,6 @@ class PreparedFit:
     folder: Path
     material_name: str
     uids: tuple[int, ...]
-    reference: Path
     notes: tuple[str, ...]
     is_new: bool
 

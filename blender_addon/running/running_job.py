@@ -76,8 +76,6 @@ def start(fit: PreparedFit, *, timer: bool) -> None:
     shown_result.clear(runtime)
     runtime.state, runtime.material, runtime.job_folder = "RUNNING", fit.material_name, str(fit.folder)
     runtime.progress_text = "Starting"
-    previews.warm_up()
-    previews.show("reference", fit.reference)
     for note in fit.notes:
         add_message(runtime, note, "INFO")
     if timer and not bpy.app.timers.is_registered(_tick):
@@ -211,9 +209,9 @@ def _handle(job: RunningJob, event: Event) -> None:
             if not (job.process.cancelling or _looks_for_a_start(event)):  # another stage may follow, and will say so
                 runtime.progress_text = "Checking the values"
         elif event["event"] == "preview":
-            _show_preview(job, "current", event["path"])
-            if "difference" in event:
-                _show_preview(job, "difference", event["difference"])
+            for key, name in (("path", "current"), ("reference", "reference"), ("difference", "difference")):
+                if key in event:
+                    _show_preview(job, name, event[key])
     except (KeyError, TypeError, ValueError, OverflowError, OSError, RuntimeError):
         return  # a newer backend says less or more than we know; its result is what counts
     redraw()
@@ -222,7 +220,7 @@ def _handle(job: RunningJob, event: Event) -> None:
 def _show_preview(job: RunningJob, name: str, relative: str) -> None:
     path = (job.process.folder / relative).resolve()
     if path.is_relative_to(job.process.folder.resolve()):
-        previews.show(name, path, now=True)
+        previews.show_thumbnail(name, path)
 
 
 def progress_text(event: Event) -> str:

@@ -11,36 +11,35 @@ from ..metrics.flip.flip_error import flip_error
 from ..types.event import PREVIEW_SIDE
 from ..types.image import Encoding, Image, Pixels
 from .difference_map import magma_counted
-from .picture import displayed, png_bytes
+from .picture import block_side_within, displayed, thumbnail_bytes
 
 LARGEST_MAP = 128  # FLIP of this many takes a fifth of that of a 256x256 picture
 
 
 class LivePictures:
-    """PNGs of scene-linear pictures of the size of `reference`, averaged over blocks of pixels."""
+    """Thumbnails of scene-linear pictures of the size of `reference`, averaged over blocks of pixels."""
 
     def __init__(self, reference: Image, view: View) -> None:
         self._view = view
-        self._reference = _small(reference, LARGEST_MAP)
-        side = _side(reference, LARGEST_MAP)
+        self._reference = reference
+        self._compared = _small(reference, LARGEST_MAP)
+        side = block_side_within(reference.pixels.shape, LARGEST_MAP)
         self._counts = None if reference.counts is None else full_blocks(reference.counts, side)
+
+    def reference(self) -> bytes:
+        """The reference under the view, as large as `current`."""
+        return thumbnail_bytes(displayed(_small(self._reference, PREVIEW_SIDE), self._view))
 
     def current(self, pixels: Pixels) -> bytes:
         """The picture under the view, PREVIEW_SIDE wide or high at most."""
-        return png_bytes(displayed(_small(Image(pixels, Encoding.LINEAR), PREVIEW_SIDE), self._view))
+        return thumbnail_bytes(displayed(_small(Image(pixels, Encoding.LINEAR), PREVIEW_SIDE), self._view))
 
     def difference(self, pixels: Pixels) -> bytes:
         """The FLIP map of pictures averaged to LARGEST_MAP; for the eye, its mean is not the FLIP of the picture."""
         test = _small(Image(np.nan_to_num(pixels), Encoding.LINEAR), LARGEST_MAP)
-        return png_bytes(magma_counted(flip_error(self._reference, test, display=self._view).map, self._counts))
+        return thumbnail_bytes(magma_counted(flip_error(self._compared, test, display=self._view).map, self._counts))
 
 
 def _small(image: Image, largest: int) -> Image:
     """Means over square blocks, so that no side is above `largest`; what does not fill a block is left out."""
-    return block_means(image, _side(image, largest))
-
-
-def _side(image: Image, largest: int) -> int:
-    """Pixels along each side of a block; a strip thinner than that stays as it is."""
-    side = -(-max(image.height, image.width) // largest)
-    return 1 if side > min(image.height, image.width) else side
+    return block_means(image, block_side_within(image.pixels.shape, largest))

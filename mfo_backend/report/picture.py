@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures as a user sees them: Blender's view transform Standard, then 8-bit sRGB PNG."""
+"""Pictures as a user sees them: display values under the scene's view, as files with 8 bits a channel."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics.display.tone_mapping import View
+from ..metrics.flip.block_means import block_means
 from ..types.image import Encoding, Image, Pixels
+
+THUMBNAIL_SIDE = 512  # pixels at most: a panel of the usual width on a screen of twice the usual density
 
 
 def displayed(image: Image, view: View) -> Pixels:
@@ -26,7 +29,23 @@ def displayed_linear(pixels: Pixels, view: View) -> Pixels:
 
 def png_bytes(display: Pixels) -> bytes:
     """An 8-bit PNG of display values (height, width, 3) in [0, 1]."""
-    return _png(np.rint(np.clip(display, 0.0, 1.0) * 255).astype(np.uint8))
+    return _png(_levels(display))
+
+
+def thumbnail_bytes(display: Pixels, largest: int = THUMBNAIL_SIDE) -> bytes:
+    """A binary PPM of display values (height, width, 3) in [0, 1], over blocks of pixels so that no side is above `largest`.
+
+    Its pixels stand there as they are: who shows it needs no library.
+    """
+    small = _levels(block_means(Image(display, Encoding.SRGB), block_side_within(display.shape, largest)).pixels)
+    height, width = small.shape[:2]
+    return b"P6 %d %d 255\n" % (width, height) + small.tobytes()
+
+
+def block_side_within(shape: tuple[int, ...], largest: int) -> int:
+    """Pixels along each side of the blocks; a strip thinner than that stays as it is."""
+    side = -(-max(shape[:2]) // largest)
+    return 1 if side > min(shape[:2]) else side
 
 
 def mask_png(mask: NDArray[np.bool_]) -> bytes:
@@ -40,6 +59,10 @@ def mask_from_png(data: bytes) -> NDArray[np.bool_]:
 
     with Pillow.open(io.BytesIO(data)) as picture:
         return np.asarray(picture.convert("L")) > 127
+
+
+def _levels(display: Pixels) -> NDArray[np.uint8]:
+    return np.rint(np.clip(display, 0.0, 1.0) * 255).astype(np.uint8)
 
 
 def _png(values: NDArray[np.uint8]) -> bytes:

@@ -31,18 +31,31 @@ def write_interpreter(path: Path) -> Path:
     return path
 
 
+def disc(colour: tuple[int, int, int], width: int, height: int) -> list[bytes]:
+    """Rows of a picture with a disc of one 8-bit sRGB colour on grey."""
+
+    def inside(x: int, y: int) -> bool:
+        return (x - width / 2) ** 2 + (y - height / 2) ** 2 < (min(width, height) * 0.4) ** 2
+
+    return [b"".join(bytes(colour if inside(x, y) else (90, 90, 90)) for x in range(width)) for y in range(height)]
+
+
+def thumbnail(pictures: Path, name: str, colour: tuple[int, int, int], size: tuple[int, int] = (96, 64)) -> str:
+    """The same as a thumbnail in a job's folder of pictures; returns its path from the job's."""
+    path = pictures / "thumbnails" / f"{name}.ppm"
+    path.parent.mkdir(exist_ok=True)
+    path.with_suffix(".tmp").write_bytes(b"P6 %d %d 255\n" % size + b"".join(disc(colour, *size)))
+    os.replace(path.with_suffix(".tmp"), path)
+    return f"pictures/thumbnails/{name}.ppm"
+
+
 def png(path: Path, colour: tuple[int, int, int], width: int = 96, height: int = 64) -> None:
     """A PNG with a disc of one 8-bit sRGB colour on grey."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    rows = bytearray()
-    for y in range(height):
-        rows.append(0)
-        for x in range(width):
-            inside = (x - width / 2) ** 2 + (y - height / 2) ** 2 < (height * 0.4) ** 2
-            rows += bytes(colour if inside else (90, 90, 90))
+    rows = b"".join(b"\0" + row for row in disc(colour, width, height))
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(rows))) + chunk(b"IEND", b"")
     temporary = path.with_suffix(".tmp")
@@ -103,11 +116,12 @@ def main(arguments: list[str]) -> int:
             best=loss, fraction=fraction, seconds=i * pause, remaining_seconds=(steps - i - 1) * pause,
         )  # fmt: skip
         if i % 4 == 0:
-            png(
-                pictures / "current.png", (int(120 + 60 * fraction), int(120 - 60 * fraction), int(120 - 80 * fraction))
-            )
-            png(pictures / "current_difference.png", (int(200 - 180 * fraction), 20, 60))
-            say(event="preview", path="pictures/current.png", difference="pictures/current_difference.png")
+            shown = (int(120 + 60 * fraction), int(120 - 60 * fraction), int(120 - 80 * fraction))
+            say(
+                event="preview", path=thumbnail(pictures, "current", shown),
+                reference=thumbnail(pictures, "reference", (180, 60, 40)),
+                difference=thumbnail(pictures, "current_difference", (int(200 - 180 * fraction), 20, 60)),
+            )  # fmt: skip
         if i % STEPS == STEPS - 1:
             say(
                 event="stage_end", stage=stage, status="stale", iterations=STEPS, loss_start=0.2, loss_best=loss,
@@ -119,9 +133,9 @@ def main(arguments: list[str]) -> int:
         time.sleep(pause)
         if cancelled.is_set():
             break
-    png(pictures / "start.png", (120, 120, 120))
-    png(pictures / "result.png", (178, 62, 42))
-    png(pictures / "difference.png", (20, 10, 60))
+    for name, colour in (("start", (120, 120, 120)), ("result", (178, 62, 42)), ("difference", (20, 10, 60))):
+        png(pictures / f"{name}.png", colour)
+        thumbnail(pictures, name, colour)
     png(pictures / "curve.png", (86, 156, 240))
     (folder / "index.html").write_text("<!doctype html><title>report</title>")
     partial = cancelled.is_set()
@@ -186,6 +200,7 @@ def judge(folder: Path, picture: Path) -> int:
     assert picture.stat().st_size > 0
     for name, colour in (("cycles", (175, 64, 44)), ("cycles_difference", (24, 12, 64))):
         png(folder / "pictures" / f"{name}.png", colour)
+        thumbnail(folder / "pictures", name, colour)
     print(json.dumps({"status": "ok", "metrics": {"flip": 0.0234}, "notes": []}), flush=True)
     return 0
 

@@ -15,21 +15,23 @@ from mfo_backend.types.event import PREVIEW_SIDE
 from mfo_backend.types.image import Encoding, Image
 
 
-def opened(png: bytes) -> np.ndarray:
-    return np.asarray(Pillow.open(io.BytesIO(png)))
+def opened(ppm: bytes) -> np.ndarray:
+    return np.asarray(Pillow.open(io.BytesIO(ppm)))
 
 
 @pytest.mark.parametrize("size", [(40, 60), (300, 700), (1030, 8), (2, 900)])
 def test_sizes(size: tuple[int, int]) -> None:
     pixels = np.full((*size, 3), 0.25, np.float32)
     live = LivePictures(Image(pixels, Encoding.LINEAR), DisplayView())
-    for png, largest in ((live.current(pixels), PREVIEW_SIDE), (live.difference(pixels), LARGEST_MAP)):
-        shown = opened(png)
+    assert opened(live.reference()).shape == opened(live.current(pixels)).shape  # they are compared
+    for ppm, largest in ((live.current(pixels), PREVIEW_SIDE), (live.difference(pixels), LARGEST_MAP)):
+        shown = opened(ppm)
         thin = -(-max(size) // largest) > min(size)  # nothing to average over
         assert max(shown.shape[:2]) <= (max(size) if thin else largest)
         assert shown.shape[2] == 3
     # IEC 61966-2-1: 0.25 linear is 0.5371 of 255
     assert (opened(live.current(pixels)) == 137).all()
+    assert (opened(live.reference()) == 137).all()
 
 
 def test_difference_is_where_the_pictures_differ() -> None:

@@ -11,16 +11,16 @@ import json
 from pathlib import Path
 
 from ...fit.judge.region import fill_outside
-from ...job.folder.atomic_file import write_atomically
 from ...job.folder.job_folder import JobFolder
 from ...job.folder.request import read_request
 from ...job.folder.view_request import view_of
+from ...job.output.pictures import picture_files, write_picture
 from ...job.run.run_job import read_reference
 from ...metrics.compare import compare_images
 from ...metrics.flip.block_means import block_means, block_side, full_blocks, means_beside
 from ...metrics.pixels.pixel_check import check_mask, check_pair
 from ...report.difference_map import magma_counted
-from ...report.picture import displayed, mask_from_png, png_bytes
+from ...report.picture import displayed, mask_from_png
 from ...scene.image_file import read_image
 
 
@@ -61,12 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
         counts = full_blocks(counts, side)
     seen = means_beside(reference.encoding, picture, side, view)
     comparison = compare_images(block_means(reference, side), seen, mask=mask, display=view)
-    folder.pictures.mkdir(exist_ok=True)
     name = Path(arguments.name).name
-    write_atomically(folder.pictures / f"{name}.png", png_bytes(displayed(picture, view)))
-    write_atomically(
-        folder.pictures / f"{name}_difference.png", png_bytes(magma_counted(comparison.maps["flip"], counts))
-    )
+    write_picture(folder, name, picture_files(displayed(picture, view)))
+    write_picture(folder, f"{name}_difference", picture_files(magma_counted(comparison.maps["flip"], counts)))
     if arguments.json:
         print(json.dumps({"status": "ok", "metrics": comparison.metrics, "notes": [*picture.notes, *comparison.notes]}))
         return 0

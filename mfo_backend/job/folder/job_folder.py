@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from ...types.errors import BadInputError
 
-PICTURES = ("reference.png", "start.png", "result.png", "difference.png", "result.exr", "current.png")
+PICTURES = ("reference.png", "start.png", "result.png", "difference.png", "result.exr")
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,11 @@ class JobFolder:
     def pictures(self) -> Path:
         """Folder of the pictures."""
         return self.root / "pictures"
+
+    @property
+    def thumbnails(self) -> Path:
+        """Folder of the same pictures, small, for a panel; during a fit of those that change, too."""
+        return self.pictures / "thumbnails"
 
     @property
     def counted(self) -> Path:
@@ -125,7 +130,7 @@ class JobFolder:
 
 
 def clear_outputs(folder: JobFolder) -> None:
-    """Remove what an earlier run left and make the folder of pictures.
+    """Remove what an earlier run left and make the folders of pictures.
 
     Links go too: a stranger's folder may hold ``progress.jsonl`` as a link to a file of the user.
 
@@ -136,12 +141,13 @@ def clear_outputs(folder: JobFolder) -> None:
     """
     for path in (folder.result, folder.partial, folder.progress, folder.report):
         path.unlink(missing_ok=True)
-    if folder.pictures.is_symlink():
-        folder.pictures.unlink()
-    folder.pictures.mkdir(exist_ok=True)
-    for path in folder.pictures.iterdir():
-        if path.name in PICTURES or path.name.endswith(".tmp"):
-            path.unlink()
+    for pictures in (folder.pictures, folder.thumbnails):
+        if pictures.is_symlink():
+            pictures.unlink()
+        pictures.mkdir(exist_ok=True)
+        for path in pictures.iterdir():
+            if path.name in PICTURES or path.name.endswith(".tmp") or pictures == folder.thumbnails:
+                path.unlink()
     for path in folder.root.glob(".*.tmp"):  # left by a process that was killed while it wrote
         path.unlink()
 

@@ -11,17 +11,20 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ...types.event import Event, Preview, Started
-from ...types.image import Pixels
 from ...types.status import Status
 from ..folder.atomic_file import write_atomically
 from ..folder.job_folder import JobFolder, clear_outputs
 from .progress_bar import ProgressBar
 
-PREVIEW_PATH = "pictures/current.png"
-DIFFERENCE_PATH = "pictures/current_difference.png"
+if TYPE_CHECKING:
+    from ...report.live_pictures import LivePictures
+
+REFERENCE_PATH = "pictures/thumbnails/reference.ppm"
+PREVIEW_PATH = "pictures/thumbnails/current.ppm"
+DIFFERENCE_PATH = "pictures/thumbnails/current_difference.ppm"
 PREVIEW_SECONDS = 0.3  # a viewer cannot follow faster, and encoding costs about 10 ms at 256x256
 DIFFERENCE_SECONDS = 1.0  # a FLIP map costs several times that
 
@@ -42,39 +45,24 @@ class EventWriter:
         self._stream = stream
         self._bar = ProgressBar() if bar else None
         self._folder: JobFolder | None = None
-        self._encode_preview: Callable[[Pixels], bytes] | None = None
-        self._encode_difference: Callable[[Pixels], bytes] | None = None
+        self._pictures: LivePictures | None = None
         self._file: TextIO | None = None
         self._last_preview = self._last_difference = -math.inf
         self._lock = threading.Lock()
         self._ended = False
 
-    def attach(
-        self,
-        folder: JobFolder,
-        encode_preview: Callable[[Pixels], bytes],
-        encode_difference: Callable[[Pixels], bytes] | None = None,
-    ) -> None:
+    def attach(self, folder: JobFolder, pictures: LivePictures | None = None) -> None:
         """Name the folder for progress.jsonl and previews; nothing is written there before the first event."""
-        self._folder = folder
-        self._encode_preview, self._encode_difference = encode_preview, encode_difference
+        self._folder, self._pictures = folder, pictures
 
     def __call__(self, event: Event) -> None:
         """Report one event of the fit."""
         if isinstance(event, Preview):
-            if time.monotonic() - self._last_preview < PREVIEW_SECONDS:
+            fields = self._show(event)
+            if not fields:
                 return
-            if not self._write_picture(PREVIEW_PATH, self._encode_preview, event.image):
-                return
-            fields: dict[str, Any] = {"path": PREVIEW_PATH}
-            self._last_preview = time.monotonic()
-            if self._last_preview - self._last_difference >= DIFFERENCE_SECONDS and self._write_picture(
-                DIFFERENCE_PATH, self._encode_difference, event.image
-            ):
-                fields["difference"] = DIFFERENCE_PATH
-                self._last_difference = time.monotonic()
         else:
-            fields = asdict(event)
+            fields: dict[str, Any] = asdict(event)
         if isinstance(event, Started):
             self._begin()
         self._write({"event": event.event, **fields})
@@ -127,11 +115,29 @@ class EventWriter:
                         self._file.close()
                     self._file = None
 
-    def _write_picture(self, path: str, encode: Callable[[Pixels], bytes] | None, image: Pixels) -> bool:
-        if self._folder is None or encode is None or not self._folder.pictures.is_dir():
+    def _show(self, preview: Preview) -> dict[str, str]:
+        """Write what a viewer has time for; the paths, none where nothing was written."""
+        pictures, now = self._pictures, time.monotonic()
+        if pictures is None or now - self._last_preview < PREVIEW_SECONDS:
+            return {}
+        is_first = self._last_preview == -math.inf
+        if not self._write_picture(PREVIEW_PATH, lambda: pictures.current(preview.image)):
+            return {}
+        fields, self._last_preview = {"path": PREVIEW_PATH}, time.monotonic()
+        if is_first and self._write_picture(REFERENCE_PATH, pictures.reference):
+            fields["reference"] = REFERENCE_PATH
+        if self._last_preview - self._last_difference >= DIFFERENCE_SECONDS and self._write_picture(
+            DIFFERENCE_PATH, lambda: pictures.difference(preview.image)
+        ):
+            fields["difference"] = DIFFERENCE_PATH
+            self._last_difference = time.monotonic()
+        return fields
+
+    def _write_picture(self, path: str, encode: Callable[[], bytes]) -> bool:
+        if self._folder is None or not self._folder.thumbnails.is_dir():
             return False
         try:
-            write_atomically(self._folder.root / path, encode(image))
+            write_atomically(self._folder.root / path, encode())
         except OSError:  # on Windows also when a viewer holds the old one; the next preview comes soon
             return False
         return True

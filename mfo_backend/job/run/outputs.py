@@ -16,12 +16,13 @@ from ...metrics.pixels.side_by_side import side_by_side
 from ...report.curve_picture import curve_png
 from ...report.difference_map import magma_counted
 from ...report.html_report import ReportContent, report_html
-from ...report.picture import displayed, displayed_linear, mask_png, png_bytes
+from ...report.picture import THUMBNAIL_SIDE, displayed, displayed_linear, mask_png
 from ...scene.image_file import write_exr
 from ...types.image import Encoding, Image
 from ..folder.atomic_file import write_atomically
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request
+from ..output.pictures import picture_files, write_picture
 from ..output.progress import DIFFERENCE_PATH, PREVIEW_PATH
 from ..output.result import result_to_json, versions, write_result
 from .job_outcome import JobOutcome, SeenPicture
@@ -81,7 +82,7 @@ def write_outputs(pictures: Sequence[JobPicture], outcome: JobOutcome, *, notes:
             for (path, each), own, found in zip(request.targets, outcome.materials, inner, strict=True)
         ]  # fmt: skip
     write_result(folder, content)
-    for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # result.png and difference.png are what they were on the way to
+    for path in (PREVIEW_PATH, DIFFERENCE_PATH):  # the result's are what they were on the way to
         (folder.root / path).unlink(missing_ok=True)
     return content
 
@@ -128,20 +129,19 @@ def _write_pictures(picture: JobPicture, seen: SeenPicture) -> dict[str, bytes]:
         "result": lambda: displayed_linear(seen.result, view),
         "difference": lambda: magma_counted(difference.map, counts),
     }
-    files = side_by_side(lambda picture: png_bytes(picture()), list(shown.values()))
-    pictures = dict(zip(shown, files, strict=True))
-    folder.pictures.mkdir(exist_ok=True)
-    for name, data in pictures.items():
-        write_atomically(folder.pictures / f"{name}.png", data)
+    files = dict(zip(shown, side_by_side(lambda picture: picture_files(picture()), list(shown.values())), strict=True))
+    for name, written in files.items():
+        write_picture(folder, name, written)
     write_atomically(folder.counted, mask_png(seen.counted))
     write_exr(folder.pictures / "result.exr", seen.result)
-    return pictures
+    return {name: written.png for name, written in files.items()}
 
 
 def bytes_needed(request: Request) -> int:
-    """An upper estimate of what a job writes: four 8-bit pictures, their copies in the report, a mask and one EXR."""
-    pixels = sum(each.width * each.height for each in (request, *(more for _, more in request.more_pictures)))
-    return 2**20 + pixels * (4 * 3 * 3 + 1 + 12)
+    """An upper estimate of what a job writes: four 8-bit pictures, small and in the report too, a mask and one EXR."""
+    pixels = [each.width * each.height for each in (request, *(more for _, more in request.more_pictures))]
+    small = sum(min(count, THUMBNAIL_SIDE**2) for count in pixels)
+    return 2**20 + sum(pixels) * (4 * 3 * 3 + 1 + 12) + small * 4 * 3
 
 
 def _title(request: Request) -> str:

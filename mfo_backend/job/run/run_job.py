@@ -88,8 +88,7 @@ def _run(path: Path, events: EventWriter, stop: StopSignal, fitter: Fitter, trus
     view = view_of(folder, request.view, request.view_table, reference)
     more, said_of_more = _read_more(JobPicture(folder, request, reference, view))
     folder.require_space(bytes_needed(request))
-    small = LivePictures(reference, view)
-    events.attach(folder, small.current, small.difference)
+    events.attach(folder, LivePictures(reference, view))
 
     # the export may have said the same of the reference
     said = tuple(dict.fromkeys((*request.notes, *notes, *said_of_more)))

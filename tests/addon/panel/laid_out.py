@@ -55,6 +55,14 @@ class Item:
                 yield Cut(text, measure(text), width - self.margins)
 
 
+@dataclass(frozen=True)
+class Picture(Item):
+    """An icon as a picture; Blender draws it into a square."""
+
+    icon: int = 0
+    side: float = 0.0
+
+
 class Layout:
     """Stands for a UILayout: keeps what is drawn, with its place; `words` translates as Blender would."""
 
@@ -87,8 +95,8 @@ class Layout:
     def separator(self) -> None:
         pass
 
-    def template_icon(self, **_options: Any) -> None:
-        self.items.append(Item((), 0.0))
+    def template_icon(self, *, icon_value: int, scale: float) -> None:
+        self.items.append(Picture((), 0.0, icon=icon_value, side=scale * UNIT))
 
     def template_ID(self, *_given: Any, **_options: Any) -> None:
         self.items.append(Item((), 0.0))
@@ -184,6 +192,14 @@ class Layout:
         """The texts within that do not fit a width."""
         for item, share in zip(self.items, self._shares(width), strict=True):
             yield from item.cut(share, measure)
+
+    def pictures(self, width: float) -> Iterator[tuple[Picture, float]]:
+        """The pictures within, each with the width it has."""
+        for item, share in zip(self.items, self._shares(width), strict=True):
+            if isinstance(item, Layout):
+                yield from item.pictures(share)
+            elif isinstance(item, Picture):
+                yield item, share
 
     def _shares(self, width: float) -> list[float]:
         count = len(self.items)

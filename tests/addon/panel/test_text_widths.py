@@ -188,7 +188,7 @@ def with_chosen_values(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> It
 def with_a_queue(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
     from blender_addon.running import cycles_check, fit_queue, running_job
 
-    waits = fit_queue.PreparedFit(Path(), Path(), "Glaze", (), Path(), (), True)
+    waits = fit_queue.PreparedFit(Path(), Path(), "Glaze", (), (), True)
     patch.setattr(fit_queue, "waiting", [waits] * 12)
     patch.setattr(fit_queue, "finished", [fit_queue.EndedFit("Glaze", "It was cancelled.", "INFO")] * 8)
     yield

@@ -133,7 +133,7 @@ def test_queue_fits_one_after_the_other(scene: SimpleNamespace, monkeypatch: pyt
         folder.mkdir()
         shutil.copyfile(Path(scene.job, "request.json"), folder / "request.json")
         uid = other.session_uid
-        fit_queue.add(PreparedFit(first.python, folder, other.name, (uid,), first.reference, (), True))
+        fit_queue.add(PreparedFit(first.python, folder, other.name, (uid,), (), True))
     bpy.ops.mfo.drop_queued(index=1)
     assert not Path(f"{scene.job}_1").exists()  # it was made for the fit that is not to be
     fit_queue.waiting[0] = PreparedFit(Path("/nowhere/python"), *list(vars(fit_queue.waiting[0]).values())[1:])

@@ -89,5 +89,5 @@ def test_events_with_wrong_values_are_passed_over(scene: SimpleNamespace, tmp_pa
     from blender_addon.running.fit_queue import PreparedFit
 
     process = SimpleNamespace(folder=tmp_path, cancelling=False)
-    prepared = PreparedFit(tmp_path, tmp_path, "Glaze", (0,), tmp_path / "reference.exr", (), True)
+    prepared = PreparedFit(tmp_path, tmp_path, "Glaze", (0,), (), True)
     running_job._handle(running_job.RunningJob(process, prepared), event)

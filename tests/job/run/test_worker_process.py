@@ -106,7 +106,9 @@ def test_a_finished_job_leaves_pictures_report_and_result(start_worker, job: Pat
     assert result["partial"] is False
     names = {path.name for path in (job / "pictures").iterdir()}
     pictures = ("reference", "start", "result", "difference", "curve", "counted")
-    assert names == {"result.exr", *(f"{name}.png" for name in pictures)}
+    assert names == {"result.exr", "thumbnails", *(f"{name}.png" for name in pictures)}
+    small = {path.name for path in (job / "pictures" / "thumbnails").iterdir()}
+    assert small == {f"{name}.ppm" for name in pictures[:4]}  # none of the picture on the way is left
     assert "Glaze · Vase" in (job / "index.html").read_text("utf-8")
     assert not [path for path in job.rglob("*") if path.suffix == ".tmp"]
 
@@ -290,7 +292,7 @@ def test_a_full_disk_for_progress_does_not_cost_the_result(job: Path, capsys: py
         pytest.skip("no /dev/full here")
     out = io.StringIO()
     events = EventWriter(stream=out)
-    events.attach(JobFolder.open(job), lambda pixels: b"")
+    events.attach(JobFolder.open(job))
     events(Started((), (), 0.0))
     assert events._file is not None
     events._file.close()

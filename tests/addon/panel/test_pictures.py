@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of every shape fill the squares that Blender draws them into, the sidebar's width, and bear their names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from .. import fake_backend
+from .laid_out import AROUND, Item, Layout, Picture
+
+WIDTHS = (220, 280, 400)  # of the sidebar, pixels at a scale of 1
+SHAPES = ((1920, 1080), (256, 256), (1080, 1920), (1440, 1080), (2390, 1000))
+LEAST = 0.7  # of a square: of one wide picture alone 0.56 is picture
+COMPARED = (("reference", "result", "start"), ("reference", "current", "difference"), ("cycles", "engine", "reference"))
+
+
+class Collection(dict[str, Any]):
+    """Stands for Blender's previews, which a Blender in the background has not; the number of an icon is its place."""
+
+    def new(self, key: str) -> SimpleNamespace:
+        pixels = SimpleNamespace(foreach_set=lambda values: setattr(self[key], "pixels", values.view(np.uint8)))
+        self[key] = SimpleNamespace(icon_id=len(self) + 1, image_size=(0, 0), image_pixels=pixels)
+        return self[key]
+
+    def filled(self, number: int) -> float:
+        """How much of the square of an icon is picture."""
+        made = next(each for each in self.values() if each.icon_id == number)
+        return float((made.pixels.reshape(-1, 4)[:, 3] == 255).sum()) / max(made.image_size) ** 2
+
+
+@pytest.fixture
+def icons(addon: object, monkeypatch: pytest.MonkeyPatch) -> Collection:
+    from blender_addon.result import previews
+
+    found = Collection()
+    monkeypatch.setattr(previews, "_collection", found)
+    monkeypatch.setattr(previews, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
+    for kept in ("_shown", "_thumbnails"):
+        monkeypatch.setattr(previews, kept, {})
+    return found
+
+
+def shown(names: tuple[str, ...], folder: Path, size: tuple[int, int]) -> None:
+    """As after a fit of pictures of this size."""
+    from blender_addon.result import previews
+
+    side = max(size) // 96  # fewer pixels do
+    for i, name in enumerate(names):
+        fake_backend.thumbnail(folder, name, (40 * i, 60, 200), (size[0] // side, size[1] // side))
+        previews.show(name, folder)
+
+
+def drawn(names: tuple[str, ...], width: float, scale: float, **options: Any) -> Layout:
+    import bpy
+
+    from blender_addon.panel.layout import draw_pictures
+
+    words: Any = lambda text, _context: text  # noqa: E731
+    words.measure = lambda text: 6.0 * len(text)
+    context = SimpleNamespace(
+        region=SimpleNamespace(width=width * scale),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=scale), addons=bpy.context.preferences.addons),
+    )
+    layout = Layout(words)
+    draw_pictures(layout, context, names, **options)  # type: ignore[arg-type]  # stands for Blender's
+    return layout
+
+
+@pytest.mark.parametrize("size", SHAPES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("names", COMPARED, ids="_".join)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_squares_are_filled(
+    icons: Collection, tmp_path: Path, size: tuple[int, int], names: tuple[str, ...], width: int, scale: float
+) -> None:
+    shown(names, tmp_path, size)
+    layout = drawn(names, width, scale)
+    placed = list(layout.pictures(width - AROUND))
+    assert placed
+    for picture, share in placed:
+        assert picture.icon > 0
+        assert icons.filled(picture.icon) >= LEAST
+        assert 0.8 * min(share, 300.0) <= picture.side <= max(share, 40.0)  # as wide as its place
+    assert sum(share for _, share in placed) >= 0.95 * (width - AROUND)
+
+
+@pytest.mark.parametrize("clickable", [True, False])
+def test_each_picture_has_its_name_beside_it(icons: Collection, tmp_path: Path, clickable: bool) -> None:
+    names = COMPARED[0]
+    (tmp_path / "wide").mkdir()
+    shown(names, tmp_path / "wide", (1920, 1080))
+    texts = list(_texts(drawn(names, 280, 1.0, clickable=clickable)))
+    assert texts == ["Reference", "a picture", "Result", *(["Start"] if clickable else [])]  # from above
+    (tmp_path / "tall").mkdir()
+    shown(names, tmp_path / "tall", (1080, 1920))
+    texts = list(_texts(drawn(names, 280, 1.0, clickable=clickable)))
+    assert texts == ["a picture", "Reference", "Result", *(["Start"] if clickable else [])]  # from the left
+
+
+def _texts(layout: Layout) -> Any:
+    for item in layout.items:
+        if isinstance(item, Layout):
+            yield from _texts(item)
+        elif isinstance(item, Picture):
+            yield "a picture"
+        elif isinstance(item, Item):
+            yield from item.texts
+
+
+@pytest.mark.parametrize(("size", "axis"), [((1920, 1080), 0), ((1080, 1920), 1)])
+def test_the_first_is_above_or_left(size: tuple[int, int], axis: int) -> None:
+    from blender_addon.result.thumbnail import is_wide, paired
+
+    first, second = (np.full((size[1] // 4, size[0] // 4, 3), value, np.uint8) for value in (10, 200))
+    both = paired(first, second)
+    assert both is not None
+    half = first.shape[axis]
+    assert (np.take(both, range(half), axis)[..., :3] == 10).all()
+    assert (np.take(both, range(-half, 0), axis)[..., :3] == 200).all()
+    assert is_wide(first) == (axis == 0)
+    assert paired(first, second[:-1]) is None  # of two sizes
+
+
+def test_what_is_drawn_is_upright(icons: Collection, tmp_path: Path) -> None:
+    """Blender has the lowest row first, a file the uppermost."""
+    from blender_addon.result import previews
+
+    rows = bytes((255, 0, 0)) * 4 + bytes((0, 0, 255)) * 4
+    (tmp_path / "flag.ppm").write_bytes(b"P6 4 2 255\n" + rows)
+    previews.show_thumbnail("flag", tmp_path / "flag.ppm")
+    (made,) = icons.values()
+    assert made.image_size == (4, 2)
+    assert made.pixels.reshape(2, 4, 4)[:, 0].tolist() == [[0, 0, 255, 255], [255, 0, 0, 255]]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"P5 2 2 255\n" + bytes(12), b"P6 2 2 255\n" + bytes(11), b"P6 0 0 255\n", b"P6 2 2 65535\n" + bytes(24)],
+)
+def test_what_is_no_thumbnail_is_refused(tmp_path: Path, content: bytes) -> None:
+    from blender_addon.result.thumbnail import read_thumbnail
+
+    (tmp_path / "x.ppm").write_bytes(content)
+    with pytest.raises(OSError, match="no thumbnail"):
+        read_thumbnail(tmp_path / "x.ppm")
+    with pytest.raises(OSError, match="No such file"):
+        read_thumbnail(tmp_path / "y.ppm")
+
+
+def test_thumbnails_are_those_of_the_backend(tmp_path: Path) -> None:
+    """What one side writes the other reads."""
+    from blender_addon.result.thumbnail import read_thumbnail
+    from mfo_backend.report.picture import thumbnail_bytes
+
+    display = np.random.default_rng(1).uniform(0, 1, (30, 50, 3)).astype(np.float32)
+    (tmp_path / "x.ppm").write_bytes(thumbnail_bytes(display))
+    assert np.abs(read_thumbnail(tmp_path / "x.ppm") / 255.0 - display).max() <= 0.5 / 255.0 + 1e-6
