@@ -23,7 +23,7 @@ _checked = False
 
 def watch(context: bpy.types.Context) -> None:
     """Called while drawing: have a check made soon if there was none, or something it looks at has changed."""
-    if not _checked or _seen != _look(context.scene, context.view_layer):
+    if not _checked or _seen != look(context.scene, context.view_layer):
         request()
 
 
@@ -37,7 +37,7 @@ def check_now(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     """Make the quick check; what an export said stays as long as the quick check says the same as before."""
     global findings, is_thorough, mended, _before, _quick, _seen, _checked
     found = quick_check(scene, view_layer)
-    _seen, _checked = _look(scene, view_layer), True
+    _seen, _checked = look(scene, view_layer), True
     if found != _quick:
         findings, is_thorough, _quick = found, False, found
         mended = _before = ()
@@ -115,7 +115,7 @@ def redraw() -> None:
                     region.tag_redraw()
 
 
-def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
+def look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
     """What can change without the depsgraph saying so, cheap enough for every draw."""
     settings, render, view = scene.mfo, scene.render, scene.view_settings
     target = view_layer.objects.active

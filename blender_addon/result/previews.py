@@ -77,7 +77,7 @@ def show_thumbnail(name: str, path: Path) -> None:
 
 
 def pair(first: str, second: str) -> tuple[int, bool] | None:
-    """Icon number of two pictures in one, and whether the first is above (else left); None where there is no such icon."""
+    """Icon number of two pictures in one, and whether the first is above, else left; None where they are not paired."""
     number = icon(f"{first} {second}")
     return (number, is_wide(_thumbnails[first])) if number and first in _thumbnails else None
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import bpy
 
 from ..backend.preferences import idle_seconds
+from ..check import preflight
 from ..check.preflight import redraw
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
@@ -50,6 +51,7 @@ class RunningJob:
 
 current: RunningJob | None = None
 unrecorded: list[tuple[JobResult, int]] = []  # results with their material's session_uid, not in its history yet
+_refused: object = None  # what was checked when a fit was refused last
 _patience = PATIENCE
 
 
@@ -137,14 +139,23 @@ def reset() -> None:
 
 def fail(sentences: Sequence[str]) -> None:
     """Show errors that kept a fit from starting."""
+    global _refused
     runtime = _runtime()
     if current is None:
         shown_result.clear(runtime)
         runtime.state = "FAILED"
+        _refused = preflight.look(bpy.context.scene, bpy.context.view_layer)
     runtime.sentence = sentences[0] if sentences else ""
     for sentence in sentences[1:]:
         add_message(runtime, sentence, "ERROR")
     redraw()
+
+
+def is_answered(context: bpy.types.Context) -> bool:
+    """Whether the last fit was refused for what has been changed since, so that nothing of it need be said any more."""
+    runtime = _runtime()
+    refused = runtime.state == "FAILED" and not runtime.job_folder
+    return refused and _refused != preflight.look(context.scene, context.view_layer)
 
 
 def record_results() -> int:
@@ -237,7 +248,7 @@ def _looks_for_a_start(event: Event) -> bool:
 
 
 def _finish(job: RunningJob, outcome: Outcome) -> None:
-    global current
+    global current, _refused
     runtime = _runtime()
     current = None
     atexit.unregister(close)
@@ -261,6 +272,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:
         shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
         runtime.job_folder = ""
+        _refused = preflight.look(bpy.context.scene, bpy.context.view_layer)
     if bpy.app.background:
         record_results()
     else:

@@ -33,7 +33,7 @@ def png_bytes(display: Pixels) -> bytes:
 
 
 def thumbnail_bytes(display: Pixels, largest: int = THUMBNAIL_SIDE) -> bytes:
-    """A binary PPM of display values (height, width, 3) in [0, 1], over blocks of pixels so that no side is above `largest`.
+    """A binary PPM of display values (height, width, 3) in [0, 1]: means over blocks, no side above `largest` pixels.
 
     Its pixels stand there as they are: who shows it needs no library.
     """

@@ -400,3 +400,20 @@ def test_colours_follow_the_working_space(scene: SimpleNamespace) -> None:
 def _plain(socket) -> object:
     value = socket.default_value
     return value if isinstance(value, (int, float, str)) else tuple(value)
+
+
+@pytest.mark.parametrize("end", ["refused", "failed", "crash"])
+def test_a_refusal_is_said_until_what_it_was_about_is_changed(
+    scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    from blender_addon.running import running_job
+
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": end}))
+    context, settings = scene.bpy.context, scene.bpy.context.scene.mfo
+    settings.reference_path = "/nowhere/reference.exr" if end == "refused" else scene.reference
+    with pytest.raises(RuntimeError):
+        scene.bpy.ops.mfo.fit(job_folder=scene.job)
+    assert runtime(scene).state == "FAILED"
+    assert not running_job.is_answered(context)
+    settings.reference_path = scene.reference + " other"
+    assert running_job.is_answered(context) == (end != "crash")  # which no other picture mends
