@@ -25,14 +25,10 @@ class Compare:
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
         if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
             draw_sentence(layout, context, f"Of material {runtime.material}", "MATERIAL")
-        draw_pictures(layout, context, ("reference", "result", "start"), clickable=True)
-        _draw_each_picture(layout)
-        column = layout.column(align=True)
-        row = buttons_side_by_side(column, context, "Side by Side", "Split")
-        row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
-        row.operator("mfo.show_pictures", text="Split", icon="ARROW_LEFTRIGHT").show = "split"
-        if comparison.has_split():
-            column.prop(runtime, "split", slider=True)
+        if previews.icon("result"):
+            _draw_result(layout, context, runtime)
+        elif previews.icon("current"):
+            draw_pictures(layout, context, ("reference", "current"))
         _draw_cycles(layout, context, runtime)
         row = buttons_side_by_side(layout, context, "Report", "Load Result")
         row.operator("mfo.open_report", text="Report", icon="URL")
@@ -41,6 +37,18 @@ class Compare:
         header.label(text="Details")
         if body:
             _draw_details(body, context, runtime)
+
+
+def _draw_result(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
+    """What a fit that came to its end, or to its own way out, has left to look at."""
+    draw_pictures(layout, context, ("reference", "result", "start"), clickable=True)
+    _draw_each_picture(layout)
+    column = layout.column(align=True)
+    row = buttons_side_by_side(column, context, "Side by Side", "Split")
+    row.operator("mfo.show_pictures", text="Side by Side", icon="IMAGE_DATA").show = "strip"
+    row.operator("mfo.show_pictures", text="Split", icon="ARROW_LEFTRIGHT").show = "split"
+    if comparison.has_split():
+        column.prop(runtime, "split", slider=True)
 
 
 def _draw_each_picture(layout: bpy.types.UILayout) -> None:

@@ -10,7 +10,8 @@ from .job_result import JobResult, Value
 from .write_back import result_to_sockets, socket_to_parameter
 
 CHECKED = ("cycles", "cycles_difference", "engine", "engine_difference")  # by the check in Cycles
-PICTURES = ("reference", "start", "result", "difference", "curve", *CHECKED)
+# "current" is there where the backend was killed before it wrote the others
+PICTURES = ("reference", "start", "result", "difference", "current", "curve", *CHECKED)
 _ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP"}  # others are for the report
 VERDICT_ICONS = {"same": "CHECKMARK", "close": "QUESTION", "different": "ERROR"}  # others have no verdict
 _KEPT = ("split",)  # settings of the view, not of a fit

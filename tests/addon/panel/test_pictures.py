@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 from .. import fake_backend
+from ..test_operators import fit
 from .laid_out import AROUND, Item, Layout, Picture
 
 WIDTHS = (220, 280, 400)  # of the sidebar, pixels at a scale of 1
@@ -60,13 +63,11 @@ def drawn(names: tuple[str, ...], width: float, scale: float, **options: Any) ->
 
     from blender_addon.panel.layout import draw_pictures
 
-    words: Any = lambda text, _context: text  # noqa: E731
-    words.measure = lambda text: 6.0 * len(text)
     context = SimpleNamespace(
         region=SimpleNamespace(width=width * scale),
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=scale), addons=bpy.context.preferences.addons),
     )
-    layout = Layout(words)
+    layout = Layout(_untranslated())
     draw_pictures(layout, context, names, **options)  # type: ignore[arg-type]  # stands for Blender's
     return layout
 
@@ -100,6 +101,14 @@ def test_each_picture_has_its_name_beside_it(icons: Collection, tmp_path: Path, 
     shown(names, tmp_path / "tall", (1080, 1920))
     texts = list(_texts(drawn(names, 280, 1.0, clickable=clickable)))
     assert texts == ["a picture", "Reference", "Result", *(["Start"] if clickable else [])]  # from the left
+
+
+def _untranslated() -> Any:
+    def words(text: str, _context: str) -> str:
+        return text
+
+    words.measure = lambda text: 6.0 * len(text)  # type: ignore[attr-defined]
+    return words
 
 
 def _texts(layout: Layout) -> Any:
@@ -160,3 +169,34 @@ def test_thumbnails_are_those_of_the_backend(tmp_path: Path) -> None:
     display = np.random.default_rng(1).uniform(0, 1, (30, 50, 3)).astype(np.float32)
     (tmp_path / "x.ppm").write_bytes(thumbnail_bytes(display))
     assert np.abs(read_thumbnail(tmp_path / "x.ppm") / 255.0 - display).max() <= 0.5 / 255.0 + 1e-6
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_killed_fit_has_the_pictures_that_it_left(
+    scene: SimpleNamespace, icons: Collection, monkeypatch: pytest.MonkeyPatch, killed: bool
+) -> None:
+    """And no button for a picture that it has not written."""
+    from blender_addon.panel.compare import Compare
+    from blender_addon.result import shown_result
+
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": "killed" if killed else ""}))
+    with suppress(RuntimeError):
+        fit(scene)
+    found = shown_result.result
+    assert found is not None
+    assert found.partial == killed
+    context = scene.bpy.context
+    panel: Any = SimpleNamespace(layout=Layout(_untranslated()))
+    Compare.draw(
+        panel,
+        SimpleNamespace(
+            object=context.object, window_manager=context.window_manager, preferences=context.preferences,
+            region=SimpleNamespace(width=280.0),
+        ),  # type: ignore[arg-type]  # stands for Blender's
+    )  # fmt: skip
+    texts = list(_texts(panel.layout))
+    texts = texts[: texts.index("Check in Cycles")]
+    assert "a picture" in texts
+    buttons = {"Result", "Start", "Split"}
+    assert buttons.intersection(texts) == (set() if killed else buttons)
+    assert ("Preliminary" in texts) == killed

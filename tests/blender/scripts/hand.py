@@ -14,7 +14,9 @@ import bpy
 
 STEP = 14  # pixels between two looks of the mouse, less than the height of a button at scale 1
 SCREEN_HEIGHT = 1000  # pixels
-GRIP = 7  # pixels at scale 1 from a sidebar's edge to where Blender 4.3 and 5.2 let it be dragged
+# pixels at scale 1 from a sidebar's edge to where Blender 4.3 and 5.2 let it be dragged
+GRIP = 7  # over the view
+GRIP_BESIDE = 2  # beside it, without region overlap
 SETTLED = 0.3  # seconds after which Blender knows what is under a mouse that rests, on busy cores
 _screen: Any = None
 _last = None  # height at which a button was found
@@ -198,7 +200,8 @@ def look_for(words, place, where, region, part=0.3, begin=None):
 
 def widen(width):
     """Drag the sidebar's edge, as its width is no property."""
-    region, grip = side_bar(), GRIP * scale()
+    over = bpy.context.preferences.system.use_region_overlap
+    region, grip = side_bar(), (GRIP if over else GRIP_BESIDE) * scale()
     y, target = region.y + region.height // 2, region.x + region.width - width
     yield from drag((region.x + grip, y), (target + grip, y))
     yield 0.3
