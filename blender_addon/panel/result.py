@@ -73,8 +73,7 @@ def _draw_materials(layout: bpy.types.UILayout, runtime: bpy.types.PropertyGroup
 def _draw_values(layout: bpy.types.UILayout, context: bpy.types.Context, rows: bpy.types.bpy_prop_collection) -> None:
     """Names, starts and results; what the picture does not show is one sentence."""
     kept = [row.name for row in rows if row.certainty == _KEPT]
-    column = (room(context) - BOX) * (1.0 - _NAME_OF_THREE) / 2 - BUTTON
-    has_start = fits(context, column, word("Start"), word("Result"), _NUMBER)
+    has_start = fits(context, _number_width(context, has_start=True), word("Start"), word("Result"), _NUMBER)
     box = layout.box()
     grid = box.column(align=True)
     name, start, result = _cells(grid, has_start)
@@ -119,9 +118,25 @@ def _draw_row(
         name, name.alignment = line, "LEFT"
     icon = "ERROR" if is_doubtful else "NONE"
     name.operator("mfo.copy_values", text=text, icon=icon, emboss=False, translate=False).name = row.name
+    width = _number_width(context, has_start=has_start)
     if start is not None:
-        _draw_value(start, row.start, -1.0)
-    _draw_value(result, row.result, row.sureness)
+        _draw_value(start, _shortened(context, row.start, width), -1.0)
+    _draw_value(result, _shortened(context, row.result, width), row.sureness)
+
+
+def _number_width(context: bpy.types.Context, *, has_start: bool) -> float:
+    """What a column of values has for a number."""
+    share = (1.0 - _NAME_OF_THREE) / 2 if has_start else 1.0 - _NAME_OF_TWO
+    return (room(context) - BOX) * share - BUTTON
+
+
+def _shortened(context: bpy.types.Context, shown: str, width: float) -> str:
+    """A number with as many of its digits as have room; a press copies all of them."""
+    if not shown or shown.startswith("#") or fits(context, width, shown):
+        return shown
+    value = float(shown)
+    fewer, fewest = (f"{value:{digits}}" for digits in ((".0f", ".0e") if abs(value) >= 1.0 else (".2g", ".1g")))
+    return fewer if fits(context, width, fewer) else fewest
 
 
 def _cells(

@@ -22,6 +22,7 @@ WIDTHS = (DEFAULT, 262, 240, 220)
 SCALES = (1.0, 1.25, 2.0)  # of hinted letters the widths change by up to 7 %
 LANGUAGES = ("en_US", "de_DE", "fr_FR")
 WITHIN = {"Cycles prepares the scene", "Values to Fit", "partial"}  # shown as part of a longer text, or as it is
+NUMBERS = [f"{value:.3g}" for value in (-0.3125, 0.0074321, 1234.5, 1.2345e-5, -0.0012345, 123456.0)]  # of results
 NOT_NOW = {"new node"}  # for a moment after a node was made
 
 
@@ -150,7 +151,7 @@ def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
     shown = runtime(scene)
     for i, name in enumerate(names):
         row = shown.values.add()
-        row.name, row.start, row.result = name, "0.125", "-0.312"
+        row.name, row.start, row.result = name, "0.125", NUMBERS[i % len(NUMBERS)]
         row.sureness = 0.5 if i % 2 else -1.0
     patch.setattr(previews, "icon", lambda name: int(name.startswith("#") or name.isidentifier()))
     yield
