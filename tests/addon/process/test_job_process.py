@@ -9,6 +9,7 @@ import textwrap
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -205,6 +206,27 @@ def test_cancel_keeps_what_the_backend_says(start: Start) -> None:
     assert not process.cancelling
 
 
+def test_a_worker_has_time_for_the_pictures_of_what_it_keeps(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of 1920 x 1080 took 20 seconds on busy cores."""
+    process = start("""
+        say(event="started")
+        signal.signal(signal.SIGTERM, lambda *_: os._exit(1))
+        while not os.path.exists("written"): time.sleep(0.01)
+        say(event="finished", status="cancelled", sentence="The best values so far were kept.")
+        sys.exit(4)
+    """)
+    wait_for(process, "started")
+    process.cancel()
+    later = SimpleNamespace(monotonic=lambda: time.monotonic() + 30.0)
+    monkeypatch.setattr(job_process, "time", later)
+    for _ in range(20):
+        process.poll()
+        time.sleep(0.01)
+    (process.folder.parent / "written").touch()
+    drain(process, 10)
+    assert process.outcome == job_process.Outcome("cancelled", "The best values so far were kept.")
+
+
 def test_a_worker_deaf_to_cancel_is_killed_with_its_children(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job_process, "CANCEL_GRACE", 0.2)
     monkeypatch.setattr(job_process, "TERMINATE_GRACE", 0.2)
@@ -271,7 +293,7 @@ def test_the_copy_of_the_file_goes_with_the_fit(start: Start, tmp_path: Path, bo
 
 
 def test_a_worker_that_hangs_after_its_last_event_is_ended(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(job_process, "CANCEL_GRACE", 0.2)
+    monkeypatch.setattr(job_process, "EXIT_GRACE", 0.2)
     process = start("say(event='finished', status='stale', sentence='ok'); time.sleep(60)")
     drain(process, 10)
     assert process.outcome == job_process.Outcome("stale", "ok")
