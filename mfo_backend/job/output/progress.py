@@ -120,12 +120,12 @@ class EventWriter:
         pictures, now = self._pictures, time.monotonic()
         if pictures is None or now - self._last_preview < PREVIEW_SECONDS:
             return {}
-        is_first = self._last_preview == -math.inf
+        if self._last_preview == -math.inf:
+            self._write_picture(REFERENCE_PATH, pictures.reference)
         if not self._write_picture(PREVIEW_PATH, lambda: pictures.current(preview.image)):
             return {}
-        fields, self._last_preview = {"path": PREVIEW_PATH}, time.monotonic()
-        if is_first and self._write_picture(REFERENCE_PATH, pictures.reference):
-            fields["reference"] = REFERENCE_PATH
+        # each names the reference, for of several events a slow reader takes the last one alone
+        fields, self._last_preview = {"path": PREVIEW_PATH, "reference": REFERENCE_PATH}, time.monotonic()
         if self._last_preview - self._last_difference >= DIFFERENCE_SECONDS and self._write_picture(
             DIFFERENCE_PATH, lambda: pictures.difference(preview.image)
         ):

@@ -16,6 +16,7 @@ from typing import Any
 UNIT = 20.0  # of all that follows: pixels at a scale of 1, an icon's width
 ASKED = 10 * UNIT  # by an item with a text, where the layout expands
 GAP = 8.0  # between items of a row or a split that are not aligned
+BESIDE = 7.0  # beside a bar in a column of values: 47 pixels were drawn where 54 were its share
 LABEL = 3.0  # margins of a label
 BOX = 16.0  # a box's margins
 AROUND = 52.0  # a panel's margins and the tabs of the sidebar
@@ -69,11 +70,12 @@ class Layout:
     def __init__(self, words: Any, kind: str = "column", *, align: bool = False, factor: float = 0.0) -> None:
         self.words, self.kind, self.align, self.factor = words, kind, align, factor
         self.alignment, self.use_property_split, self.fixed = "EXPAND", False, False
+        self.in_split = False
         self.items: list[Any] = []
 
     def _within(self, kind: str, **options: Any) -> Layout:
         made = Layout(self.words, kind, **options)
-        made.use_property_split = self.use_property_split
+        made.use_property_split, made.in_split = self.use_property_split, self.kind == "split"
         self.items.append(made)
         return made
 
@@ -113,7 +115,7 @@ class Layout:
         self._text(text, "*", icon != "NONE" or icon_value > 0, LABEL, translate)
 
     def progress(self, *, text: str, **_options: Any) -> None:
-        self._text(text, "*", False, BUTTON, False)
+        self._text(text, "*", False, BUTTON + BESIDE if self.in_split else BUTTON, False)
 
     def operator(
         self, name: str, *, text: str | None = None, icon: str = "NONE", translate: bool = True, **_options: Any
