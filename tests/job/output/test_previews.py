@@ -17,6 +17,7 @@ from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.report.live_pictures import LivePictures
 from mfo_backend.types.event import Preview, Started
 from mfo_backend.types.image import Encoding, Image
+from mfo_backend.types.status import Status
 
 
 def test_each_preview_names_its_reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,6 +29,7 @@ def test_each_preview_names_its_reference(tmp_path: Path, monkeypatch: pytest.Mo
     events(Started((), (), 0.0))
     for _ in range(3):
         events(Preview(pixels))
+    events.finished(Status.STALE, "Done.")
     told = [event for event in map(json.loads, out.getvalue().splitlines()) if event["event"] == "preview"]
     assert len(told) == 3
     for event in told:
