@@ -29,7 +29,7 @@ def read_thumbnail(path: Path) -> Thumbnail:
     header = _HEADER.match(data)
     width, height = map(int, header.groups()) if header else (0, 0)
     if header is None or not width * height or len(data) != header.end() + 3 * width * height:
-        raise OSError(f"{path} is no thumbnail")
+        raise OSError(f"{path} is not a picture")
     return np.frombuffer(data, np.uint8, offset=header.end()).reshape(height, width, 3)
 
 

@@ -155,7 +155,7 @@ def test_what_is_no_thumbnail_is_refused(tmp_path: Path, content: bytes) -> None
     from blender_addon.result.thumbnail import read_thumbnail
 
     (tmp_path / "x.ppm").write_bytes(content)
-    with pytest.raises(OSError, match="no thumbnail"):
+    with pytest.raises(OSError, match="is not a picture"):
         read_thumbnail(tmp_path / "x.ppm")
     with pytest.raises(OSError, match="No such file"):
         read_thumbnail(tmp_path / "y.ppm")
