@@ -221,13 +221,12 @@ def check(chosen: argparse.Namespace) -> dict[str, Any]:
     """Render with the values of a finished job on its material, at the job's resolution and the scene's samples."""
     bpy = _open(chosen.file)
     _watch_parent(chosen.parent)
+    from .export.camera.render_region import render_as
     from .result.job_result import result_folders, whole_job
 
     folders = result_folders(whole_job(Path(chosen.job).absolute()))  # with what was fitted together
     result, *_ = [_put_values(bpy, chosen, folder)[1] for folder in folders]
-    render, image = bpy.context.scene.render, result.image
-    if render.pixel_aspect_x == render.pixel_aspect_y and all(image):
-        render.resolution_x, render.resolution_y, render.resolution_percentage = *image, 100
+    render_as(bpy.context.scene.render, result.image, result.frame)
     return _render(bpy, chosen)
 
 

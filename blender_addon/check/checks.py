@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import bpy
 
-from ..export.camera.read_camera import has_camera, note_picture_settings, picture_size
+from ..export.camera.read_camera import has_camera, note_picture_settings
+from ..export.camera.render_region import Size, pictured_region, pictured_size, render_region
 from ..export.findings import ExportError, Findings, Fix
 from ..export.images.image_pixels import UnreadableImageError, is_data, read_pixels, without_pixels
 from ..export.images.picture_header import read_header
@@ -20,6 +22,7 @@ from ..export.materials.read_material import read_target
 from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 from ..export.reference.counted_part import CountedPart
+from ..export.reference.picture_setup import size_of
 from ..export.reference.reference import (
     DISPLAY_SUFFIXES,
     LINEAR_SUFFIXES,
@@ -41,6 +44,8 @@ from ..result.overlay import background_of
 from ..versions import overrides_of
 
 FINE, IGNORED, TO_CHOOSE, STOPS = "fine", "ignored", "to_choose", "stops"
+REGION_ALONE = "Render Region is on, and the picture shows the region alone."
+REGION_IN_FRAME = "Render Region is on: where the picture is empty beside the region, the region alone counts."
 SHOWN_INSIDE = 3  # values of nodes that the check names
 _FITTED = {name for _, name, *_ in SOCKET_ITEMS}
 
@@ -165,9 +170,9 @@ def _inside(settings: bpy.types.PropertyGroup, target: TargetShader, material: b
 
 
 def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:
-    findings = Findings()
+    findings, size = Findings(), _reference_size(scene)
     if has_camera(scene, findings):
-        note_picture_settings(scene, findings)
+        note_picture_settings(scene, findings, size)
     replaced = overrides_of(view_layer)
     if replaced:
         name, other = view_layer.name, replaced[0]
@@ -179,9 +184,24 @@ def _picture(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
         sentence = f"The render engine is {engine}; the fit reproduces what Cycles shows."
         found.append(Finding(IGNORED, sentence, (Fix("cycles"),)))
     if not findings.errors:
-        width, height = picture_size(scene.render)
+        width, height = pictured_size(scene.render, size)
         found.append(Finding(FINE, f"Camera '{scene.camera.name}', {width} x {height} pixels."))
+        if render_region(scene.render) is not None:
+            alone = pictured_region(scene.render, size) is not None
+            sentence = REGION_ALONE if alone else REGION_IN_FRAME
+            found.append(Finding(FINE, sentence, (Fix("whole_frame"),)))
     return found
+
+
+def _reference_size(scene: bpy.types.Scene) -> Size | None:
+    """Width and height of the chosen reference, None where they are not known."""
+    settings = scene.mfo
+    if settings.reference_source == "IMAGE":
+        return size_of(settings.reference_image)
+    try:
+        return size_of(Path(settings.reference_path)) if settings.reference_path else None
+    except OSError:
+        return None
 
 
 def _more_pictures(scene: bpy.types.Scene) -> list[Finding]:
@@ -222,7 +242,9 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
         return [Finding(STOPS, f"The reference cannot be read ({problem.strerror or problem}): choose another file.")]
     problems = []
     if all(found.size):
-        problems += _refused(refuse_size, found.name, found.size, picture_size(scene.render))
+        wanted = pictured_size(scene.render, found.size)
+        of_region = pictured_region(scene.render, found.size) is not None
+        problems += _refused(partial(refuse_size, of_region=of_region), found.name, found.size, wanted)
     words = f"scene-linear {found.space}, converted to Rec.709" if found.space else "scene-linear Rec.709"
     if not found.is_linear:
         problems += _refused(needs_table, scene, found.name, settings.reference_view)
@@ -257,7 +279,7 @@ def _part_words(scene: bpy.types.Scene) -> list[Finding]:
     part = scene.mfo.first_picture.part
     if part.is_whole:
         return []
-    size = picture_size(scene.render)
+    size = pictured_size(scene.render, _reference_size(scene))
     if part.mask is not None and all(part.mask.size) and tuple(part.mask.size) != size:
         mask, picture = (f"{width}x{height}" for width, height in (part.mask.size, size))
         said = f"The mask '{part.mask.name}' is {mask} and the picture {picture}: it is scaled to that."
@@ -288,7 +310,7 @@ def _file_reference(scene: bpy.types.Scene) -> _Picture:
     kind = f"{header.depth} {header.kind}".strip()
     words = f"{header.width} x {header.height}, {kind}" if header.width else header.kind
     is_linear = path.suffix.lower() in LINEAR_SUFFIXES
-    said = turn_notes(path.name, header, picture_size(scene.render))
+    said = turn_notes(path.name, header, pictured_size(scene.render, (header.width, header.height)))
     space = other_space(header) if is_linear else ""
     return _Picture(path.name, (header.width, header.height), words, is_linear, space, said)
 

@@ -11,7 +11,7 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 
 from ..export.nodes.shader_graph import surface_of
 from ..export.nodes.target_shader import make_own, target_shader
-from ..picture_part import count_all, count_render_region
+from ..picture_part import count_all
 from ..result.animated_sockets import REPLACE, remove_driver
 from ..result.local_copy import LocalCopyError, make_local
 from ..versions import PRINCIPLED, active_output, nodes_enabled
@@ -86,10 +86,6 @@ def _resolution(context: bpy.types.Context, size: str) -> None:
 
 def _whole_frame(context: bpy.types.Context, _argument: str) -> None:
     context.scene.render.use_border = False
-
-
-def _region_counts(context: bpy.types.Context, _argument: str) -> None:
-    count_render_region(context.scene)
 
 
 def _one_eye(context: bpy.types.Context, _argument: str) -> None:
@@ -233,9 +229,6 @@ KINDS = {
     "perspective": Kind("Make Perspective", "Make the scene's camera a perspective one", _perspective),
     "resolution": Kind("Set Output to {}", "Set the output resolution to the reference's, at 100 %", _resolution),
     "whole_frame": Kind("Whole Frame", "Turn Render Region off", _whole_frame),
-    "region_counts": Kind(
-        "Only This Region Counts", "Fit to this part of the reference alone, and turn Render Region off", _region_counts
-    ),
     "whole_picture": Kind("Whole Picture", "Let all of the picture count", _whole_picture),
     "one_eye": Kind("Turn Off", "Turn stereoscopy off", _one_eye),
     "cycles": Kind("Use Cycles", "Set the render engine to Cycles", _cycles),

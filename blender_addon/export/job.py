@@ -16,6 +16,7 @@ from ..graph_values.place import holder_of, is_there
 from ..result.animated_sockets import VALUE, animation_notes
 from ..result.local_copy import unwritable
 from ..versions import PRINCIPLED
+from .camera.render_region import pictured_region, region_parts
 from .files.job_folder import MORE_PICTURES, TARGETS, link_files, new_job_folder, share_files
 from .findings import ExportError, Findings
 from .fitted_slot import FittedSlot, check_slots
@@ -28,7 +29,7 @@ from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe
 from .materials.wanted_values import WantedValues, fits_of_each, wanted_values
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
-from .reference.picture_setup import PictureSetup, check_setups, named, shown
+from .reference.picture_setup import PictureSetup, check_setups, named, shown, size_of
 from .reference.reference import Picture, read_reference
 from .reference.reference_view import SCENE
 from .request import WholeRequest, parameter_of
@@ -243,18 +244,24 @@ def partial_export(
     asked = fits_of_each(fitted, fit, several=bool(targets))
     wanted = [wanted_values(each, own, findings) for each, own in zip(fitted, asked, strict=True)]
     may_miss = bool(targets) and several  # one of the materials, in this picture
+    size = size_of(reference, upright=upright)
+    region = pictured_region(context.scene.render, size)
     with probe_for(fitted, always=any(each.values for each in wanted)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
         if leaves is None:
-            leaves = [largest_leaf(probe, context, f) if probe is not None and by_share else f.leaf for f in fitted]
+            leaves = [
+                largest_leaf(probe, context, f, region=region) if probe is not None and by_share else f.leaf
+                for f in fitted
+            ]
         for number, leaf in enumerate(leaves):
             if leaf is not None:  # whose numbers and values are others
                 wanted[number] = wanted_values(fitted[number], asked[number], Findings(), leaf)
         with SceneBakes(context, probe) as bakes:
             fitted = [replace(each, leaf=own) for each, own in zip(fitted, leaves, strict=True)]
             leaf = leaves[0] if leaves else None
-            data = read_scene(context, obj, findings, bakes, leaf, fitted if targets else (), may_miss=may_miss)
+            together = fitted if targets else ()
+            data = read_scene(context, obj, findings, bakes, leaf, together, may_miss=may_miss, picture=size)
             findings.raise_first()
             assert data is not None
             assert obj is not None
@@ -262,11 +269,12 @@ def partial_export(
             for number, each in enumerate(fitted):
                 fits.append(_read_values(data, context, each, number, wanted[number], findings))
             tell(0.4)
-            size = (data.camera.width, data.camera.height)
-            picture = read_reference(reference, context.scene, size, made=reference_view, upright=upright)
+            picture = read_reference(reference, context.scene, data.camera.size, made=reference_view, upright=upright)
+            if picture is not None and region is None:
+                picture = replace(picture, region=region_parts(context.scene.render))
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
-            inside = [request_of(context, each, own.values) for each, own in zip(fitted, wanted, strict=True)]
+            inside = [request_of(context, each, own.values, region) for each, own in zip(fitted, wanted, strict=True)]
             with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
@@ -280,7 +288,7 @@ def partial_export(
             described = data.materials[target_bsdf(number)]
             if probe is not None and (described.asks_graph or wanted[number].values):
                 described, graphs[number] = yield from evaluate_graph(
-                    probe, context, each, described, number, may_miss=may_miss
+                    probe, context, each, described, number, may_miss=may_miss, region=region
                 )
                 data.materials[target_bsdf(number)] = described
                 (unseen.add if graphs[number] is None else unseen.discard)(number)  # Cycles knows better than rays

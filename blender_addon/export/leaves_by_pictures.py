@@ -8,9 +8,10 @@ from typing import Any
 
 import bpy
 
+from .camera.render_region import pictured_region
 from .fitted_slot import FittedSlot
 from .materials.node_graph import asks_leaf, largest_leaf, probe_for
-from .reference.picture_setup import PictureSetup, named, shown
+from .reference.picture_setup import PictureSetup, named, shown, size_of
 
 
 def leaves_by_pictures(
@@ -39,7 +40,8 @@ def leaves_by_pictures(
         ):
             assert probe is not None
             here = [number for number in asked if targets[number].object.name in there.view_layer.objects]
+            region = pictured_region(there.scene.render, size_of(setup.reference))
             for number in here:
-                leaves[number] = largest_leaf(probe, there, targets[number], may_miss=True)
+                leaves[number] = largest_leaf(probe, there, targets[number], may_miss=True, region=region)
         asked = [number for number in asked if leaves[number] is None]
     return leaves

@@ -67,11 +67,7 @@ class WholeRequest:
                 "node": list(material.node),
                 "labels": _labels(material),
             },
-            "image": {
-                "width": data.camera.width,
-                "height": data.camera.height,
-                "film_transparent": data.settings.film_transparent,
-            },
+            "image": _image(data),
         }
         request["view"] = {"exposure_ev": view.exposure, "gamma": view.gamma}
         if picture is not None and picture.view is not None:
@@ -88,6 +84,17 @@ class WholeRequest:
         request["notes"] = list(self.findings.notes)
         request["left_out"] = list(self.findings.left_out)
         return request
+
+
+def _image(data: SceneData) -> dict[str, Any]:
+    """What is said of the picture; where it shows a region alone, also the frame and where in that it lies."""
+    camera = data.camera
+    width, height = camera.size
+    said: dict[str, Any] = {"width": width, "height": height, "film_transparent": data.settings.film_transparent}
+    if camera.region is not None:
+        frame = {"width": camera.width, "height": camera.height}
+        said["frame"] = frame | {"left": camera.region.left, "top": camera.region.top}
+    return said
 
 
 def _material(material: Material, files: SceneFiles, *, seen: bool) -> dict[str, Any]:

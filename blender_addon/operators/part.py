@@ -8,7 +8,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ..check import preflight
-from ..export.camera.read_camera import picture_size
+from ..export.camera.render_region import pictured_size
 from ..picture_part import count_all, count_render_region
 from ..result import overlay
 from ..sentences.translated import translated
@@ -66,6 +66,12 @@ class MFO_OT_draw_part(bpy.types.Macro):
         if context.space_data is None or context.space_data.type != "VIEW_3D":
             cls.poll_message_set(translated("Draw in a 3D view: open the sidebar there"))
             return False
+        render = context.scene.render
+        if render.use_border and render.use_crop_to_border:
+            cls.poll_message_set(
+                translated("Render Region cuts the picture already: turn it off, or give the edges below")
+            )
+            return False
         if camera is None or camera.type != "CAMERA" or not chosen:
             cls.poll_message_set(translated("Choose the picture to match, and give the scene a camera, first"))
             return False
@@ -83,8 +89,7 @@ class MFO_OT_paint_mask(bpy.types.Operator):
         """Make the image, or take the chosen one, and show it in an Image Editor where one is open."""
         part = context.scene.mfo.first_picture.part
         if part.mask is None:
-            width, height = picture_size(context.scene.render)
-            part.mask = bpy.data.images.new("Mask", width, height)
+            part.mask = bpy.data.images.new("Mask", *pictured_size(context.scene.render))
             part.mask.generated_color = (1.0, 1.0, 1.0, 1.0)
             part.mask.use_fake_user = True  # it may have no other user while the scene's settings change
         editors = [a.spaces.active for a in context.screen.areas if a.type == "IMAGE_EDITOR"] if context.screen else []

@@ -17,6 +17,8 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
+from ..export.camera.camera_model import Region
+from ..export.camera.render_region import picture_size, region_settings
 from ..versions import save_as_multilayer
 from .plain_exr import read_plain_exr
 
@@ -55,13 +57,15 @@ class Outputs:
     frame: Frame
 
 
-def frame_of(scene: bpy.types.Scene, obj: bpy.types.Object, scale: int, outputs: int) -> Frame | None:
+def frame_of(
+    scene: bpy.types.Scene, obj: bpy.types.Object, scale: int, outputs: int, region: Region | None = None
+) -> Frame | None:
     """The frame around `obj` with at most `scale` subpixels along a pixel, less where the AOVs would be too large.
 
-    None where all of it is beside the picture or behind the camera.
+    The picture may show a `region` of it alone. None where all of it is beside the picture or behind the camera.
     """
-    size = _picture_size(scene.render)
-    bounds = _bounds(scene, obj, size)
+    size = picture_size(scene.render)
+    bounds = _bounds(scene, obj, size, region or Region(0, 0, *size))
     if bounds is None:
         return None
     left, top, right, bottom = bounds
@@ -183,13 +187,9 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
         put(render, "resolution_percentage", 100)
         put(render, "resolution_x", width)
         put(render, "resolution_y", height)
-        put(render, "use_border", True)
-        put(render, "use_crop_to_border", True)
-        # Blender rounds borders to whole pixels, and a float32 of a bound may lie just below
-        put(render, "border_min_x", (frame.left + 0.25) / width)
-        put(render, "border_max_x", (frame.right + 0.25) / width)
-        put(render, "border_min_y", (height - frame.bottom + 0.25) / height)
-        put(render, "border_max_y", (height - frame.top + 0.25) / height)
+        region = Region(frame.left, frame.top, frame.right, frame.bottom)
+        for name, value in region_settings(region, frame.full).items():
+            put(render, name, value)
         for name in ("use_compositing", "use_sequencer", "use_motion_blur", "use_multiview", "use_freestyle"):
             put(render, name, False)
         put(render, "use_file_extension", False)
@@ -223,16 +223,19 @@ def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.f
     return np.stack([parts[key] for key in order], axis=-1)
 
 
-def _picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
-    percent = render.resolution_percentage
-    return render.resolution_x * percent // 100, render.resolution_y * percent // 100
-
-
-def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]) -> tuple[int, int, int, int] | None:
-    """Left, top, right and bottom of the pixels that can see `obj`; the whole picture where it reaches behind the
-    camera, None where there are none."""
+def _bounds(
+    scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int], region: Region
+) -> tuple[int, int, int, int] | None:
+    """Left, top, right and bottom of the pixels of a region that can see `obj`; all where it reaches behind the camera,
+    None where there are none."""
     width, height = size
-    whole = (0, 0, width, height)
+    margin = int(MARGIN)
+    whole = (
+        max(region.left - margin, 0),
+        max(region.top - margin, 0),
+        min(region.right + margin, width),
+        min(region.bottom + margin, height),
+    )
     corners = []
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
@@ -250,9 +253,9 @@ def _bounds(scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int]
     left, right = (pick(point.x for point in seen) * width for pick in (min, max))
     bottom, top = (pick(point.y for point in seen) * height for pick in (min, max))
     found = (
-        max(math.floor(left - MARGIN), 0),
-        max(math.floor(height - top - MARGIN), 0),
-        min(math.ceil(right + MARGIN), width),
-        min(math.ceil(height - bottom + MARGIN), height),
+        max(math.floor(left - MARGIN), whole[0]),
+        max(math.floor(height - top - MARGIN), whole[1]),
+        min(math.ceil(right + MARGIN), whole[2]),
+        min(math.ceil(height - bottom + MARGIN), whole[3]),
     )
     return found if found[0] < found[2] and found[1] < found[3] else None

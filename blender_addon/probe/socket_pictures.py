@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..export.camera.camera_model import Region
 from ..export.images.color_space import to_rec709
 from ..export.nodes.displacement import SHADING_NORMAL, displacement_in
 from ..export.nodes.shader_graph import source_of
@@ -56,7 +57,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     Requested are `scene`, `layer`, `object`, `slot`, for each of the `leaves` of its shaders the `node` (a path of
     names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples` of
     each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the second
-    what it would see were that away, and so on; files have one below the other. Answered are for each of the `leaves`
+    what it would see were that away, and so on; files have one below the other. `region` is the left, top, right and
+    bottom of what the picture shows alone, in pixels of the frame, None for all. Answered are for each of the `leaves`
     the `sockets` by name and the `weight`, each a `file` and its `mean` over what the camera sees; the file
     `positions`, and `camera`, the (3, 4) matrix from the world to columns and rows of the files. Colours are linear
     Rec.709, directions unit vectors of the world or zero.
@@ -141,12 +143,14 @@ class Target:
     layer: bpy.types.ViewLayer
     obj: bpy.types.Object
     slot: bpy.types.MaterialSlot
+    region: Region | None = None
 
     @staticmethod
     def of(request: Mapping[str, Any]) -> Target:
         """That of a request's `scene`, `layer`, `object` and `slot`, which are the window's from now on.
 
-        So are the camera, frame and size of its `view`, where it has one.
+        So are the camera, frame and size of its `view`, where it has one. It or the view may have the `region` of the
+        frame that the picture shows alone.
         """
         scene = bpy.data.scenes[request["scene"]]
         layer = scene.view_layers[request["layer"]]
@@ -155,7 +159,8 @@ class Target:
         if request.get("view"):
             _show(scene, request["view"])
         obj = scene.objects[request["object"]]
-        return Target(scene, layer, obj, obj.material_slots[request["slot"]])
+        edges = (request.get("view") or request).get("region")
+        return Target(scene, layer, obj, obj.material_slots[request["slot"]], Region(*edges) if edges else None)
 
     @property
     def material(self) -> bpy.types.Material:
@@ -164,7 +169,7 @@ class Target:
 
     def frame(self, scale: int, outputs: int) -> Frame:
         """See `frame_of`; raises `NotSeenError` where there is none."""
-        frame = frame_of(self.scene, self.obj, scale, outputs)
+        frame = frame_of(self.scene, self.obj, scale, outputs, self.region)
         if frame is None:
             raise NotSeenError(NOT_SEEN.format(obj=self.obj.name))
         return frame

@@ -45,10 +45,10 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """Write one .npy file, float32 (height, width, 1 or 3), for each socket of each variant.
 
     Requested are `scene`, `layer`, `object` and `slot` as of the command `sockets`, with the `view` of a picture, its
-    `camera`, `frame`, `width` and `height`, where it may be another one than the file's, the `sockets` by name, each a
-    path of names to it, of which the last is empty for the weight of a shader in a mix, the `places` of the values
-    (entries of request.json), `variants`, each with a number or colour for every place in `values` and with the
-    names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder` for
+    `camera`, `frame`, `width`, `height` and `region`, where it may be another one than the file's, the `sockets` by
+    name, each a path of names to it, of which the last is empty for the weight of a shader in a mix, the `places` of
+    the values (entries of request.json), `variants`, each with a number or colour for every place in `values` and with
+    the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder` for
     the files; `elsewhere` where the files of that name are asked for, too, for the first variant. Answered are
     `files`, by socket for each variant, `elsewhere`, by socket as of the command `sockets`, and of the target the
     file `positions`, NaN beside it, and the `camera` of that command.

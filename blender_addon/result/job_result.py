@@ -70,6 +70,7 @@ class JobResult:
     verdict: str = ""
     certainty_words: Mapping[str, str] = field(default_factory=dict)
     image: tuple[int, int] = (0, 0)  # width and height of the job's pictures
+    frame: Mapping[str, int] = field(default_factory=dict)  # of which they show a part: width, height, left and top
     spread: Mapping[str, float] = field(default_factory=dict)  # standard deviation, of a colour's least sure channel
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # what the fit could have chosen
     pictures: tuple[PastPicture, ...] = ()  # of a fit of several
@@ -171,6 +172,7 @@ def read_job_result(folder: Path) -> JobResult:
             pictures=tuple(_picture(folder, p) for p in result.get("pictures", ())),
             next_picture=_next_picture(result.get("next_picture")),
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),
+            frame={str(k): int(v) for k, v in (request.get("image", {}).get("frame") or {}).items()},
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise JobResultError(

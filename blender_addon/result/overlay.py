@@ -6,6 +6,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
+import numpy as np
+
+from ..export.camera.camera_model import Region
+from ..export.camera.render_region import Size, picture_size, pictured_region
 
 NAME = "Material Fit Overlay"  # of the image, by which the background is known again
 
@@ -29,12 +33,33 @@ def show(scene: bpy.types.Scene) -> None:
         image = settings.reference_image.copy()
     else:
         image = bpy.data.images.load(str(Path(bpy.path.abspath(settings.reference_path))), check_existing=False)
+    region = pictured_region(scene.render, (image.size[0], image.size[1]))
+    if region is not None:
+        image = _in_frame(image, region, picture_size(scene.render))
     image.name = NAME
     camera = scene.camera.data
     background = camera.background_images.new()
     background.image, background.display_depth = image, "FRONT"
     background.frame_method, background.alpha = "CROP", settings.overlay_opacity
     camera.show_background_images = True
+
+
+def _in_frame(image: bpy.types.Image, region: Region, size: Size) -> bpy.types.Image:
+    """An image of a frame that shows `image`, which goes away, in a region and nothing beside."""
+    width, height = size
+    framed = bpy.data.images.new(NAME, width, height, alpha=True, float_buffer=image.is_float)
+    framed.colorspace_settings.name = image.colorspace_settings.name
+    shown = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(shown)
+    shown = shown.reshape(image.size[1], image.size[0], image.channels)
+    pixels = np.zeros((height, width, 4), np.float32)
+    inside = pixels[height - region.bottom : height - region.top, region.left : region.right]  # rows from below
+    inside[..., 3] = 1.0
+    inside[..., : image.channels] = shown if image.channels > 2 else shown[..., :1]
+    framed.pixels.foreach_set(pixels.ravel())
+    framed.pack()  # a drawn image whose pixels no file holds is lost with the next undo step
+    bpy.data.images.remove(image)
+    return framed
 
 
 def hide(camera: bpy.types.Object | None) -> None:

@@ -23,8 +23,8 @@ def panorama(scene: Any, target: Any) -> None:
     scene.camera.data.type = "PANO"
 
 
-def border(scene: Any, target: Any) -> None:
-    scene.render.use_border = True
+def empty_region(scene: Any, target: Any) -> None:
+    scene.render.use_border, scene.render.border_min_x, scene.render.border_max_x = True, 0.5, 0.51
 
 
 def flat_camera(scene: Any, target: Any) -> None:
@@ -79,7 +79,7 @@ def override(scene: Any, target: Any) -> None:
 CASES: dict[Callable[[Any, Any], None], str] = {
     no_camera: "The scene has no camera: add one and make it the active camera.",
     panorama: "Camera 'Camera' is of type Pano: make it Perspective or Orthographic.",
-    border: "Render Region is on, so the picture shows a part of the frame: turn Render Region off.",
+    empty_region: "The Render Region holds no pixel: turn Render Region off.",
     flat_camera: "Camera 'Camera' has a scale of zero: give it and its parents a scale other than zero.",
     no_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
     empty_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",

@@ -26,11 +26,35 @@ class PixelFilter:
 
 
 @dataclass(frozen=True)
+class Region:
+    """A rectangle of pixels, from the upper left corner of the frame on; `right` and `bottom` are the first beside."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.right - self.left, self.bottom - self.top
+
+    def parts_of(self, width: int, height: int) -> tuple[float, float, float, float]:
+        """Its edges as parts of the frame's width and height."""
+        return self.left / width, self.top / height, self.right / width, self.bottom / height
+
+
+def edges_of(region: Region | None) -> list[int] | None:
+    """Left, top, right and bottom, for JSON."""
+    return None if region is None else [region.left, region.top, region.right, region.bottom]
+
+
+@dataclass(frozen=True)
 class Camera:
     """A Blender camera. `world` is a rigid 4x4 matrix; lengths in metres, `lens` and `sensor` in millimetres.
 
-    `width` and `height` count square pixels; `fit` is AUTO, HORIZONTAL or VERTICAL; shifts are in units of the
-    fitted dimension.
+    `width` and `height` count square pixels of the frame; `fit` is AUTO, HORIZONTAL or VERTICAL; shifts are in units of
+    the fitted dimension. The picture is all of the frame or a `region` of it.
     """
 
     kind: str  # PERSP or ORTHO
@@ -49,6 +73,25 @@ class Camera:
     # of a perspective camera without shift; a radius of 0 leaves everything sharp
     aperture_radius: float = 0.0
     focus_distance: float = 0.0
+    region: Region | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture."""
+        return (self.width, self.height) if self.region is None else self.region.size
+
+    def shown(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether pixel coordinates (n, 2) of the frame lie in the picture, (n,)."""
+        left, top, right, bottom = self._edges()
+        return ((places > (left, top)) & (places < (right, bottom))).all(axis=1)
+
+    def beside(self, places: NDArray[np.float64]) -> bool:
+        """Whether all pixel coordinates (n, 2) lie beyond one and the same edge of the picture."""
+        left, top, right, bottom = self._edges()
+        return bool(((places < (left, top)).all(axis=0) | (places > (right, bottom)).all(axis=0)).any())
+
+    def _edges(self) -> list[int]:
+        return edges_of(self.region) or [0, 0, self.width, self.height]
 
     @property
     def fits_width(self) -> bool:
@@ -113,6 +156,7 @@ def sensor_element(camera: Camera, pixel_filter: PixelFilter, spp: int) -> Eleme
         plugin("film", "hdrfilm"),
         integer("width", camera.width),
         integer("height", camera.height),
+        *_crop(camera.region),
         string("pixel_format", "rgb"),
         string("component_format", "float32"),
         boolean("sample_border", True),  # Cycles' filter reaches beyond the picture
@@ -120,6 +164,14 @@ def sensor_element(camera: Camera, pixel_filter: PixelFilter, spp: int) -> Eleme
     )
     sampler = add(plugin("sampler", "independent"), integer("sample_count", spp))
     return add(sensor, scalar("near_clip", camera.clip_start), scalar("far_clip", camera.clip_end), film, sampler)
+
+
+def _crop(region: Region | None) -> list[Element]:
+    if region is None:
+        return []
+    width, height = region.size
+    named = {"offset_x": region.left, "offset_y": region.top, "width": width, "height": height}
+    return [integer(f"crop_{name}", value) for name, value in named.items()]
 
 
 def filter_element(pixel_filter: PixelFilter) -> Element:

@@ -9,23 +9,20 @@ import numpy as np
 from ...versions import cycles_settings
 from ..findings import Findings, Fix
 from .camera_model import Camera, PixelFilter
+from .render_region import Size, picture_size, pictured_region, render_region
 
 
-def picture_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
-    """Return width and height in pixels, the percentage applied as Blender does."""
-    percent = render.resolution_percentage
-    return render.resolution_x * percent // 100, render.resolution_y * percent // 100
-
-
-def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings: Findings) -> Camera | None:
-    """Return the scene camera, or None with an error in `findings`."""
+def read_camera(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings: Findings, picture: Size | None = None
+) -> Camera | None:
+    """Return the scene camera for a reference of the size `picture`, or None with an error in `findings`."""
     if not has_camera(scene, findings):
         return None
     evaluated = scene.camera.evaluated_get(depsgraph)
     data = evaluated.data
     render = scene.render
     name = scene.camera.name
-    note_picture_settings(scene, findings)
+    note_picture_settings(scene, findings, picture)
     width, height = picture_size(render)
     aspect = render.pixel_aspect_x / render.pixel_aspect_y
     square_width, square_height = (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
@@ -58,6 +55,7 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, findings
         clip_end=data.clip_end,
         aperture_radius=_aperture_radius(data),
         focus_distance=_focus_distance(evaluated, depsgraph),
+        region=pictured_region(render, picture),
     )
 
 
@@ -91,14 +89,15 @@ def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     return max(abs(view.dot(camera.matrix_world.translation - place.translation)), 1e-5)
 
 
-def note_picture_settings(scene: bpy.types.Scene, findings: Findings) -> None:
-    """Report what the scene's camera and output settings do to a picture and the fit does not."""
+def note_picture_settings(scene: bpy.types.Scene, findings: Findings, picture: Size | None = None) -> None:
+    """Report what the scene's camera and output settings do to a picture of this size and the fit does not."""
     render = scene.render
-    if render.use_border:
+    region = render_region(render)
+    if region is not None and min(region.size) <= 0:
+        findings.error("The Render Region holds no pixel: turn Render Region off.", Fix("whole_frame"))
+    elif pictured_region(render, picture) is not None and render.pixel_aspect_x != render.pixel_aspect_y:
         findings.error(
-            "Render Region is on, so the picture shows a part of the frame: turn Render Region off.",
-            Fix("whole_frame"),
-            Fix("region_counts"),
+            "Render Region cuts pictures whose pixels are not square: turn Render Region off.", Fix("whole_frame")
         )
     if render.use_multiview:
         findings.error("Stereoscopy is on: turn it off to fit a single picture.", Fix("one_eye"))

@@ -15,7 +15,8 @@ from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
 from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, plain_name
 from ...probe.own_blender import save_copy
-from ..camera.read_camera import picture_size
+from ..camera.camera_model import Region, edges_of
+from ..camera.render_region import picture_size
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material
@@ -128,8 +129,13 @@ def _numbers_of_leaves(target: TargetShader) -> list[int]:
     return [position for position, leaf in enumerate(target.others) if leaf.node.bl_idname in KINDS]
 
 
-def request_of(context: bpy.types.Context, fitted: FittedSlot, values: Sequence[GraphValue]) -> dict[str, Any]:
-    """What the entry `graph` of request.json has besides for these values; nothing where there are none."""
+def request_of(
+    context: bpy.types.Context, fitted: FittedSlot, values: Sequence[GraphValue], region: Region | None = None
+) -> dict[str, Any]:
+    """What the entry `graph` of request.json has besides for these values; nothing where there are none.
+
+    The picture may show a `region` alone.
+    """
     material, target = fitted.material, target_shader(fitted.material, fitted.leaf)
     if not values or material is None or target is None:
         return {}
@@ -147,16 +153,17 @@ def request_of(context: bpy.types.Context, fitted: FittedSlot, values: Sequence[
         "evaluate": {
             "scene": context.scene.name, "layer": context.view_layer.name, "object": fitted.object.name,
             "slot": fitted.slot, "sockets": {name: path(name) for name in used},
-            "view": _view(context.scene),
+            "view": _view(context.scene, region),
         },
     }  # fmt: skip
 
 
-def _view(scene: bpy.types.Scene) -> dict[str, Any]:
+def _view(scene: bpy.types.Scene, region: Region | None) -> dict[str, Any]:
     """What the picture shows of the copy, which another picture's export may have made."""
     width, height = picture_size(scene.render)
     assert scene.camera is not None  # it was read
-    return {"camera": scene.camera.name, "frame": scene.frame_current_final, "width": width, "height": height}
+    view = {"camera": scene.camera.name, "frame": scene.frame_current_final, "width": width, "height": height}
+    return view if region is None else view | {"region": edges_of(region)}
 
 
 def write_copy(folder: Path) -> None:

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...probe.client import Probe, ProbeError
+from ..camera.camera_model import Region, edges_of
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material, Socket
@@ -90,8 +91,15 @@ def asks_leaf(fitted: FittedSlot) -> bool:
     return len(leaves) > 1 and not chosen_leaf(fitted.material) and any(leaf.is_linked for leaf in leaves)
 
 
-def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot, *, may_miss: bool = False) -> str | None:
-    """The name of the leaf that covers most of the target in the picture.
+def largest_leaf(
+    probe: Probe,
+    context: bpy.types.Context,
+    fitted: FittedSlot,
+    *,
+    may_miss: bool = False,
+    region: Region | None = None,
+) -> str | None:
+    """The name of the leaf that covers most of the target in the picture, which may show a `region` of the frame.
 
     None where there is nothing to choose, or the camera does not see a target that it `may_miss`.
 
@@ -104,7 +112,7 @@ def largest_leaf(probe: Probe, context: bpy.types.Context, fitted: FittedSlot, *
         return None
     leaves = fitted_leaves(fitted.material)
     asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
-    _send(probe, context, fitted, asked, 1, probe.folder, elsewhere=False, may_miss=may_miss)
+    _send(probe, context, fitted, asked, 1, probe.folder, elsewhere=False, may_miss=may_miss, region=region)
     answer = probe.receive()  # waited for: the scene is read by it, and must be as in the copy that was asked
     if not answer.get("seen", True):
         return None
@@ -126,12 +134,13 @@ def _send(
     *,
     elsewhere: bool = True,
     may_miss: bool = False,
+    region: Region | None = None,
 ) -> None:
     probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=fitted.object.name, slot=fitted.slot,
         leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths, elsewhere=elsewhere,
-        may_miss=may_miss,
+        may_miss=may_miss, region=edges_of(region),
     )  # fmt: skip
 
 
@@ -148,6 +157,7 @@ def evaluate_graph(
     number: int = 0,
     *,
     may_miss: bool = False,
+    region: Region | None = None,
 ) -> Generator[None, None, tuple[Material, NodeGraph | None]]:
     """The material with the mean of each socket of its graph, and the pictures of them; yields while Cycles works.
 
@@ -171,7 +181,7 @@ def evaluate_graph(
     folder = probe.folder / f"target_{number}"
     folder.mkdir(exist_ok=True)
     depths = DEPTHS if material.passes_light else 1
-    _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss)
+    _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss, region=region)
     while not probe.is_answered():
         yield
     answer = probe.receive()

@@ -12,11 +12,12 @@ from typing import Any
 import bpy
 
 from ...versions import cycles_settings
-from ..camera.read_camera import picture_size
+from ..camera.render_region import Size, pictured_size
 from ..findings import ExportError
 from ..images.picture_header import read_header
 from .counted_part import picture_of
 from .reference import Picture
+from .turned_picture import SIDEWAYS
 
 MOST_PICTURES = 32  # as the backend's `job.folder.request`
 _MOST_EXPOSURE = 32.0  # stops, as Blender's own view exposure
@@ -107,8 +108,8 @@ def shown(
         cycles = cycles_settings(scene)
         if setup.exposure and cycles is not None:
             put(cycles, "film_exposure", cycles.film_exposure * 2.0**setup.exposure)
-        size = _size(setup.reference) if own_size else None
-        if size is not None and size != picture_size(scene.render):
+        size = size_of(setup.reference) if own_size else None
+        if size is not None and size != pictured_size(scene.render, size):
             put(scene.render, "resolution_percentage", 100)
             put(scene.render, "resolution_x", size[0])
             put(scene.render, "resolution_y", size[1])
@@ -167,11 +168,19 @@ def _camera(scene: bpy.types.Scene, setup: PictureSetup) -> bpy.types.Object | N
     return camera
 
 
-def _size(picture: Picture) -> tuple[int, int] | None:
-    """Width and height of a picture, None where they are not known without reading it."""
+def size_of(picture: Picture | None, *, upright: bool = False) -> Size | None:
+    """Width and height of a picture, None where they are not known without reading it.
+
+    `upright` says that it is turned as its EXIF data say.
+    """
+    if picture is None:
+        return None
     reference = picture_of(picture)
     if isinstance(reference, bpy.types.Image):
         return (reference.size[0], reference.size[1]) if all(reference.size) else None
     path = Path(bpy.path.abspath(str(reference)))
     header = read_header(path) if path.is_file() else None
-    return (header.width, header.height) if header is not None and header.width and header.height else None
+    if header is None or not (header.width and header.height):
+        return None
+    width, height = header.width, header.height
+    return (height, width) if upright and header.orientation in SIDEWAYS else (width, height)

@@ -12,12 +12,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..camera.render_region import Size, picture_size
 from ..files.exr_file import REC709, write_exr
 from ..files.png_file import write_png
 from ..findings import ExportError, Fix
 from ..images.image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
 from ..images.picture_header import PictureHeader, read_header
-from .counted_part import CountedPart
+from .counted_part import WHOLE, CountedPart
 from .reference_colour import file_notes, image_notes
 from .reference_view import SCENE, needs_table, view_note
 from .turned_picture import turn_notes, turned
@@ -35,7 +36,8 @@ class Reference:
     """A reference to be written as `name`: the file `source`, or `pixels` (linear float32 or display uint8).
 
     `view` is the view of a display picture where no formula has it; `notes` say what was taken for granted. `space` and
-    `primaries` are what the file of linear `pixels` says of their colours. `part` says what of it counts.
+    `primaries` are what the file of linear `pixels` says of their colours. `part` says what of it counts; beside
+    `region`, a rectangle like a crop, it may be empty.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Reference:
     space: str = ""
     primaries: tuple[float, ...] = REC709
     part: CountedPart | None = None
+    region: tuple[float, float, float, float] = WHOLE
 
     def write(self, folder: Path) -> dict[str, Any]:
         """Put the picture into `folder`; returns the object `reference` of request.json.
@@ -66,6 +69,8 @@ class Reference:
         else:
             write_png(folder / self.name, np.asarray(self.pixels, dtype=np.uint8))
         part = self.part.write(folder) if self.part is not None else {}
+        if self.region != WHOLE:
+            part["region"] = list(self.region)
         return {"path": self.name, "encoding": self.encoding, **part}
 
 
@@ -96,8 +101,9 @@ def read_reference(
         found = read_reference(reference.picture, scene, size, made=made, upright=upright, alpha=reference.alpha)
         return replace(found, part=reference) if found is not None else None
     stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
+    rendered = picture_size(scene.render) if stretched else size
     if isinstance(reference, bpy.types.Image):
-        found = _from_image(reference, scene, size, stretched, made, alpha=alpha)
+        found = _from_image(reference, scene, size, rendered, made, alpha=alpha)
         return replace(found, notes=(*found.notes, *image_notes(reference)))
     path = Path(bpy.path.abspath(str(reference)))
     if not path.is_file():
@@ -107,16 +113,14 @@ def read_reference(
     header = read_header(path)
     refuse_kind(path, header)
     turn = header.orientation if header is not None and upright else 1
-    said = (
-        () if header is None or upright else turn_notes(path.name, header, rendered_size(scene), f"reference{suffix}")
-    )
+    said = () if header is None or upright else turn_notes(path.name, header, rendered, f"reference{suffix}")
     is_linear = suffix in LINEAR_SUFFIXES
     if stretched or turn != 1:
         image = bpy.data.images.load(str(path), check_existing=False)
         try:
             if suffix == ".exr":
                 image.colorspace_settings.name = "Non-Color"  # the numbers as they are, with what the file says of them
-            found = _from_image(image, scene, size, stretched, made, turn, alpha=alpha)
+            found = _from_image(image, scene, size, rendered, made, turn, alpha=alpha)
         finally:
             bpy.data.images.remove(image)
         if suffix == ".exr" and header is not None:
@@ -151,29 +155,31 @@ def holds_display_colours(image: bpy.types.Image) -> bool:
     return image.colorspace_settings.name in SRGB_NAMES and image.file_format not in LINEAR_FORMATS
 
 
-def refuse_size(name: str, found: tuple[int, int], wanted: tuple[int, int]) -> None:
-    """Raise `ExportError` where a reference has another size (width, height) than the render."""
-    if found != wanted:
+def refuse_size(name: str, found: Size, wanted: Size, *, of_region: bool = False) -> None:
+    """Raise `ExportError` where a reference has another size (width, height) than the render, or its Render Region."""
+    if found == wanted:
+        return
+    scale = Fix("scale", f"{wanted[0]}x{wanted[1]}")
+    if of_region:
         raise ExportError(
-            f"The reference '{name}' is {found[0]}x{found[1]}, but the scene renders {wanted[0]}x{wanted[1]}: set the "
-            "output resolution to the reference's.",
-            Fix("resolution", f"{found[0]}x{found[1]}"),
-            Fix("scale", f"{wanted[0]}x{wanted[1]}"),
+            f"The reference '{name}' is {found[0]}x{found[1]}, but the Render Region is {wanted[0]}x{wanted[1]}: turn "
+            "Render Region off, or set it as it was for the reference.",
+            Fix("whole_frame"),
+            scale,
         )
-
-
-def rendered_size(scene: bpy.types.Scene) -> tuple[int, int]:
-    """Width and height of the pictures that the scene renders, in pixels as they are, square or not."""
-    render = scene.render
-    share = render.resolution_percentage
-    return render.resolution_x * share // 100, render.resolution_y * share // 100
+    raise ExportError(
+        f"The reference '{name}' is {found[0]}x{found[1]}, but the scene renders {wanted[0]}x{wanted[1]}: set the "
+        "output resolution to the reference's.",
+        Fix("resolution", f"{found[0]}x{found[1]}"),
+        scale,
+    )
 
 
 def _from_image(
     image: bpy.types.Image,
     scene: bpy.types.Scene,
     size: tuple[int, int],
-    stretched: bool,
+    rendered: Size,
     made: str,
     turn: int = 1,
     *,
@@ -185,8 +191,8 @@ def _from_image(
         raise ExportError(f"The reference '{image.name}' {problem}.") from None
     pixels = turned(pixels, turn)
     height, width = pixels.shape[:2]
-    refuse_size(image.name, (width, height), rendered_size(scene) if stretched else size)
-    if stretched:
+    refuse_size(image.name, (width, height), rendered, of_region=rendered != picture_size(scene.render))
+    if rendered != size:
         pixels = _stretch(pixels, size)
     if not holds_display_colours(image):
         return Reference("reference.exr", "linear", pixels=pixels)

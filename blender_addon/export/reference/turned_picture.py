@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..findings import ExportError, Fix
 from ..images.picture_header import PictureHeader
 
-_SIDEWAYS = (5, 6, 7, 8)
+SIDEWAYS = (5, 6, 7, 8)
 # orientation of EXIF 2.3, 4.6.4, in words
 _SHOWN = {
     2: "mirrored",
@@ -24,7 +24,7 @@ _SHOWN = {
 
 def turned(pixels: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:
     """The picture (height, width, channels) as EXIF data of this orientation want it shown."""
-    if orientation in _SIDEWAYS:
+    if orientation in SIDEWAYS:
         pixels = np.swapaxes(pixels, 0, 1)
     if orientation in (3, 4, 7, 8):
         pixels = pixels[::-1]
@@ -47,7 +47,7 @@ def turn_notes(name: str, header: PictureHeader, wanted: tuple[int, int], copy: 
     if shown is None:
         return ()
     stored = (header.width, header.height)
-    if header.orientation in _SIDEWAYS and stored != wanted and stored[::-1] == wanted:
+    if header.orientation in SIDEWAYS and stored != wanted and stored[::-1] == wanted:
         raise ExportError(
             f"The reference {name} is stored as {stored[0]}x{stored[1]} and its EXIF data want it shown {shown}, which "
             f"is the {wanted[0]}x{wanted[1]} of this scene: take a turned copy (Turn Upright, --upright).",

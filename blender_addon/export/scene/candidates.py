@@ -21,9 +21,11 @@ MOST_CAMERAS, MOST_LIGHTS = 12, 3  # the most that the backend's `fit.candidates
 def candidates(scene: bpy.types.Scene, data: SceneData) -> dict[str, Any]:
     """The lists `cameras` and `lights` of request.json; those that give the target most light come first.
 
-    Cameras are perspective ones without shift. Where lights come by instances there are none that could be moved alone.
+    Cameras are perspective ones without shift, and none for a picture of a Render Region alone. Where lights come by
+    instances there are none that could be moved alone.
     """
-    cameras = [_camera(obj, data.camera) for obj in scene.objects if obj.type == "CAMERA" and obj != scene.camera]
+    others = [obj for obj in scene.objects if obj.type == "CAMERA" and obj != scene.camera]
+    cameras = [_camera(obj, data.camera) for obj in others if data.camera.region is None]
     counts = Counter(light.name for light in data.lights)
     single = all(count == 1 and name in scene.objects for name, count in counts.items())
     middle = data.middle() if data.target is None else data.target.mesh.positions.mean(axis=0)

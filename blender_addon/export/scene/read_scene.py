@@ -21,6 +21,7 @@ from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.bent_normals import share_of_bent_normals
 from ..camera.read_camera import read_camera, read_pixel_filter
+from ..camera.render_region import Size
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings, Fix
 from ..fitted_slot import FittedSlot
@@ -63,18 +64,20 @@ def read_scene(
     targets: Sequence[FittedSlot] = (),
     *,
     may_miss: bool = False,
+    picture: Size | None = None,
 ) -> SceneData | None:
     """Return the scene as the render would see it, or None with errors in `findings`.
 
     What only Cycles can tell is asked of `bakes`; `finish_scene` puts it in. `leaf` names the shader of the target's
     mix that is fitted, and `targets` are the slots whose materials are fitted together, where these are several. With
-    `may_miss` the camera need not see all of these: other pictures may.
+    `may_miss` the camera need not see all of these: other pictures may. `picture` is the reference's size, which says
+    whether it shows the Render Region alone.
     """
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
         findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
         with context.temp_override(view_layer=layer):
-            return read_scene(bpy.context, target, findings, bakes, leaf, targets, may_miss=may_miss)
+            return read_scene(bpy.context, target, findings, bakes, leaf, targets, may_miss=may_miss, picture=picture)
     scene, view_layer = context.scene, context.view_layer
     others = [each.name for each in scene.view_layers if each.use and each != view_layer]
     if others and view_layer.use:
@@ -95,7 +98,7 @@ def read_scene(
         findings.note("Compositing nodes are left out: a reference that went through them holds more than the render.")
     with render_state(view_layer, scene):
         depsgraph = context.evaluated_depsgraph_get()
-        camera = read_camera(scene, depsgraph, findings)
+        camera = read_camera(scene, depsgraph, findings, picture)
         settings = _read_settings(scene, findings)
         fitted = targets or [FittedSlot(target, target.active_material_index, leaf)]
         materials = [read_target(f.material, f.object.name, f.slot, findings, f.leaf) for f in fitted]

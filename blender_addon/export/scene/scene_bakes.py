@@ -244,7 +244,7 @@ def _texels(camera: Camera, mesh: TriangleMesh) -> int:
     a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
     points = chosen[:, 0] + a * (chosen[:, 1] - chosen[:, 0]) + b * (chosen[:, 2] - chosen[:, 0])
     places, depths = camera.project(points)
-    seen = (places > 0.0).all(axis=1) & (places < (camera.width, camera.height)).all(axis=1) & (depths > 0.0)
+    seen = camera.shown(places) & (depths > 0.0)
     if not seen.any():
         return LEAST_SIZE
     right = camera.world[:3, 0] / np.linalg.norm(camera.world[:3, 0])

@@ -8,7 +8,8 @@ import numpy as np
 from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from ..findings import Findings
+from ..camera.camera_model import Camera
+from ..findings import Findings, Fix
 from .scene_data import SceneData, Shape
 
 # rays towards as many points of the target are tried before it counts as hidden
@@ -28,14 +29,13 @@ def check_visible(
     points = _points(shape.mesh.positions.astype(np.float64)[shape.mesh.triangles])
     camera = data.camera
     places, depths = camera.project(points)
-    inside = (places > 0.0).all(axis=1) & (places < (camera.width, camera.height)).all(axis=1)
+    inside = camera.shown(places)
     inside &= (depths > camera.clip_start) & (depths < camera.clip_end)
     if not inside.any():
         corners, corner_depths = camera.project(shape.mesh.positions.astype(np.float64))
-        outside = (corners < 0.0).all(axis=0) | (corners > (camera.width, camera.height)).all(axis=0)
         behind = (corner_depths < camera.clip_start).all() or (corner_depths > camera.clip_end).all()
-        if behind or outside.any():
-            findings.error(f"The camera does not see '{target.name}': move it into the frame.")
+        if behind or camera.beside(corners):
+            findings.error(f"The camera does not see '{target.name}': move it into the frame.", *_whole_frame(camera))
         return
     seen = points[inside]
     seen = seen[np.linspace(0, len(seen) - 1, min(len(seen), PROBES)).astype(int)]
@@ -48,6 +48,10 @@ def check_visible(
         if _lets_light_through(hit):
             return
     findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
+
+
+def _whole_frame(camera: Camera) -> list[Fix]:
+    return [] if camera.region is None else [Fix("whole_frame")]
 
 
 def _is_of_slot(item: bpy.types.Object, face: int, slot: int) -> bool:

@@ -126,10 +126,19 @@ def _view(data: Any, where: str) -> dict[str, Any] | None:
     """What the picture shows of the copy; None for what this shows as it is."""
     if data is None:
         return None
-    entry = CheckedObject(data, where, ("camera", "frame", "width", "height"))
-    return {
+    entry = CheckedObject(data, where, ("camera", "frame", "width", "height", "region"))
+    view = {
         "camera": entry.text("camera"),
         "frame": entry.number("frame", -LAST_FRAME, LAST_FRAME),
         "width": entry.integer("width", 1, LARGEST_SIDE),
         "height": entry.integer("height", 1, LARGEST_SIDE),
     }
+    region = entry.raw("region", None)
+    if region is None:
+        return view
+    if not (isinstance(region, (list, tuple)) and len(region) == 4 and all(type(edge) is int for edge in region)):
+        raise entry.wrong("region", "left, top, right and bottom in whole pixels")
+    left, top, right, bottom = region
+    if not (0 <= left < right <= view["width"] and 0 <= top < bottom <= view["height"]):
+        raise entry.wrong("region", "a rectangle inside of the frame")
+    return view | {"region": list(region)}

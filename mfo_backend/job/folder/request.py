@@ -71,6 +71,7 @@ class Request:
     encoding: Encoding
     part: PicturePart = field(default_factory=PicturePart)  # what of the reference counts
     film_transparent: bool = False
+    frame: Mapping[str, int] | None = None  # of which the picture shows a part: its width and height, left and top
     view: DisplayView | None = None
     view_table: ViewTable | None = None
     light_paths: LightPaths | None = None
@@ -146,9 +147,9 @@ def request_from_json(data: Any) -> Request:
             "use add-on and backend of one release."
         )
     top = CheckedObject(data, WHERE, _KEYS)
-    image = CheckedObject(top.raw("image"), f"{WHERE}: image", ("width", "height", "film_transparent"))
+    image = CheckedObject(top.raw("image"), f"{WHERE}: image", ("width", "height", "film_transparent", "frame"))
     reference = CheckedObject(
-        top.raw("reference"), f"{WHERE}: reference", ("path", "encoding", "crop", "mask", "alpha")
+        top.raw("reference"), f"{WHERE}: reference", ("path", "encoding", "crop", "mask", "alpha", "region")
     )
     return Request(
         scene=top.text("scene"),
@@ -156,6 +157,7 @@ def request_from_json(data: Any) -> Request:
         width=image.integer("width", 1, LARGEST_SIDE),
         height=image.integer("height", 1, LARGEST_SIDE),
         film_transparent=image.boolean("film_transparent", False),
+        frame=_frame(image.raw("frame", None)),
         reference=reference.text("path"),
         encoding=Encoding(reference.choice("encoding", [e.value for e in Encoding])),
         part=part_from_json(reference),
@@ -236,6 +238,7 @@ def request_to_json(request: Request) -> dict[str, Any]:
             "width": request.width,
             "height": request.height,
             "film_transparent": request.film_transparent,
+            **({"frame": dict(request.frame)} if request.frame is not None else {}),
         },
         "reference": {
             "path": request.reference,
@@ -276,6 +279,14 @@ def _target(data: Any) -> Target:
         node=target.texts("node", ()),
         labels={key: str(label) for key, label in target.mapping("labels", {}).items()},
     )
+
+
+def _frame(data: Any) -> dict[str, int] | None:
+    if data is None:
+        return None
+    keys = ("width", "height", "left", "top")
+    frame = CheckedObject(data, f"{WHERE}: image.frame", keys)
+    return {key: frame.integer(key, int(key in ("width", "height")), LARGEST_SIDE) for key in keys}
 
 
 def _fit(data: Any) -> FitSettings:

@@ -140,9 +140,9 @@ def camera_ray(sensor: mi.Sensor, pixel: mi.UInt32, offset: mi.Point2f, on_lens:
     width = dr.opaque(mi.UInt32, int(film.crop_size()[0]))  # no part of the kernel
     y = pixel // width
     x = pixel - y * width
-    crop = film.crop_offset()
-    on_film = mi.Point2f(mi.Float(x) + offset.x + 0.5 + crop[0], mi.Float(y) + offset.y + 0.5 + crop[1])
-    on_film /= dr.opaque(mi.Point2f, tuple(int(n) for n in film.size()))
+    # a sensor counts from 0 to 1 along the part of its film that is rendered
+    on_film = mi.Point2f(mi.Float(x) + offset.x + 0.5, mi.Float(y) + offset.y + 0.5)
+    on_film /= dr.opaque(mi.Point2f, tuple(int(n) for n in film.crop_size()))
     ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, on_film, on_lens)
     return ray
 

@@ -39,7 +39,9 @@ def turn_about(center: NDArray[np.float64], degrees: float) -> NDArray[np.float6
 
 
 def view_of(sensor: mi.Sensor) -> View | None:
-    """Where a sensor stands; None for one that is no perspective camera."""
+    """Where a sensor stands; None for one that is no perspective camera, or of whose film a part is rendered."""
+    if tuple(sensor.film().crop_size()) != tuple(sensor.film().size()):
+        return None
     params = mi.traverse(sensor)
     if "x_fov" not in params or "to_world" not in params:
         return None

@@ -34,8 +34,16 @@ def panorama(scene: SimpleNamespace) -> None:
     scene.bpy.data.cameras["Camera"].type = "PANO"
 
 
-def render_region(scene: SimpleNamespace) -> None:
-    scene.bpy.context.scene.render.use_border = True
+def empty_region(scene: SimpleNamespace) -> None:
+    render = scene.bpy.context.scene.render
+    render.use_border, render.border_min_x, render.border_max_x = True, 0.5, 0.501
+
+
+def another_region(scene: SimpleNamespace) -> None:
+    """The reference has the size of the frame, and the picture of another output size that of a region."""
+    render = scene.bpy.context.scene.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_max_x, render.resolution_x = 0.5, 100
 
 
 def stereo(scene: SimpleNamespace) -> None:
@@ -102,7 +110,8 @@ def nothing_chosen(scene: SimpleNamespace) -> None:
 
 
 SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
-    (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (render_region, "whole_frame"),
+    (no_camera, "camera"), (no_camera_at_all, "new_camera"), (panorama, "perspective"), (empty_region, "whole_frame"),
+    (another_region, "scale"),
     (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
     (another_size, "resolution"), (another_size, "scale"), (another_display, "reference_view"),
     (no_material, "new_material"), (toon, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
@@ -172,7 +181,7 @@ def test_what_was_mended_keeps_its_line(scene: SimpleNamespace) -> None:
 
     bpy = scene.bpy
     bpy.context.scene.mfo.reference_path = scene.reference
-    bpy.context.scene.render.use_border, bpy.context.scene.camera = True, None
+    bpy.context.scene.render.use_multiview, bpy.context.scene.camera = True, None
     preflight.reset()
     preflight.check_now(bpy.context.scene, bpy.context.view_layer)
     before = [finding.sentence for finding in preflight.rows()]
@@ -180,8 +189,8 @@ def test_what_was_mended_keeps_its_line(scene: SimpleNamespace) -> None:
     bpy.ops.mfo.mend(kind="camera", argument=camera)
     assert [finding.fixes[0].kind for finding in preflight.mended] == ["camera"]
     assert before[0] == preflight.rows()[0].sentence == preflight.mended[0].sentence
-    bpy.ops.mfo.mend(kind="whole_frame")
-    assert [finding.fixes[0].kind for finding in preflight.mended] == ["camera", "whole_frame"]
+    bpy.ops.mfo.mend(kind="one_eye")
+    assert [finding.fixes[0].kind for finding in preflight.mended] == ["camera", "one_eye"]
     assert preflight.summary()[0].startswith("Ready")
     bpy.context.scene.mfo.reference_path = ""
     preflight.check_now(bpy.context.scene, bpy.context.view_layer)

@@ -88,7 +88,7 @@ def with_problems(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterato
     from blender_addon.check import preflight
 
     scene.bpy.context.scene.mfo.reference_path = scene.reference
-    scene.bpy.context.scene.render.use_border = True
+    scene.bpy.context.scene.render.use_multiview = True
     scene.bpy.context.scene.camera = None
     scene.bpy.context.scene.render.resolution_x = 1920
     preflight.check_now(scene.bpy.context.scene, scene.bpy.context.view_layer)

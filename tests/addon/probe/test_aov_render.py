@@ -10,6 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from blender_addon.export.camera.camera_model import Region  # noqa: E402
 from blender_addon.probe.aov_render import frame_of, render_outputs  # noqa: E402
 
 
@@ -36,6 +37,13 @@ def test_the_frame_is_the_object_and_two_pixels_around(scene: Any) -> None:
     wanted = [4 * v for v in (left - 2, right + 2, top - 2, bottom + 2)]
     assert found == pytest.approx(wanted, abs=4.0)  # a corner may round to the next pixel
     assert (frame.scale, frame.full) == (4, (400, 400))
+
+
+def test_a_region_of_the_picture_bounds_the_frame(scene: Any) -> None:
+    frame = frame_of(scene, bpy.context.object, 4, 1, Region(0, 40, 70, 100))
+    assert (frame.right, frame.top) == (4 * 72, 4 * 38)  # and two pixels around
+    assert (frame.left, frame.bottom) == pytest.approx((4 * 58, 4 * 52), abs=4.0)
+    assert frame_of(scene, bpy.context.object, 4, 1, Region(0, 0, 50, 50)) is None
 
 
 @pytest.mark.parametrize(("outputs", "scale"), [(1, 8), (3000, 8), (4000, 4), (12000, 4), (16000, 2), (10**7, 1)])

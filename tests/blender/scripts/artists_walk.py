@@ -76,11 +76,11 @@ def story():
     bpy.context.view_layer.objects.active = head
     head.select_set(True)
     scene.mfo.reference_path = bpy.path.relpath(reference)
-    scene.render.use_border, scene.camera = True, None
+    scene.render.use_multiview, scene.camera = True, None
     yield 1.0
     press(bpy.ops.mfo.mend, kind="camera", argument="Camera")
     yield from shot("1_check")
-    press(bpy.ops.mfo.mend, kind="whole_frame")
+    press(bpy.ops.mfo.mend, kind="one_eye")
     yield 1.0
     press(bpy.ops.mfo.fit)
     end = time.monotonic() + 120.0

@@ -98,7 +98,7 @@ def check_and_mend():
     """A scene where a lot is wrong, mended by the buttons alone, each one undo step."""
     scene = bpy.context.scene
     bpy.ops.ed.undo_push(message="new scene")
-    scene.render.use_border = True
+    scene.render.use_multiview = True
     scene.camera = None
     tree = material().node_tree
     noise = tree.nodes.new("ShaderNodeTexNoise")
@@ -109,9 +109,9 @@ def check_and_mend():
     yield from until(lambda: stops() >= {"camera", "resolution"}, 5)
     yield from shot("01_check_stops")
     do(bpy.ops.mfo.mend, kind="camera", argument="Camera")
-    yield from until(lambda: "whole_frame" in stops(), 5)
+    yield from until(lambda: "one_eye" in stops(), 5)
     for kind, argument in (
-        ("whole_frame", ""), ("unlink", "Roughness"), ("resolution", "96x64"), ("cycles", ""),
+        ("one_eye", ""), ("unlink", "Roughness"), ("resolution", "96x64"), ("cycles", ""),
     ):  # fmt: skip
         do(bpy.ops.mfo.mend, kind=kind, argument=argument)
         yield 0.05

@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PIL import Image as Picture
 
 from mfo_backend.job.folder.checked_object import CheckedObject
 from mfo_backend.job.folder.job_folder import JobFolder
 from mfo_backend.job.folder.picture_part import NO_ALPHA, PicturePart, part_from_json, part_to_json, with_part
-from mfo_backend.scene.image_file import write_png
+from mfo_backend.scene.image_file import read_image, write_png
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.image import Encoding, Image
 
-KEYS = ("crop", "mask", "alpha")
+KEYS = ("crop", "mask", "alpha", "region")
 
 
 def picture(height=6, width=8, alpha=None):
@@ -84,3 +85,60 @@ def test_json_holds_what_differs_from_the_whole_picture():
 def test_json_of_a_wrong_crop_is_refused(crop):
     with pytest.raises(BadInputError, match="crop"):
         part_from_json(CheckedObject({"crop": crop}, "reference", KEYS))
+
+
+REGION = (0.25, 0.25, 0.75, 0.5)
+INSIDE = np.s_[24:48, 24:72]  # of 96 x 96 pixels
+
+
+def of_region(beside, encoding=Encoding.SRGB, alpha=None):
+    """A busy region in a picture of one colour."""
+    pixels = np.full((96, 96, 3), beside, np.float32)
+    pixels[INSIDE] = np.random.default_rng(1).random((24, 48, 3))
+    return Image(pixels, encoding, alpha)
+
+
+def with_region(image, folder):
+    found, notes = with_part(image, PicturePart(region=REGION), JobFolder(folder))
+    return found.counts, notes
+
+
+@pytest.mark.parametrize("beside", [0.0, (0.1, 0.1, 0.5)], ids=["black", "as False Color shows black"])
+@pytest.mark.parametrize("encoding", Encoding)
+def test_beside_a_render_region_nothing_counts_where_the_picture_is_empty(beside, encoding, tmp_path):
+    counts, notes = with_region(of_region(beside, encoding), tmp_path)
+    expected = np.zeros((96, 96), bool)
+    expected[INSIDE] = True
+    assert np.array_equal(counts, expected)
+    assert notes == (
+        "12.5 % of the reference's pixels count (Render Region); the others have no part in the fit and its verdict.",
+    )
+
+
+def test_what_a_jpeg_blurs_over_the_edge_of_the_region_is_empty(tmp_path):
+    Picture.fromarray(np.rint(of_region(0.0).pixels * 255).astype(np.uint8)).save(tmp_path / "a.jpg", quality=60)
+    image = read_image(tmp_path / "a.jpg")
+    assert image.pixels[20:24, 24:72].max() > 0.02  # it is blurred
+    assert with_region(image, tmp_path)[0].sum() == 24 * 48
+
+
+def test_what_is_transparent_beside_the_region_is_empty_whatever_its_colour(tmp_path):
+    alpha = np.zeros((96, 96), np.float32)
+    alpha[INSIDE] = 1.0
+    image = of_region(np.random.default_rng(2).random((96, 96, 3)), alpha=alpha)
+    assert with_region(image, tmp_path)[0].sum() == 24 * 48
+
+
+def test_a_picture_that_shows_more_than_the_render_region_counts_as_a_whole(tmp_path):
+    image = of_region(0.0, Encoding.LINEAR)
+    image.pixels[70:80, 10:30] = 0.01  # two per cent of what is beside
+    counts, notes = with_region(image, tmp_path)
+    assert counts is None
+    assert notes == ("Render Region is on, and the reference shows more than the region: all of it counts.",)
+
+
+def test_a_render_region_goes_through_json():
+    part = PicturePart(region=REGION)
+    assert part_from_json(CheckedObject(part_to_json(part), "reference", KEYS)) == part
+    with pytest.raises(BadInputError, match=r"The region is 50 %, 0 %, 50 %, 100 %"):
+        PicturePart(region=(0.5, 0.0, 0.5, 1.0))

@@ -47,6 +47,25 @@ def test_pixels_are_ordered_by_tile_and_its_quarters(width, height, stride):
     np.testing.assert_array_equal(tile, np.sort(number))
 
 
+def test_pixels_of_a_part_of_the_film_are_those_of_the_whole_film():
+    from mfo_backend.render.machine.variant import load_variant
+
+    load_variant()
+    import mitsuba as mi
+
+    from mfo_backend.render.camera.primary_rays import camera_ray
+
+    def directions(pixels, **crop):
+        film = {"type": "hdrfilm", "width": 12, "height": 8, **crop}
+        sensor = mi.load_dict({"type": "perspective", "film": film, "fov": 40.0, "principal_point_offset_x": 0.1})
+        ray = camera_ray(sensor, mi.UInt32(pixels), mi.Point2f(0.1, -0.2), mi.Point2f(0.5))
+        return np.array(ray.d)
+
+    part = directions(np.arange(15), crop_offset_x=4, crop_offset_y=2, crop_width=5, crop_height=3)
+    rows, columns = np.divmod(np.arange(15), 5)
+    np.testing.assert_allclose(part, directions((rows + 2) * 12 + columns + 4), atol=1e-6)
+
+
 @pytest.mark.parametrize("four", [False, True])
 @pytest.mark.parametrize("rfilter", ["box", "gaussian", "lanczos"])
 @pytest.mark.parametrize("sensor", SENSORS)
