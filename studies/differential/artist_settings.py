@@ -77,9 +77,11 @@ def _two_materials(rig: Rig, _: Draw) -> None:
 
 
 def _border(rig: Rig, draw: Draw) -> None:
+    """A region with half of the frame or more in each direction, so that the target is in it."""
     render = rig.scene.render
     render.use_border, render.use_crop_to_border = True, bool(draw.random() < 0.5)
-    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.1, 0.9, 0.0, 0.8
+    render.border_min_x, render.border_min_y = draw.uniform(0.0, 0.25, 2)
+    render.border_max_x, render.border_max_y = draw.uniform(0.75, 1.0, 2)
 
 
 def _vertical_sensor(rig: Rig, draw: Draw) -> None:

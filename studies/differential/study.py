@@ -58,8 +58,19 @@ def try_scene(settings: Sequence[str], seed: int, folder: Path, *, size: int, sa
         report = export_job(bpy.context, rig.target, job, reference=folder / "cycles_1.exr", fit={})
     except ExportError as refusal:
         return Outcome(tuple(settings), str(refusal), (), None)
-    ours = render_job(job, 2 * samples, "specular_ior_level")
+    first, second = render_job(job, 2 * samples, "specular_ior_level")
+    region = report.request["reference"].get("region", (0.0, 0.0, 1.0, 1.0))
+    ours = _empty_beside(first, region), _empty_beside(second, region)
     return Outcome(tuple(settings), "", report.notes, compare(ours, theirs))
+
+
+def _empty_beside(picture: Picture, region: Sequence[float]) -> Picture:
+    """A picture of the frame as Cycles leaves it where a region is rendered alone; edges are parts of its sides."""
+    height, width = picture.shape[:2]
+    left, top, right, bottom = np.rint(np.multiply(region, (width, height, width, height))).astype(int)
+    shown = np.zeros_like(picture)
+    shown[top:bottom, left:right] = picture[top:bottom, left:right]
+    return shown
 
 
 def minimised(outcome: Outcome, seed: int, folder: Path, *, size: int, samples: int) -> Outcome:

@@ -21,7 +21,8 @@ WHOLE = (0.0, 0.0, 1.0, 1.0)
 PAINTED = 0.5  # of white, from which on a pixel of a mask counts
 OPAQUE = 0.99  # alpha below which a pixel shows something else, too; 8 bits have 0.996 next to 1
 # Beside a Render Region Blender leaves a picture black and transparent, which a view may show as another colour and
-# JPEG blurs over its blocks of 16 pixels. Black under every view of 4.3 to 5.2 as PNG and JPEG is within 1 / 255.
+# JPEG blurs over its blocks of 16 pixels. Under every view of 4.3 and 5.0, with all of their dither, it is even within
+# 2 / 255 as PNG, JPEG, TIFF and WebP.
 BLOCK = 16  # pixels
 ALIKE = 2.5 / 255  # of the display's range
 ODD = 0.01  # share of the pixels that may differ more
