@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...versions import corner_normals
+from ...versions import corner_normals, rounds_beside_flat_faces
 from .mesh_arrays import CornerMesh
 
 
@@ -84,12 +84,12 @@ def _vertex_of_corner(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
 def _shading_normals(
     mesh: bpy.types.Mesh, places: NDArray[np.float32], corners: NDArray[np.int32], is_smooth: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Normals as Cycles takes them (measured with Blender 5.0), at three corners a triangle.
+    """Normals as Cycles takes them (measured with Blender 4.3, 5.0 and 5.2), at three corners a triangle.
 
     Each triangle of a flat face is flat by itself, also where the face is not plane, unless the mesh has custom
     normals. Faces that only sharp edges make flat are smooth.
     """
-    if mesh.normals_domain == "FACE":
+    if mesh.normals_domain == "FACE" or (rounds_beside_flat_faces() and not _splits_vertices(mesh)):
         vertex_normals = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
         mesh.vertex_normals.foreach_get("vector", vertex_normals)
         normals = vertex_normals.reshape(-1, 3)[_vertex_of_corner(mesh)[corners]].reshape(-1, 3, 3)
@@ -98,6 +98,18 @@ def _shading_normals(
     if mesh.has_custom_normals:
         return normals
     return np.where(is_smooth[:, None, None], normals, flat_normals(places))
+
+
+def _splits_vertices(mesh: bpy.types.Mesh) -> bool:
+    """Whether custom normals or sharp edges let the faces around a vertex have other normals there."""
+    if mesh.has_custom_normals:
+        return True
+    sharp = mesh.attributes.get("sharp_edge")
+    if sharp is None or not len(sharp.data):
+        return False
+    values = np.empty(len(sharp.data), dtype=np.bool_)
+    sharp.data.foreach_get("value", values)
+    return bool(values.any())
 
 
 def flat_normals(places: NDArray[np.float32]) -> NDArray[np.float32]:
