@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..probe.light_path import CAMERA, SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output, node_tree_of
+from .stage import copy_properties
 
 Pixels = NDArray[np.float32]
 
@@ -66,6 +67,7 @@ def _studio(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
     try:
         studio.collection.objects.link(camera)
         studio.camera = camera
+        copy_properties((scene, bpy.context.view_layer), studio)
         studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         _set_up(studio, scene)
         yield studio

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -35,6 +35,7 @@ def staged(
         _copy_what_nodes_ask_for(original, item, mesh)
         stage.collection.objects.link(item)
         stage.camera = scene.camera
+        copy_properties((scene.world, scene, view_layer), stage)
         stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         _set_up(stage, scene)
         window.scene = stage
@@ -66,6 +67,14 @@ def bake(stage: Stage, kind: str) -> None:
         bpy.ops.object.bake(type=kind)
 
 
+def copy_properties(owners: Iterable[bpy.types.ID | bpy.types.ViewLayer | None], into: bpy.types.ID) -> None:
+    """Give an ID the custom properties of others, which Attribute nodes look for; those of the last one win."""
+    for owner in filter(None, owners):
+        for key in owner.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
+            if not hasattr(owner[key], "as_pointer"):
+                into[key] = owner[key]
+
+
 def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
     """Generated coordinates, Object Info and attributes of the object."""
     if hasattr(original.data, "texspace_location"):
@@ -73,9 +82,7 @@ def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object,
         mesh.texspace_location = original.data.texspace_location
         mesh.texspace_size = original.data.texspace_size
     item.pass_index, item.color = original.pass_index, original.color
-    for key in original.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
-        if not hasattr(original[key], "as_pointer"):
-            item[key] = original[key]
+    copy_properties((original,), item)
     name = original.name  # Object Info's Random is made of it
     original.name = "material_fit_original"
     item.name = name

@@ -65,7 +65,27 @@ def prepare_several_blender_principled(
             table = opened[bsdf_id][1] if bsdf_id in opened else None
             start = {} if table is None else table.unpack(opened[bsdf_id][2])
             _put_material(scene, bsdf, materials[bsdf_id], start, textures, unreachable_refraction=not uniform)
+    _put_normal_maps(scene)
     return [_prepared(scene, *found, materials[bsdf_id]) for bsdf_id, found in opened.items()]
+
+
+def _put_normal_maps(scene: Element) -> None:
+    """Give Blender's shaders below a `normalmap` its normals, which they treat as Cycles does."""
+    by_id = {bsdf.get("id"): bsdf for bsdf in scene.findall("bsdf")}
+    for bsdf in by_id.values():
+        nested, normals = bsdf.find("ref"), bsdf.find("texture")
+        below = by_id.get(nested.get("id")) if nested is not None else None
+        if bsdf.get("type") != "normalmap" or normals is None or below is None:
+            continue
+        if below.get("type") != "blender_principled":
+            continue
+        bsdf.attrib["type"] = "blender_principled"
+        for child in list(bsdf):
+            bsdf.remove(child)
+        bsdf.extend(copy.deepcopy(child) for child in below)
+        direction = ElementTree.SubElement(bsdf, "texture", type="mapped_normal", name="normal")
+        normals.attrib["name"] = "map"
+        direction.append(normals)
 
 
 def _opened(target: Target, selection: str | Sequence[str], materials: Materials) -> Opened:

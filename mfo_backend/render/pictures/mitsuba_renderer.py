@@ -297,13 +297,14 @@ def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) 
     _forget_scenes_before()
     import mitsuba as mi
 
-    from ...material.plugins import closure_tree, leaf_radiance, principled_plugin, projective_texture
+    from ...material.plugins import closure_tree, leaf_radiance, mapped_normal, principled_plugin, projective_texture
     from ..lamps import lamp_plugins
     from ..transport import cycles_path
 
     principled_plugin.register()
     closure_tree.register()
     projective_texture.register()
+    mapped_normal.register()
     leaf_radiance.register()
     cycles_path.register()
     lamp_plugins.register()

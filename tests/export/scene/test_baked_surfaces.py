@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from mfo_backend.scene.image_file import read_image
+from studies.parity.cycles_parity import render_job
 
-from ..scenes import add_camera, add_quad, new_material, world_color
+from ..scenes import add_camera, add_light, add_quad, new_material, world_color
 
 
 class Nodes:
@@ -357,3 +358,42 @@ def test_without_a_second_blender_the_nearest_model_stays(
     assert any("'Ball' of 'Ball' could not be baked by Cycles: The second Blender" in note for note in report.notes)
     assert any(note.startswith("Base Color of material 'Ball' is linked to") for note in report.notes)
     assert [path.name for path in tmp_path.iterdir()] == ["job"]
+
+
+@pytest.mark.parametrize("owner", ["world", "scene", "layer"])
+def test_attributes_of_the_view_layer_are_those_of_the_users_scene(owner: str, stage: Any, export: Any) -> None:
+    """Cycles looks for them at the view layer, then at the scene, then at the world."""
+    target, _, nodes = stage
+    owners = {"world": bpy.context.scene.world, "scene": bpy.context.scene, "layer": bpy.context.view_layer}
+    for number, name in enumerate(owners):
+        owners[name]["wear"] = 0.1 * number
+        if name == owner:
+            break
+    owners[owner]["wear"] = 0.7
+    attribute = nodes.new("Attribute")
+    attribute.attribute_type, attribute.attribute_name = "VIEW_LAYER", "wear"
+    nodes.tree.links.new(attribute.outputs["Fac"], nodes.principled.inputs["Roughness"])
+    report = export(target)
+    bsdf, _, _ = shape_of(report)
+    assert report.request["materials"][bsdf]["sockets"]["Roughness"]["value"] == pytest.approx(0.7, abs=1e-5)
+
+
+@pytest.mark.parametrize("lean", [-0.8, 0.8], ids=["towards the camera", "away from the camera"])
+def test_a_leaning_normal_on_a_surface_that_is_seen_from_the_side_shades_as_in_cycles(
+    lean: float, scene: Any, export: Any, render_cycles: Callable[[], np.ndarray]
+) -> None:
+    """Diffuse light falls on a normal as it is, also on one that the camera does not see; reflections bend it."""
+    add_light("SUN", rotation=(-0.6, 0.0, 0.0), energy=3.0)
+    add_camera("PERSP", (0.0, -4.0, 0.8), (1.374, 0.0, 0.0))
+    target = add_quad("Target", 0.1, 0.1, new_material("Target"))
+    floor = add_quad("Floor", 3.0, 0.0, new_material("Floor"))
+    nodes = Nodes(floor.data.materials[0])
+    normal = nodes.new("CombineXYZ")
+    normal.inputs["Y"].default_value, normal.inputs["Z"].default_value = lean, 1.0
+    nodes.tree.links.new(normal.outputs[0], nodes.principled.inputs["Normal"])
+    expected = render_cycles()
+    job = export(target, reference=bpy.data.images.new("Any", 32, 32)).folder
+    found = np.mean(render_job(job, 64, "roughness"), axis=0)
+    lit = expected.min(axis=-1) > 0.05
+    assert lit.sum() > 50
+    assert found[lit].mean() == pytest.approx(expected[lit].mean(), rel=0.01)
