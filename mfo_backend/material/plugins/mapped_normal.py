@@ -7,6 +7,7 @@ third axis along the smooth normal and the first along u, as for Mitsuba's BSDF 
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+# pyright: reportIncompatibleMethodOverride=false
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ class MappedNormal(mi.Texture):
         mi.Texture.__init__(self, props)
         self.map: Any = props["map"]
 
-    def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def traverse(self, callback: Any) -> None:
         """Show the map."""
         callback.put("map", self.map, mi.ParamFlags.NonDifferentiable)
 
