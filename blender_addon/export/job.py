@@ -274,7 +274,10 @@ def partial_export(
                 picture = replace(picture, region=region_parts(context.scene.render))
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
-            inside = [request_of(context, each, own.values, region) for each, own in zip(fitted, wanted, strict=True)]
+            inside = [
+                request_of(context, each, own.values, region, data.origin)
+                for each, own in zip(fitted, wanted, strict=True)
+            ]
             with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
@@ -288,7 +291,7 @@ def partial_export(
             described = data.materials[target_bsdf(number)]
             if probe is not None and (described.asks_graph or wanted[number].values):
                 described, graphs[number] = yield from evaluate_graph(
-                    probe, context, each, described, number, may_miss=may_miss, region=region
+                    probe, context, each, described, number, may_miss=may_miss, region=region, origin=data.origin
                 )
                 data.materials[target_bsdf(number)] = described
                 (unseen.add if graphs[number] is None else unseen.discard)(number)  # Cycles knows better than rays

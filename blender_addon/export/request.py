@@ -56,7 +56,8 @@ class WholeRequest:
         view, _device = output_view(self.scene)
         request: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
-            "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)},
+            "generator": {"name": GENERATOR, "version": _version(), "blender": list(bpy.app.version)}
+            | ({"origin": data.origin.tolist()} if data.origin.any() else {}),
             "scene": "scene.xml",
             "target": {
                 "shape_id": target_shape(number),

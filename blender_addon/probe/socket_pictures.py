@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -55,13 +55,14 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """Write one .npy file, float32 (height, width, 1 or 3), for each socket, and the positions, NaN beside the target.
 
     Requested are `scene`, `layer`, `object`, `slot`, for each of the `leaves` of its shaders the `node` (a path of
-    names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples` of
-    each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the second
-    what it would see were that away, and so on; files have one below the other. `region` is the left, top, right and
-    bottom of what the picture shows alone, in pixels of the frame, None for all. Answered are for each of the `leaves`
-    the `sockets` by name and the `weight`, each a `file` and its `mean` over what the camera sees; the file
-    `positions`, and `camera`, the (3, 4) matrix from the world to columns and rows of the files. Colours are linear
-    Rec.709, directions unit vectors of the world or zero.
+    names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples`
+    of each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the
+    second what it would see were that away, and so on; files have one below the other. `region` is the left, top,
+    right and bottom of what the picture shows alone, in pixels of the frame, None for all; places count from
+    `origin`, zero if it is absent. Answered are for each of the `leaves` the `sockets` by name and the `weight`,
+    each a `file` and its `mean` over what the camera sees; the file `positions`, and `camera`, the (3, 4) matrix
+    from the world to columns and rows of the files. Colours are linear Rec.709, directions unit vectors of the
+    world or zero.
 
     Where `elsewhere` is requested and nodes ask for the ray, sockets and weights have a file of that name, too: one
     below the other what rays from elsewhere find at `other_views.ANGLES` angles, a place a pixel.
@@ -109,8 +110,8 @@ def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
         else:
             leaves[each.leaf]["sockets"][each.socket] = said
     positions = np.where(seen[..., None], found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
-    np.save(folder / "positions.npy", positions.astype(np.float32))
-    camera = world_to_frame(target.scene, frame).tolist()
+    np.save(folder / "positions.npy", (positions - target.origin).astype(np.float32))
+    camera = from_origin(world_to_frame(target.scene, frame), target.origin).tolist()
     return {"leaves": leaves, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
 
 
@@ -144,6 +145,7 @@ class Target:
     obj: bpy.types.Object
     slot: bpy.types.MaterialSlot
     region: Region | None = None
+    origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))  # that positions are told from
 
     @staticmethod
     def of(request: Mapping[str, Any]) -> Target:
@@ -159,8 +161,10 @@ class Target:
         if request.get("view"):
             _show(scene, request["view"])
         obj = scene.objects[request["object"]]
-        edges = (request.get("view") or request).get("region")
-        return Target(scene, layer, obj, obj.material_slots[request["slot"]], Region(*edges) if edges else None)
+        shown = request.get("view") or request
+        region = Region(*shown["region"]) if shown.get("region") else None
+        origin = np.array(shown.get("origin") or (0.0, 0.0, 0.0))
+        return Target(scene, layer, obj, obj.material_slots[request["slot"]], region, origin)
 
     @property
     def material(self) -> bpy.types.Material:
@@ -201,6 +205,11 @@ class Target:
         finally:
             self.slot.material = material
             self.slot.link = was_link
+
+
+def from_origin(camera: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A (3, 4) camera matrix for places that count from an origin."""
+    return np.concatenate([camera[:, :3], camera[:, 3:] + camera[:, :3] @ origin[:, None]], axis=1)
 
 
 def _show(scene: bpy.types.Scene, view: Mapping[str, Any]) -> None:

@@ -27,6 +27,7 @@ from .socket_pictures import (
     SEEN,
     Target,
     cleaned,
+    from_origin,
     make_opaque,
     whole,
     widen_bumps,
@@ -44,14 +45,14 @@ _Found = tuple[dict[tuple[int, str], NDArray[np.float32]], NDArray[np.float32], 
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """Write one .npy file, float32 (height, width, 1 or 3), for each socket of each variant.
 
-    Requested are `scene`, `layer`, `object` and `slot` as of the command `sockets`, with the `view` of a picture, its
-    `camera`, `frame`, `width`, `height` and `region`, where it may be another one than the file's, the `sockets` by
-    name, each a path of names to it, of which the last is empty for the weight of a shader in a mix, the `places` of
-    the values (entries of request.json), `variants`, each with a number or colour for every place in `values` and with
-    the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each subpixel and the `folder` for
-    the files; `elsewhere` where the files of that name are asked for, too, for the first variant. Answered are
-    `files`, by socket for each variant, `elsewhere`, by socket as of the command `sockets`, and of the target the
-    file `positions`, NaN beside it, and the `camera` of that command.
+    Requested are `scene`, `layer`, `object` and `slot` as of the command `sockets`, with the `view` of a picture,
+    its `camera`, `frame`, `width`, `height`, `region` and `origin`, where it may be another one than the file's,
+    the `sockets` by name, each a path of names to it, of which the last is empty for the weight of a shader in a
+    mix, the `places` of the values (entries of request.json), `variants`, each with a number or colour for every
+    place in `values` and with the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each
+    subpixel and the `folder` for the files; `elsewhere` where the files of that name are asked for, too, for the
+    first variant. Answered are `files`, by socket for each variant, `elsewhere`, by socket as of the command
+    `sockets`, and of the target the file `positions`, NaN beside it, and the `camera` of that command.
 
     Raises
     ------
@@ -74,8 +75,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
             most //= 2
     seen = mask[..., 0] > SEEN
     positions = np.where(seen[..., None], positions / np.maximum(mask, SEEN), np.float32(np.nan))
-    np.save(Path(request["folder"]) / "positions.npy", positions.astype(np.float32))
-    camera = world_to_frame(target.scene, frame).tolist()
+    np.save(Path(request["folder"]) / "positions.npy", (positions - target.origin).astype(np.float32))
+    camera = from_origin(world_to_frame(target.scene, frame), target.origin).tolist()
     elsewhere = {}
     if request.get("elsewhere") and asks_ray(target.material.node_tree):
         elsewhere = _elsewhere(target, request, places, variants[:1])

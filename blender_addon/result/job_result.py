@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -146,6 +146,7 @@ def read_job_result(folder: Path) -> JobResult:
     try:
         target = request["target"]
         material = request.get("materials", {}).get(target.get("bsdf_id"), {})
+        origin = request.get("generator", {}).get("origin", (0.0, 0.0, 0.0))
         sockets = {k: _value(s["value"]) for k, s in material.get("sockets", {}).items() if s.get("value") is not None}
         return JobResult(
             folder=folder,
@@ -170,7 +171,7 @@ def read_job_result(folder: Path) -> JobResult:
             leaf="/".join(map(str, target.get("node", ()))),
             labels={str(k): str(v) for k, v in target.get("labels", {}).items()},
             pictures=tuple(_picture(folder, p) for p in result.get("pictures", ())),
-            next_picture=_next_picture(result.get("next_picture")),
+            next_picture=_next_picture(result.get("next_picture"), origin),
             image=(int(request.get("image", {}).get("width", 0)), int(request.get("image", {}).get("height", 0))),
             frame={str(k): int(v) for k, v in (request.get("image", {}).get("frame") or {}).items()},
         )
@@ -206,10 +207,11 @@ def _picture(folder: Path, data: dict[str, Any]) -> PastPicture:
     return PastPicture(name, str(data.get("verdict") or ""), (float(before), float(after)), inner)
 
 
-def _next_picture(data: Mapping[str, Any] | None) -> NextPicture | None:
+def _next_picture(data: Mapping[str, Any] | None, origin: Sequence[Any]) -> NextPicture | None:
+    """What is proposed; its center counts from the `origin` of the exported scene."""
     if not data:
         return None
-    center = tuple(float(v) for v in data["center"])
+    center = tuple(float(v) + float(o) for v, o in zip(data["center"], origin, strict=True))
     turns = float(data["turn"]), float(data.get("light_turn", 0.0))
     if len(center) != 3 or not all(map(math.isfinite, (*turns, *center))):
         raise ValueError("the proposed camera is no place")

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ...graph_values.mix_values import default_values, inside_values
 from ...graph_values.own_groups import shared_groups
@@ -130,7 +132,11 @@ def _numbers_of_leaves(target: TargetShader) -> list[int]:
 
 
 def request_of(
-    context: bpy.types.Context, fitted: FittedSlot, values: Sequence[GraphValue], region: Region | None = None
+    context: bpy.types.Context,
+    fitted: FittedSlot,
+    values: Sequence[GraphValue],
+    region: Region | None = None,
+    origin: NDArray[np.float64] | None = None,
 ) -> dict[str, Any]:
     """What the entry `graph` of request.json has besides for these values; nothing where there are none.
 
@@ -153,17 +159,21 @@ def request_of(
         "evaluate": {
             "scene": context.scene.name, "layer": context.view_layer.name, "object": fitted.object.name,
             "slot": fitted.slot, "sockets": {name: path(name) for name in used},
-            "view": _view(context.scene, region),
+            "view": _view(context.scene, region, origin),
         },
     }  # fmt: skip
 
 
-def _view(scene: bpy.types.Scene, region: Region | None) -> dict[str, Any]:
+def _view(scene: bpy.types.Scene, region: Region | None, origin: NDArray[np.float64] | None) -> dict[str, Any]:
     """What the picture shows of the copy, which another picture's export may have made."""
     width, height = picture_size(scene.render)
     assert scene.camera is not None  # it was read
     view = {"camera": scene.camera.name, "frame": scene.frame_current_final, "width": width, "height": height}
-    return view if region is None else view | {"region": edges_of(region)}
+    if region is not None:
+        view["region"] = edges_of(region)
+    if origin is not None and origin.any():
+        view["origin"] = origin.tolist()
+    return view
 
 
 def write_copy(folder: Path) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...probe.client import Probe, ProbeError
 from ..camera.camera_model import Region, edges_of
@@ -135,12 +136,13 @@ def _send(
     elsewhere: bool = True,
     may_miss: bool = False,
     region: Region | None = None,
+    origin: NDArray[np.float64] | None = None,
 ) -> None:
     probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=fitted.object.name, slot=fitted.slot,
         leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths, elsewhere=elsewhere,
-        may_miss=may_miss, region=edges_of(region),
+        may_miss=may_miss, region=edges_of(region), origin=None if origin is None else origin.tolist(),
     )  # fmt: skip
 
 
@@ -158,6 +160,7 @@ def evaluate_graph(
     *,
     may_miss: bool = False,
     region: Region | None = None,
+    origin: NDArray[np.float64] | None = None,
 ) -> Generator[None, None, tuple[Material, NodeGraph | None]]:
     """The material with the mean of each socket of its graph, and the pictures of them; yields while Cycles works.
 
@@ -181,7 +184,7 @@ def evaluate_graph(
     folder = probe.folder / f"target_{number}"
     folder.mkdir(exist_ok=True)
     depths = DEPTHS if material.passes_light else 1
-    _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss, region=region)
+    _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss, region=region, origin=origin)
     while not probe.is_answered():
         yield
     answer = probe.receive()

@@ -10,9 +10,11 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..camera.camera_model import TURN, Camera
 from ..lights.light_model import irradiance_at
+from .origin import moved
 from .scene_data import SceneData
 
 MOST_CAMERAS, MOST_LIGHTS = 12, 3  # the most that the backend's `fit.candidates` takes
@@ -25,7 +27,7 @@ def candidates(scene: bpy.types.Scene, data: SceneData) -> dict[str, Any]:
     instances there are none that could be moved alone.
     """
     others = [obj for obj in scene.objects if obj.type == "CAMERA" and obj != scene.camera]
-    cameras = [_camera(obj, data.camera) for obj in others if data.camera.region is None]
+    cameras = [_camera(obj, data.camera, data.origin) for obj in others if data.camera.region is None]
     counts = Counter(light.name for light in data.lights)
     single = all(count == 1 and name in scene.objects for name, count in counts.items())
     middle = data.middle() if data.target is None else data.target.mesh.positions.mean(axis=0)
@@ -40,12 +42,12 @@ def candidates(scene: bpy.types.Scene, data: SceneData) -> dict[str, Any]:
     }
 
 
-def _camera(obj: bpy.types.Object, present: Camera) -> dict[str, Any] | None:
-    """A camera with a picture of the present one's size; None for one of another kind."""
+def _camera(obj: bpy.types.Object, present: Camera, origin: NDArray[np.float64]) -> dict[str, Any] | None:
+    """A camera with a picture of the present one's size, its place from an origin; None for one of another kind."""
     data = obj.data
     if data.type != "PERSP" or data.shift_x != 0.0 or data.shift_y != 0.0:
         return None
-    world = np.array(obj.matrix_world, np.float64)
+    world = moved(np.array(obj.matrix_world, np.float64), origin)
     lengths = np.linalg.norm(world[:3, :3], axis=0)
     if lengths.min() < 1e-12:
         return None

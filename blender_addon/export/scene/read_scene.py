@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 
 import bpy
@@ -41,6 +42,7 @@ from ..render_state import (
     rendered_layer,
     rendered_objects,
 )
+from .origin import moved, scene_origin
 from .ray_visibility import camera_misses, note_visibility, shadow_transmission
 from .read_light_paths import BOUNCES, read_light_paths
 from .read_world import BLACK, read_world
@@ -107,7 +109,8 @@ def read_scene(
             return None
         _name_settings(scene, view_layer, findings)
         world = read_world(scene, settings.exposure, findings, bakes) if view_layer.use_sky else BLACK
-        data = SceneData(camera, settings, world)
+        origin = scene_origin(scene.camera, [each.object for each in fitted], depsgraph)
+        data = SceneData(replace(camera, world=moved(camera.world, origin)), settings, world, origin=origin)
         rendered = rendered_objects(view_layer) | background_objects(scene)
         walk = _Walk(data, fitted, described, depsgraph, rendered, findings, bakes)
         walk.run()
@@ -220,7 +223,7 @@ class _Walk:
             item = instance.object
             if not self._is_rendered(instance, item):
                 continue
-            matrix = np.array(instance.matrix_world, dtype=np.float64)
+            matrix = moved(np.array(instance.matrix_world, dtype=np.float64), self.data.origin)
             if item.type == "LIGHT":
                 light = read_light(item, matrix, self.data.settings.exposure, self.findings)
                 if light is not None:

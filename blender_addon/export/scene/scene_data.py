@@ -71,7 +71,8 @@ class RenderSettings:
 class SceneData:
     """A whole scene: shape and BSDF of the first fitted material are `target` and `target_bsdf`.
 
-    Where several are fitted, `target_count` of them, the others' have numbers: `target_2` and `target_2_bsdf`.
+    Where several are fitted, `target_count` of them, the others' have numbers: `target_2` and `target_2_bsdf`. All
+    places count from `origin`, a place in Blender's world.
     """
 
     camera: Camera
@@ -81,6 +82,7 @@ class SceneData:
     shapes: list[Shape] = field(default_factory=list)
     materials: dict[str, Material] = field(default_factory=dict)
     target_count: int = 1
+    origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     unseen: set[int] = field(default_factory=set)  # numbers of fitted materials that no ray of the camera was found for
 
     @property

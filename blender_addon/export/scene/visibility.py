@@ -84,7 +84,7 @@ def _first_hit(
         origin, direction = point - forward * (forward @ (point - world[:3, 3])), forward
     else:
         origin, direction = world[:3, 3], point - world[:3, 3]
-    start = origin + direction * (data.camera.clip_start / float(direction @ forward))
+    start = data.origin + origin + direction * (data.camera.clip_start / float(direction @ forward))
     hit, _, _, face, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
     return (item if hit else None), face
 

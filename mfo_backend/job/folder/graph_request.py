@@ -126,13 +126,18 @@ def _view(data: Any, where: str) -> dict[str, Any] | None:
     """What the picture shows of the copy; None for what this shows as it is."""
     if data is None:
         return None
-    entry = CheckedObject(data, where, ("camera", "frame", "width", "height", "region"))
-    view = {
+    entry = CheckedObject(data, where, ("camera", "frame", "width", "height", "region", "origin"))
+    view: dict[str, Any] = {
         "camera": entry.text("camera"),
         "frame": entry.number("frame", -LAST_FRAME, LAST_FRAME),
         "width": entry.integer("width", 1, LARGEST_SIDE),
         "height": entry.integer("height", 1, LARGEST_SIDE),
     }
+    origin = entry.raw("origin", None)
+    if origin is not None:
+        if not (isinstance(origin, (list, tuple)) and len(origin) == 3 and all(map(is_number, origin))):
+            raise entry.wrong("origin", "a list of three numbers")
+        view["origin"] = [float(number) for number in origin]
     region = entry.raw("region", None)
     if region is None:
         return view

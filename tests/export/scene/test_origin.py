@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene far from Blender's zero is exported like one beside it, with its places counted from the target."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from blender_addon.export.job import check_export
+from blender_addon.export.scene.origin import FAR
+from mfo_backend.job.folder.job_folder import JobFolder
+from mfo_backend.job.folder.request import read_request
+
+from ..scenes import add_camera, add_light, add_quad, new_material, world_color
+
+PLACE = (3000.0, -2000.0, 40.0)
+
+
+def build(scene: Any, place: tuple[float, float, float]) -> Any:
+    """A target whose roughness a noise gives, a lid beside it, a lamp and two cameras."""
+    world_color(scene, 0.5)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    tree = target.data.materials[0].node_tree
+    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    coordinates, noise = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(coordinates.outputs["Object"], noise.inputs["Vector"])
+    tree.links.new(noise.outputs[0], principled.inputs["Roughness"])
+    lid = add_quad("Lid", 0.3, 0.5, new_material("Lid"))
+    lamp = add_light("POINT", energy=100.0)
+    lamp.location = (1.0, 1.0, 3.0)
+    other = add_camera("PERSP", (1.0, 0.0, 4.0), (0.0, 0.2, 0.0))
+    parent = bpy.data.objects.new("Place", None)
+    scene.collection.objects.link(parent)
+    for item in (target, lid, lamp, other, add_camera("PERSP", (0.0, 0.0, 4.0))):
+        item.parent = parent
+    parent.location = place
+    bpy.context.view_layer.update()
+    return target
+
+
+def matrices(text: str) -> np.ndarray:
+    """All matrices of a scene file."""
+    lines = [line.split(chr(34))[1] for line in text.splitlines() if "<matrix" in line]
+    return np.array([[float(number) for number in line.split()] for line in lines])
+
+
+def read(report: Any) -> tuple[np.ndarray, ...]:
+    """Matrices, vertices, the camera of the graph, the bounds of what it saw, and the other camera."""
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    ply = sorted(Path(report.folder).glob("meshes/*.ply"))[-1]
+    mesh = mi.traverse(mi.load_dict({"type": "ply", "filename": str(ply)}))
+    places = np.load(report.folder / "graph" / "positions.npy")
+    seen = np.array([np.nanmean(places, axis=(0, 1)), np.nanmax(places, axis=(0, 1))])
+    camera = np.array(report.request["graph"]["camera"])
+    other = np.array(report.request["cameras"][0]["to_world"])
+    text = (report.folder / "scene.xml").read_text()
+    return matrices(text), np.array(mesh["vertex_positions"]), camera, seen, other
+
+
+def test_all_places_count_from_the_target(scene: Any, export: Any) -> None:
+    picture = bpy.data.images.new("Any", 32, 32)
+    target = build(scene, (0.0, 0.0, 0.0))
+    near = export(target, "near", reference=picture)
+    assert "origin" not in near.request["generator"]
+    bpy.data.objects["Place"].location = PLACE
+    bpy.context.view_layer.update()
+    far = export(target, "far", reference=picture)
+    assert tuple(far.request["generator"]["origin"]) == PLACE
+    for found, expected in zip(read(far), read(near), strict=True):
+        assert len(expected)
+        # float32 has steps of 0.2 mm there, and a subpixel is 2 cm wide
+        np.testing.assert_allclose(found, expected, atol=0.02, rtol=1e-3)
+    assert read_request(JobFolder.open(far.folder)).generator["origin"] == list(PLACE)
+
+
+def test_what_hides_a_far_target_is_found(scene: Any) -> None:
+    target = build(scene, PLACE)
+    assert check_export(bpy.context, target)[0] == []
+    bpy.data.objects["Lid"].scale = (9.0, 9.0, 1.0)
+    bpy.context.view_layer.update()
+    assert check_export(bpy.context, target)[0] == ["The camera does not see 'Target': it is hidden behind 'Lid'."]
+
+
+@pytest.mark.parametrize(("distance", "is_far"), [(0.9 * FAR, False), (1.1 * FAR, True)])
+def test_what_is_near_stays_where_it_is(distance: float, is_far: bool, scene: Any, export: Any) -> None:
+    world_color(scene, 1.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    target.location.x = distance
+    add_camera("PERSP", (distance, 0.0, 0.5))
+    assert ("origin" in export(target).request["generator"]) is is_far
