@@ -17,7 +17,7 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot, slot_count
-from ..export.nodes.dependence import OF_PLACE, OF_SURROUNDINGS, OF_VIEW, asked_for
+from ..export.nodes.dependence import OF_PLACE, OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from ..export.nodes.displacement import bends_normals, unbent
 from ..probe.closure_tree import ClosureTree, Leaf, Value
 from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
@@ -41,12 +41,13 @@ def baked_surface(
 ) -> dict[str, Any]:
     """Bake the material in `slot` of a depsgraph's instance into `folder`, `size` texels along each side.
 
-    Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``, each
-    with ``kind``, ``name``, ``weight``, ``sockets`` and what of the node's settings counts; ``emission`` and for leaves
-    ``normal``, where there are any; ``view``, ``paths``, ``around`` and ``place``: what of the view, of light paths,
-    of other objects and of its own place the nodes ask for; ``left_out``: linked sockets that are not baked.
-    A value is a number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working
-    space. Normals are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
+    Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``,
+    each with ``kind``, ``name``, ``weight``, ``sockets`` and what of the node's settings counts; ``emission`` and
+    for leaves ``normal``, where there are any; ``view``, ``paths``, ``around`` and ``place``: what of the view, of
+    light paths, of other objects and of its own place the nodes ask for; ``sides``: whether for the side that is
+    seen; ``left_out``: linked sockets that are not baked. A value is a number, a list, or the name of a .npy (size,
+    size, channels), first row at the top, in the working space. Normals are in the frame of the map: its u axis,
+    the normal's side of it, the smooth normal.
     """
     shown = material_of_slot(instance.object, slot)
     assert shown is not None  # a surface without material needs no bake
@@ -61,7 +62,7 @@ def baked_surface(
         with _stage(scene, instance, depsgraph, slot, material) as stage:
             baked = _Bake(stage, material, folder, size, bool(view))
             answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": around}
-            answer["place"] = asked_for(tree, OF_PLACE)
+            answer["place"], answer["sides"] = asked_for(tree, OF_PLACE), bool(asked_for(tree, OF_SIDE))
             if emits:
                 answer["emission"] = baked.file(baked.closure())
             closures = ClosureTree(tree)

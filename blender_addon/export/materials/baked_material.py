@@ -176,6 +176,8 @@ class Baked:
         if self._answer["around"]:
             asked = ", ".join(self._answer["around"])
             findings.note(f"Material '{name}': {asked} sees its own object alone in the fit.")
+        if self._answer["sides"]:
+            findings.note(f"Material '{name}' asks for Backfacing: in the fit both sides are as its front is.")
         if self._answer["left_out"]:
             left = ", ".join(self._answer["left_out"])
             findings.note(f"Material '{name}': what is linked to {left} is left out.")

@@ -19,6 +19,8 @@ OF_VIEW = {
     "ShaderNodeNewGeometry": ("Incoming",),
     "ShaderNodeTexCoord": ("Camera", "Window", "Reflection"),
 }
+# differ between the two sides of a surface, while a bake looks at the front
+OF_SIDE = {"ShaderNodeNewGeometry": ("Backfacing",)}
 # instances of one object may have each their own of
 OF_PLACE = {
     "ShaderNodeNewGeometry": ("Position", "Normal"),

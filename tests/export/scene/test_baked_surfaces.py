@@ -360,6 +360,17 @@ def test_without_a_second_blender_the_nearest_model_stays(
     assert [path.name for path in tmp_path.iterdir()] == ["job"]
 
 
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_surface_with_two_sides_is_said(asked: bool, stage: Any, export: Any) -> None:
+    target, _, nodes = stage
+    geometry = nodes.new("NewGeometry")
+    nodes.tree.links.new(
+        geometry.outputs["Backfacing" if asked else "Pointiness"], nodes.principled.inputs["Roughness"]
+    )
+    said = "Material 'Ball' asks for Backfacing: in the fit both sides are as its front is."
+    assert (said in export(target).notes) is asked
+
+
 @pytest.mark.parametrize("owner", ["world", "scene", "layer"])
 def test_attributes_of_the_view_layer_are_those_of_the_users_scene(owner: str, stage: Any, export: Any) -> None:
     """Cycles looks for them at the view layer, then at the scene, then at the world."""
