@@ -247,6 +247,49 @@ def _displaced_box(rig: Rig, draw: Draw) -> None:
     _displaced(draw, rig.box, "DISPLACEMENT")
 
 
+def _normal_map(rig: Rig, draw: Draw) -> None:
+    """A floor of waves that is seen from the side: some normals turn away from the camera."""
+    tree = rig.floor.data.materials[0].node_tree
+    where, waves, join, bent = (
+        tree.nodes.new(f"ShaderNode{k}") for k in ("TexCoord", "VectorMath", "Mix", "NormalMap")
+    )
+    waves.operation = "SINE"
+    scaled = tree.nodes.new("ShaderNodeVectorMath")
+    scaled.operation, scaled.inputs["Scale"].default_value = "SCALE", float(draw.uniform(2.0, 6.0))
+    tree.links.new(where.outputs["Object"], scaled.inputs[0])
+    tree.links.new(scaled.outputs[0], waves.inputs[0])
+    join.data_type, join.inputs[0].default_value = "VECTOR", float(draw.uniform(0.1, 0.35))
+    join.inputs[4].default_value = (0.5, 0.5, 1.0)
+    tree.links.new(waves.outputs[0], join.inputs[5])
+    tree.links.new(join.outputs[1], bent.inputs["Color"])
+    tree.links.new(bent.outputs[0], principled(rig.floor).inputs["Normal"])
+
+
+def _smooth_beside_flat(rig: Rig, draw: Draw) -> None:
+    """One side of ball and box is smooth and the other flat, as Booleans leave them."""
+    edge = float(draw.uniform(-0.3, 0.3))
+    for item in (rig.target, rig.box):
+        for polygon in item.data.polygons:
+            polygon.use_smooth = polygon.center.x > edge
+
+
+def _far_away(rig: Rig, draw: Draw) -> None:
+    """Everything in a corner of a map."""
+    parent = _empty(rig, "Far")
+    for item in (rig.target, rig.box, rig.floor, rig.light, rig.camera):
+        if item.parent is None:
+            item.parent = parent
+    parent.location = (float(draw.uniform(50.0, 2000.0)), float(draw.uniform(-2000.0, 2000.0)), 0.0)
+
+
+def _layer_attribute(rig: Rig, draw: Draw) -> None:
+    rig.scene["tint"] = tuple(draw.uniform(0.1, 0.9, 3))
+    tree = rig.box.data.materials[0].node_tree
+    node = tree.nodes.new("ShaderNodeAttribute")
+    node.attribute_type, node.attribute_name = "VIEW_LAYER", "tint"
+    tree.links.new(node.outputs["Color"], principled(rig.box).inputs["Base Color"])
+
+
 def _lamp_nodes(rig: Rig, draw: Draw) -> None:
     data: Any = rig.light.data
     if data.node_tree is None:
@@ -340,6 +383,8 @@ def _all() -> Iterator[Setting]:
         "mirror modifier": _modifier("MIRROR", use_axis=(False, False, True), use_bisect_axis=(False, False, True)),
         "array modifier": _modifier("ARRAY", count=2, relative_offset_displace=(1.2, 0.3, 0.0)),
         "bevel modifier": _modifier("BEVEL", width=0.2, segments=3),
+        "bumped box": _bumped_box, "normal map": _normal_map, "smooth beside flat": _smooth_beside_flat,
+        "far away": _far_away, "layer attribute": _layer_attribute,
         "displaced target": _displaced_target, "displaced box": _displaced_box,
         "solidify modifier": _modifier("SOLIDIFY", thickness=0.1),
     }  # fmt: skip
@@ -347,7 +392,6 @@ def _all() -> Iterator[Setting]:
     yield Setting("depth of field", _depth_of_field, ("depth of field is left out",))
     yield Setting("custom normals", _custom_normals, ("has custom normals",))
     yield Setting("faces twice", _modifier("MIRROR", use_axis=(True, True, False)), ("twice in the same place",))
-    yield Setting("bumped box", _bumped_box, ("is baked",))
     yield Setting("linked light", _linked_light, ("Light linking",))
     yield Setting("motion blur", _motion_blur, ("Motion blur",))
 
