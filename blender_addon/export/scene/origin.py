@@ -17,7 +17,7 @@ FAR = 10.0
 def scene_origin(
     camera: bpy.types.Object, targets: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> NDArray[np.float64]:
-    """A place in whole metres: zero, or the middle of the first target that there is where the camera is far away."""
+    """A place in whole metres: zero, or the middle of the first target that there is where it and the camera are far."""
     if np.linalg.norm(camera.evaluated_get(depsgraph).matrix_world.translation) <= FAR:
         return np.zeros(3)
     for instance in depsgraph.object_instances:
@@ -25,7 +25,8 @@ def scene_origin(
             corners = np.array(instance.object.bound_box, dtype=np.float64)
             matrix = np.array(instance.matrix_world, dtype=np.float64)
             middle = matrix[:3, :3] @ corners.mean(axis=0) + matrix[:3, 3]
-            return np.rint(middle) if np.isfinite(middle).all() else np.zeros(3)
+            is_far = np.isfinite(middle).all() and np.linalg.norm(middle) > FAR
+            return np.rint(middle) if is_far else np.zeros(3)
     return np.zeros(3)
 
 

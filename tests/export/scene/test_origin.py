@@ -87,10 +87,12 @@ def test_what_hides_a_far_target_is_found(scene: Any) -> None:
     assert check_export(bpy.context, target)[0] == ["The camera does not see 'Target': it is hidden behind 'Lid'."]
 
 
-@pytest.mark.parametrize(("distance", "is_far"), [(0.9 * FAR, False), (1.1 * FAR, True)])
-def test_what_is_near_stays_where_it_is(distance: float, is_far: bool, scene: Any, export: Any) -> None:
+@pytest.mark.parametrize(
+    ("distance", "height", "is_far"), [(0.9 * FAR, 0.5, False), (1.1 * FAR, 0.5, True), (0.0, 2.0 * FAR, False)]
+)
+def test_what_is_near_stays_where_it_is(distance: float, height: float, is_far: bool, scene: Any, export: Any) -> None:
     world_color(scene, 1.0)
     target = add_quad("Target", 1.0, 0.0, new_material("Target"))
     target.location.x = distance
-    add_camera("PERSP", (distance, 0.0, 0.5))
+    add_camera("PERSP", (distance, 0.0, height))
     assert ("origin" in export(target).request["generator"]) is is_far
