@@ -17,7 +17,7 @@ FAR = 10.0
 def scene_origin(
     camera: bpy.types.Object, targets: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> NDArray[np.float64]:
-    """A place in whole metres: zero, or the middle of the first target that there is where it and the camera are far."""
+    """A place in whole metres: zero, or the middle of the first target there is, where it and the camera are far."""
     if np.linalg.norm(camera.evaluated_get(depsgraph).matrix_world.translation) <= FAR:
         return np.zeros(3)
     for instance in depsgraph.object_instances:
