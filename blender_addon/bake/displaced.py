@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import corners_of, flat_normals, material_of_slot, slot_count
-from ..export.nodes.displacement import displacement_of, moves_faces
+from ..export.nodes.dependence import OF_PLACE, asked_for
+from ..export.nodes.displacement import moves_faces
 from ..versions import active_output
 from .stage import Stage, bake, staged
 
 Corners = NDArray[np.float64]  # (corners of faces, 3)
 
-COLORS = "material_fit"
+COLORS, PLACE, GLOW = "material_fit", "material_fit_place", "material_fit_glow"
 
 
 def displaced_corners(
@@ -40,14 +41,16 @@ def displaced_corners(
                 materials.append(_displacing(shown))
                 mesh.materials.append(materials[-1])
             mesh.polygons.foreach_set("material_index", np.clip(faces, 0, len(slots) - 1))  # clear() has set them to 0
+            if not any(shown is not None and asked_for(shown.original.node_tree, OF_PLACE) for shown in slots):
+                # far from zero the kernel's places are coarse
+                stage.item.matrix_world = stage.item.matrix_world.to_3x3().to_4x4()
+            _keep_places(stage)
             stage.scene.cycles.samples = 1
-            after, normals = _baked(stage, "POSITION"), 2.0 * _baked(stage, "EMIT") - 1.0
-            for material in materials:
-                _take_away(material)
-            before = _baked(stage, "POSITION")  # which is not quite at the corners, either
+            offsets = _baked(stage, materials, "up") - _baked(stage, materials, "down")
+            normals = 2.0 * _baked(stage, materials, "normal") - 1.0
             linear = np.array(instance.matrix_world.to_3x3(), dtype=np.float64)
             places, loops, is_smooth = corners_of(mesh)
-            offsets, normals = (after - before) @ np.linalg.pinv(linear).T, normals @ linear
+            offsets, normals = offsets @ np.linalg.pinv(linear).T, normals @ linear
             moved = (places + offsets[loops].reshape(-1, 3, 3)).astype(np.float32)
             has_own = is_smooth | bool(mesh.has_custom_normals)
             found = np.where(has_own[:, None, None], normals[loops].reshape(-1, 3, 3), flat_normals(moved))
@@ -59,8 +62,19 @@ def displaced_corners(
             bpy.data.materials.remove(material)
 
 
+def _keep_places(stage: Stage) -> None:
+    """Give the mesh its places in the world before anything moves them, as an attribute."""
+    mesh: Any = stage.item.data
+    places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    matrix = np.array(stage.item.matrix_world, dtype=np.float64)
+    places = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    attribute = mesh.attributes.new(PLACE, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", places.astype(np.float32).ravel())
+
+
 def _displacing(material: bpy.types.Material | None) -> bpy.types.Material:
-    """A surface that gives half of its normal and a half, with what moves the faces of `material`, if anything does."""
+    """A surface that glows by what `_baked` asks for, with what moves the faces of `material`, if anything does."""
     if material is None or not moves_faces(material.original):
         copy = bpy.data.materials.new("material_fit_blank")
         if copy.node_tree is None:  # before Blender 5
@@ -69,30 +83,46 @@ def _displacing(material: bpy.types.Material | None) -> bpy.types.Material:
         copy = material.original.copy()
         copy.displacement_method = "DISPLACEMENT"  # without what bends normals besides
     tree: Any = copy.node_tree
-    half, emission = tree.nodes.new("ShaderNodeVectorMath"), tree.nodes.new("ShaderNodeEmission")
-    half.operation = "MULTIPLY_ADD"
-    half.inputs[1].default_value = half.inputs[2].default_value = (0.5, 0.5, 0.5)
-    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"], half.inputs[0])
-    tree.links.new(half.outputs[0], emission.inputs["Color"])
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.name = GLOW
     output: Any = active_output(tree)
     tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    _add_colors(tree)
     return copy
 
 
-def _take_away(material: bpy.types.Material) -> None:
-    socket = displacement_of(material)
-    if socket is not None:
-        material.node_tree.links.remove(socket.links[0])
+def _add_colors(tree: Any) -> None:
+    """What may be asked for, none of it below zero, as no emission is: half of the normal and a half, and how far a
+    point has moved along the axes of the world and against them."""
+    geometry, before = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeAttribute")
+    before.attribute_name = PLACE
+    half = tree.nodes.new("ShaderNodeVectorMath")
+    half.name, half.operation = "normal", "MULTIPLY_ADD"
+    half.inputs[1].default_value = half.inputs[2].default_value = (0.5, 0.5, 0.5)
+    tree.links.new(geometry.outputs["Normal"], half.inputs[0])
+    for name, first, second in (
+        ("up", geometry.outputs["Position"], before.outputs["Vector"]),
+        ("down", before.outputs["Vector"], geometry.outputs["Position"]),
+    ):
+        difference, positive = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(2))
+        difference.operation, positive.operation, positive.name = "SUBTRACT", "MAXIMUM", name
+        tree.links.new(first, difference.inputs[0])
+        tree.links.new(second, difference.inputs[1])
+        tree.links.new(difference.outputs[0], positive.inputs[0])
+        positive.inputs[1].default_value = (0.0, 0.0, 0.0)
 
 
-def _baked(stage: Stage, kind: str) -> Corners:
-    """One pass at the corners of the faces."""
+def _baked(stage: Stage, materials: list[bpy.types.Material], color: str) -> Corners:
+    """One of the colours of `_add_colors` at the corners of the faces."""
     mesh: Any = stage.item.data
+    for material in materials:
+        tree: Any = material.node_tree
+        tree.links.new(tree.nodes[color].outputs[0], tree.nodes[GLOW].inputs["Color"])
     colors = mesh.color_attributes.new(COLORS, "FLOAT_COLOR", "CORNER")
     try:
         mesh.color_attributes.active_color = colors
         stage.scene.render.bake.target = "VERTEX_COLORS"
-        bake(stage, kind)
+        bake(stage, "EMIT")
         found = np.empty(len(colors.data) * 4, dtype=np.float32)
         mesh.color_attributes[COLORS].data.foreach_get("color", found)
         return found.reshape(-1, 4)[:, :3].astype(np.float64)

@@ -119,6 +119,22 @@ def test_the_recorded_picture_is_cycles(
     assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.025
 
 
+def test_a_displacement_far_from_zero_is_as_fine_as_near(scene: Any, export: Any) -> None:
+    """3 km away places in the world are a quarter of a millimetre apart: faces of 4 cm would lean by half a degree."""
+    lit_scene(scene)
+    for item in scene.objects:
+        item.location.x += 3000.0
+    material = new_material("Target")
+    displace(material, along_x(material), SLOPE, "DISPLACEMENT")
+    item = grid(material)
+    item.location.x = 3000.0
+    bpy.context.view_layer.update()
+    positions, normals = vertices(export(item))
+    expected = np.array([-SLOPE, 0.0, 1.0]) / np.hypot(1.0, SLOPE)
+    assert np.abs(normals - expected).max() < 1e-3
+    np.testing.assert_allclose(np.ptp(positions[:, 2]), SLOPE * np.ptp(positions[:, 0]), rtol=1e-3)
+
+
 def test_a_normal_map_above_a_displacement_is_that_of_cycles(
     scene: Any, export: Any, render_cycles: Any, mitsuba: Any
 ) -> None:
