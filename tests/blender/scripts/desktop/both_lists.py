@@ -184,6 +184,8 @@ def story():
     yield from widen(300)
     yield from write("reference_path", folder / "right.exr")
     yield from press("mfo.add_picture(")
+    yield from until(lambda: len(settings.pictures) == 1, 20)
+    yield 2.0  # the list that is new grows in steps, and its fields are not yet where they will be
     yield from write("pictures[0].path", folder / "left.exr")
     yield from shot("1_pictures")
     yield from choose_camera("At Left")
