@@ -13,8 +13,8 @@ from .check import preflight
 from .operators import CLASSES as OPERATORS
 from .operators import part
 from .panel import menu
+from .pictures import comparison, previews
 from .process import waiting_backend
-from .result import comparison, previews
 from .running import cycles_check, handlers, live, notice, running_export, running_job
 from .versions import is_module
 

@@ -18,7 +18,7 @@ from bpy.props import (
 )
 
 from .picture_part import MFO_PG_part, has_pixels
-from .result import comparison, overlay
+from .pictures import comparison, overlay
 from .translations import CONTEXT
 from .versions import RELATIVE_PATH
 

@@ -41,7 +41,8 @@ def displaced_corners(
                 materials.append(_displacing(shown))
                 mesh.materials.append(materials[-1])
             mesh.polygons.foreach_set("material_index", np.clip(faces, 0, len(slots) - 1))  # clear() has set them to 0
-            if not any(shown is not None and asked_for(shown.original.node_tree, OF_PLACE) for shown in slots):
+            moving = [shown.original for shown in slots if shown is not None and moves_faces(shown.original)]
+            if not any(asked_for(material.node_tree, OF_PLACE) for material in moving):
                 # far from zero the kernel's places are coarse
                 stage.item.matrix_world = stage.item.matrix_world.to_3x3().to_4x4()
             _keep_places(stage)
@@ -119,12 +120,13 @@ def _baked(stage: Stage, materials: list[bpy.types.Material], color: str) -> Cor
         tree: Any = material.node_tree
         tree.links.new(tree.nodes[color].outputs[0], tree.nodes[GLOW].inputs["Color"])
     colors = mesh.color_attributes.new(COLORS, "FLOAT_COLOR", "CORNER")
+    name = colors.name  # another one where the mesh has such an attribute
     try:
         mesh.color_attributes.active_color = colors
         stage.scene.render.bake.target = "VERTEX_COLORS"
         bake(stage, "EMIT")
-        found = np.empty(len(colors.data) * 4, dtype=np.float32)
-        mesh.color_attributes[COLORS].data.foreach_get("color", found)
+        found = np.empty(len(mesh.loops) * 4, dtype=np.float32)
+        mesh.color_attributes[name].data.foreach_get("color", found)
         return found.reshape(-1, 4)[:, :3].astype(np.float64)
     finally:
-        mesh.color_attributes.remove(mesh.color_attributes[COLORS])
+        mesh.color_attributes.remove(mesh.color_attributes[name])

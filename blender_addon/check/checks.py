@@ -37,10 +37,10 @@ from ..export.reference.turned_picture import turn_notes
 from ..export.render_state import instanced_objects, rendered_objects
 from ..export.scene.read_scene import MESH_TYPES
 from ..graph_values.mix_values import default_values, inside_values
+from ..pictures.overlay import background_of
 from ..properties import SOCKET_ITEMS, crossed_limits, node_value_key
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
-from ..result.overlay import background_of
 from ..versions import overrides_of
 
 FINE, IGNORED, TO_CHOOSE, STOPS = "fine", "ignored", "to_choose", "stops"

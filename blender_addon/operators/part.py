@@ -10,7 +10,7 @@ from bpy.props import IntProperty
 from ..check import preflight
 from ..export.camera.render_region import pictured_size
 from ..picture_part import count_all, count_render_region
-from ..result import overlay
+from ..pictures import overlay
 from ..sentences.translated import translated
 
 

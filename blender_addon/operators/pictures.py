@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ..result.comparison import comparison_image, picture_image, split_image
+from ..pictures.comparison import comparison_image, picture_image, split_image
 from ..result.report_page import shown_report
 from ..sentences.translated import translated
 

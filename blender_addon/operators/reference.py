@@ -9,7 +9,7 @@ from bpy.props import StringProperty
 
 from ..check import preflight
 from ..export.reference.reference import DISPLAY_SUFFIXES, LINEAR_SUFFIXES
-from ..result import overlay
+from ..pictures import overlay
 from ..sentences.translated import translated
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..result import comparison, previews, shown_result
+from ..pictures import comparison, previews
+from ..result import shown_result
 from ..running import cycles_check
 from .layout import GAP, UNIT, buttons_side_by_side, draw_messages, draw_numbers, draw_pictures, draw_sentence
 

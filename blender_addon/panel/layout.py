@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..result import previews
+from ..pictures import previews
 from ..sentences.translated import translated, word
 from ..text_width import text_width, ui_scale, wrapped
 

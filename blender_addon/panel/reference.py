@@ -7,7 +7,7 @@ import bpy
 
 from ..check import preflight
 from ..check.checks import asks_view
-from ..result import overlay
+from ..pictures import overlay
 from ..running import running_job
 from ..sentences.translated import translated, word
 from .layout import BOX, BUTTON, NAMED_NUMBER, buttons_side_by_side, names_of, side_by_side

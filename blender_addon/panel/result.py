@@ -8,7 +8,8 @@ from itertools import groupby
 import bpy
 
 from ..export.nodes.target_shader import target_shader
-from ..result import previews, shown_result
+from ..pictures import previews
+from ..result import shown_result
 from ..result.animated_sockets import animation_of
 from ..result.job_result import must_ask
 from ..sentences.translated import translated, word

@@ -7,7 +7,8 @@ import bpy
 
 from ..backend.backend_section import draw_setup, has_trouble
 from ..operators.fit_options import selected_targets
-from ..result import previews, shown_result
+from ..pictures import previews
+from ..result import shown_result
 from ..result.job_result import must_ask
 from ..running import fit_queue, live, running_export, running_job
 from ..sentences.translated import translated, word

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import previews
+from ..pictures import previews
 from .job_result import JobResult, Value
 from .write_back import result_to_sockets, socket_to_parameter
 

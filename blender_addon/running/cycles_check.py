@@ -19,10 +19,11 @@ from typing import Any
 import bpy
 
 from ..check.preflight import redraw
+from ..pictures import previews
 from ..process.backend_python import EXTENSION_ROOT, backend_environment
 from ..process.background_task import BackgroundTask, Step, environment_for
 from ..process.temporary_folder import make_folder
-from ..result import previews, shown_result
+from ..result import shown_result
 
 TICK = 0.3  # seconds between two looks
 

@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..check import preflight
-from ..result import comparison
+from ..pictures import comparison
 from . import cycles_check, running_export, running_job
 
 

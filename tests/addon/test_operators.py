@@ -38,23 +38,23 @@ def test_fit_apply_undo_redo_revert(scene: SimpleNamespace) -> None:
     assert shown["Roughness"] == ("0.5", "0.312")
     assert shown["Base Color"][0] == "#E7E7E7"  # 0.8 linear, IEC 61966-2-1
     bpy.ops.ed.undo_push(message="before apply")
-    before = {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
+    before = {s.name: plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
 
     assert bpy.ops.mfo.apply("EXEC_DEFAULT", True) == {"FINISHED"}
     assert sockets(bpy)["Roughness"].default_value == pytest.approx(RECOVERED["roughness"], abs=FLOAT32)
     assert sockets(bpy)["Metallic"].default_value == pytest.approx(RECOVERED["metallic"], abs=FLOAT32)
-    applied = _plain(sockets(bpy)["Base Color"])
+    applied = plain(sockets(bpy)["Base Color"])
     assert applied != before["Base Color"]
 
     bpy.ops.ed.undo()
-    assert {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
+    assert {s.name: plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
     assert not bpy.data.materials["Glaze"].mfo.originals
     bpy.ops.ed.redo()
-    assert _plain(sockets(bpy)["Base Color"]) == applied
+    assert plain(sockets(bpy)["Base Color"]) == applied
 
     assert bpy.ops.mfo.apply() == {"FINISHED"}  # twice: the originals stay the user's
     assert bpy.ops.mfo.revert() == {"FINISHED"}
-    assert {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
+    assert {s.name: plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
     with pytest.raises(RuntimeError, match="Nothing was applied to material 'Glaze'"):
         bpy.ops.mfo.revert()
 
@@ -226,89 +226,6 @@ def test_values_are_copied_as_text(scene: SimpleNamespace) -> None:
     assert text.splitlines() == [f"Base Color: {color}", "Metallic: 0.125", "Roughness: 0.312"]
 
 
-def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    from blender_addon.running import running_job
-
-    monkeypatch.setattr("blender_addon.process.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
-    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
-    assert fit(scene, wait=False) == {"FINISHED"}
-    assert not scene.bpy.ops.mfo.fit.poll()
-    step_until(scene, lambda: runtime(scene).fraction > 0)
-    assert runtime(scene).progress_text.startswith("Refining · ")
-    for stage, said in (("Floor: start", "Refining · "), ("refine", "Checking the values")):
-        running_job._handle(running_job.current, {"event": "stage_end", "stage": stage})
-        assert runtime(scene).progress_text.startswith(said)
-    assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
-    assert not scene.bpy.ops.mfo.cancel.poll()
-    step_until(scene, lambda: runtime(scene).state != "CANCELLING")
-    assert runtime(scene).has_result
-    assert "best values so far" in runtime(scene).sentence
-    assert scene.bpy.ops.mfo.apply() == {"FINISHED"}
-
-
-def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    bpy = scene.bpy
-    before = {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
-    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": "killed"}))
-    with pytest.raises(RuntimeError, match=r"killed \(SIGKILL\).*best values so far are kept and can be applied"):
-        fit(scene)
-    assert runtime(scene).state == "FAILED"
-    assert runtime(scene).has_result
-    assert {r.name: r.result for r in runtime(scene).values}["Roughness"] == "0.312"
-    kept = bpy.data.materials["Glaze"].mfo
-    assert [(entry.partial, entry.job_folder) for entry in kept.history] == [(True, scene.job)]
-    assert {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before  # until Apply
-
-    assert bpy.ops.mfo.apply() == {"FINISHED"}
-    assert sockets(bpy)["Roughness"].default_value == pytest.approx(RECOVERED["roughness"], abs=FLOAT32)
-    assert bpy.ops.mfo.toggle(material="Glaze") == {"FINISHED"}
-    assert sockets(bpy)["Roughness"].default_value == pytest.approx(0.5, abs=FLOAT32)
-    assert bpy.ops.mfo.revert() == {"FINISHED"}
-    assert {s.name: _plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
-    assert bpy.ops.mfo.apply(job_folder=scene.job) == {"FINISHED"}  # as in a later session
-    left = json.loads(Path(scene.job, "result.json").read_text("utf-8"))
-    assert (left["partial"], left["status"]) == (True, "failed")
-    assert not Path(scene.job, "partial.json").exists()
-    Path(scene.job, "partial.json").write_text("{}")
-    monkeypatch.setenv("MFO_FAKE", "{}")
-    assert fit(scene) == {"FINISHED"}  # a folder with one is still taken for a job, and is emptied
-    assert not Path(scene.job, "partial.json").exists()
-
-
-def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    from blender_addon.running import running_job
-
-    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60, "end": "deaf"}))
-    fit(scene, wait=False)
-    process = running_job.current.process
-    scene.bpy.ops.wm.read_factory_settings()
-    assert process.outcome is not None
-    assert running_job.current is None
-    assert runtime(scene).state == "IDLE"
-
-
-def test_disable_and_enable_with_a_running_fit(scene: SimpleNamespace, addon, monkeypatch: pytest.MonkeyPatch) -> None:
-    from blender_addon.running import running_job
-
-    bpy = scene.bpy
-    handlers = {name: len(getattr(bpy.app.handlers, name)) for name in ("load_pre", "load_post", "undo_post")}
-    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
-    for _ in range(3):
-        fit(scene, wait=False)
-        process = running_job.current.process
-        addon.unregister()
-        assert process.outcome is not None
-        assert not hasattr(bpy.types.Scene, "mfo")
-        assert not hasattr(bpy.types.Material, "mfo")
-        assert not hasattr(bpy.types.WindowManager, "mfo_runtime")
-        assert not [n for n in dir(bpy.types) if n.startswith("MFO_")]
-        assert not hasattr(bpy.ops.mfo, "fit") or "fit" not in dir(bpy.ops.mfo)
-        addon.register()
-        Path(scene.job, "result.json").unlink(missing_ok=True)
-        scene.job += "x"
-    assert {name: len(getattr(bpy.app.handlers, name)) for name in handlers} == handlers
-
-
 def test_damaged_results_are_refused(scene: SimpleNamespace) -> None:
     fit(scene)
     path = Path(scene.job, "result.json")
@@ -335,7 +252,7 @@ def test_blender_model_names_are_socket_names(scene: SimpleNamespace) -> None:
     path.write_text(json.dumps(found))
     scene.bpy.ops.mfo.apply(job_folder=scene.job)
     assert sockets(scene.bpy)["IOR"].default_value == pytest.approx(1.75)
-    assert _plain(sockets(scene.bpy)["Coat Tint"]) == pytest.approx((0.5, 0.25, 1.0, 1.0), abs=FLOAT32)
+    assert plain(sockets(scene.bpy)["Coat Tint"]) == pytest.approx((0.5, 0.25, 1.0, 1.0), abs=FLOAT32)
 
 
 def test_reference_from_an_image_of_the_file(scene: SimpleNamespace) -> None:
@@ -392,28 +309,11 @@ def test_colours_follow_the_working_space(scene: SimpleNamespace) -> None:
     # ITU-R BT.2087-0, table 1: linear BT.709 to BT.2020
     matrix = ((0.6274, 0.3293, 0.0433), (0.0691, 0.9195, 0.0114), (0.0164, 0.0880, 0.8956))
     wanted = [sum(m * c for m, c in zip(row, (0.25, 0.5, 0.0625), strict=True)) for row in matrix]
-    assert _plain(sockets(bpy)["Base Color"])[:3] == pytest.approx(wanted, abs=1e-4)  # the table has four digits
+    assert plain(sockets(bpy)["Base Color"])[:3] == pytest.approx(wanted, abs=1e-4)  # the table has four digits
     bpy.ops.mfo.revert()
-    assert _plain(sockets(bpy)["Base Color"]) == pytest.approx((0.8, 0.8, 0.8, 1.0), abs=FLOAT32)
+    assert plain(sockets(bpy)["Base Color"]) == pytest.approx((0.8, 0.8, 0.8, 1.0), abs=FLOAT32)
 
 
-def _plain(socket) -> object:
+def plain(socket) -> object:
     value = socket.default_value
     return value if isinstance(value, (int, float, str)) else tuple(value)
-
-
-@pytest.mark.parametrize("end", ["refused", "failed", "crash"])
-def test_a_refusal_is_said_until_what_it_was_about_is_changed(
-    scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, end: str
-) -> None:
-    from blender_addon.running import running_job
-
-    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": end}))
-    context, settings = scene.bpy.context, scene.bpy.context.scene.mfo
-    settings.reference_path = "/nowhere/reference.exr" if end == "refused" else scene.reference
-    with pytest.raises(RuntimeError):
-        scene.bpy.ops.mfo.fit(job_folder=scene.job)
-    assert runtime(scene).state == "FAILED"
-    assert not running_job.is_answered(context)
-    settings.reference_path = scene.reference + " other"
-    assert running_job.is_answered(context) == (end != "crash")  # which no other picture mends

@@ -112,8 +112,9 @@ def _read_displacement(
     problem = graph_problem(displacement, is_copied=True)
     if problem is not None:
         findings.error(f"Displacement of material '{material.name}' is linked to {problem}: mend or unlink it.")
-    for leaf in (found, *found.leaves):
-        if bends_normals(material) and leaf.model == "principled":
+    bent = (found, *found.leaves) if bends_normals(material) else ()
+    for leaf in bent:
+        if leaf.model == "principled":
             leaf.sockets[SHADING_NORMAL] = Socket([0.0, 0.0, 0.0], True, by_graph=True)
 
 

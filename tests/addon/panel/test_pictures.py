@@ -38,7 +38,7 @@ class Collection(dict[str, Any]):
 
 @pytest.fixture
 def icons(addon: object, monkeypatch: pytest.MonkeyPatch) -> Collection:
-    from blender_addon.result import previews
+    from blender_addon.pictures import previews
 
     found = Collection()
     monkeypatch.setattr(previews, "_collection", found)
@@ -50,7 +50,7 @@ def icons(addon: object, monkeypatch: pytest.MonkeyPatch) -> Collection:
 
 def shown(names: tuple[str, ...], folder: Path, size: tuple[int, int]) -> None:
     """As after a fit of pictures of this size."""
-    from blender_addon.result import previews
+    from blender_addon.pictures import previews
 
     side = max(size) // 96  # fewer pixels do
     for i, name in enumerate(names):
@@ -123,7 +123,7 @@ def _texts(layout: Layout) -> Any:
 
 @pytest.mark.parametrize(("size", "axis"), [((1920, 1080), 0), ((1080, 1920), 1)])
 def test_the_first_is_above_or_left(size: tuple[int, int], axis: int) -> None:
-    from blender_addon.result.thumbnail import is_wide, paired
+    from blender_addon.pictures.thumbnail import is_wide, paired
 
     first, second = (np.full((size[1] // 4, size[0] // 4, 3), value, np.uint8) for value in (10, 200))
     both = paired(first, second)
@@ -137,7 +137,7 @@ def test_the_first_is_above_or_left(size: tuple[int, int], axis: int) -> None:
 
 def test_what_is_drawn_is_upright(icons: Collection, tmp_path: Path) -> None:
     """Blender has the lowest row first, a file the uppermost."""
-    from blender_addon.result import previews
+    from blender_addon.pictures import previews
 
     rows = bytes((255, 0, 0)) * 4 + bytes((0, 0, 255)) * 4
     (tmp_path / "flag.ppm").write_bytes(b"P6 4 2 255\n" + rows)
@@ -152,7 +152,7 @@ def test_what_is_drawn_is_upright(icons: Collection, tmp_path: Path) -> None:
     [b"", b"P5 2 2 255\n" + bytes(12), b"P6 2 2 255\n" + bytes(11), b"P6 0 0 255\n", b"P6 2 2 65535\n" + bytes(24)],
 )
 def test_what_is_no_thumbnail_is_refused(tmp_path: Path, content: bytes) -> None:
-    from blender_addon.result.thumbnail import read_thumbnail
+    from blender_addon.pictures.thumbnail import read_thumbnail
 
     (tmp_path / "x.ppm").write_bytes(content)
     with pytest.raises(OSError, match="is not a picture"):
@@ -163,7 +163,7 @@ def test_what_is_no_thumbnail_is_refused(tmp_path: Path, content: bytes) -> None
 
 def test_thumbnails_are_those_of_the_backend(tmp_path: Path) -> None:
     """What one side writes the other reads."""
-    from blender_addon.result.thumbnail import read_thumbnail
+    from blender_addon.pictures.thumbnail import read_thumbnail
     from mfo_backend.report.picture import thumbnail_bytes
 
     display = np.random.default_rng(1).uniform(0, 1, (30, 50, 3)).astype(np.float32)

@@ -104,7 +104,7 @@ def while_it_exports(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Itera
 
 
 def while_it_runs(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
-    from blender_addon.result import previews
+    from blender_addon.pictures import previews
     from blender_addon.running import running_job
 
     patch.setattr(running_job, "current", object())
@@ -142,8 +142,8 @@ def with_questions(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterat
 
 
 def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.pictures import previews
     from blender_addon.properties import SOCKET_ITEMS
-    from blender_addon.result import previews
 
     fit(scene)
     fit(scene)
@@ -285,7 +285,7 @@ def test_a_region_without_width_is_drawn(scene: SimpleNamespace, monkeypatch: py
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_text_is_cut(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, language: str, state: State) -> None:
     from blender_addon.panel import history, layout, parameters, part, reference, result, run
-    from blender_addon.result import previews
+    from blender_addon.pictures import previews
     from blender_addon.sentences import translated
 
     monkeypatch.setattr(translated, "_language", lambda: language)

@@ -57,11 +57,16 @@ def grid(material: Any) -> Any:
 
 
 def vertices(report: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and normals of the target."""
+    """Positions and normals of the target, the one mesh there is."""
+    (path,) = (report.folder / "meshes").glob("*.ply")
+    return ply_vertices(path)
+
+
+def ply_vertices(path: Path) -> tuple[np.ndarray, np.ndarray]:
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
-    mesh = mi.traverse(mi.load_dict({"type": "ply", "filename": str(next((report.folder / "meshes").glob("*.ply")))}))
+    mesh = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
     return np.array(mesh["vertex_positions"]).reshape(-1, 3), np.array(mesh["vertex_normals"]).reshape(-1, 3)
 
 
@@ -133,6 +138,25 @@ def test_a_displacement_far_from_zero_is_as_fine_as_near(scene: Any, export: Any
     expected = np.array([-SLOPE, 0.0, 1.0]) / np.hypot(1.0, SLOPE)
     assert np.abs(normals - expected).max() < 1e-3
     np.testing.assert_allclose(np.ptp(positions[:, 2]), SLOPE * np.ptp(positions[:, 0]), rtol=1e-3)
+
+
+def test_what_else_an_object_has_does_not_matter(scene: Any, export: Any) -> None:
+    """A slot without a material, whose faces stay with their neighbours, and an attribute by the name of the bake's."""
+    lit_scene(scene)
+    material = new_material("Target")
+    displace(material, along_x(material), SLOPE, "DISPLACEMENT")
+    item = grid(material)
+    item.data.materials.append(None)
+    for polygon in item.data.polygons:
+        polygon.material_index = int(polygon.center.x > 0.01)
+    item.data.color_attributes.new("material_fit", "BYTE_COLOR", "POINT")
+    report = export(item)
+    assert [note for note in report.notes if "displacement" in note] == []
+    positions = np.concatenate([ply_vertices(path)[0] for path in sorted((report.folder / "meshes").glob("*.ply"))])
+    assert positions[:, 0].max() == pytest.approx(1.0)
+    moved = positions[:, 0] < 0.01  # vertices of both are moved, as in Cycles
+    np.testing.assert_allclose(positions[moved, 2], SLOPE * positions[moved, 0], atol=1e-4)
+    np.testing.assert_allclose(positions[positions[:, 0] > 0.2, 2], 0.0, atol=1e-6)
 
 
 def test_a_normal_map_above_a_displacement_is_that_of_cycles(

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -287,88 +286,6 @@ def test_glow_of_any_tree_is_emission(stage: Any, export: Any) -> None:
     found = at_vertices(texture(report, bsdf, "Emission Color"), uv)
     assert np.sqrt(np.mean((found - 3.0 * (0.5 * positions + 0.5)) ** 2)) < 0.03
     assert report.request["materials"][bsdf]["sockets"]["Emission Strength"]["value"] == 1.0
-
-
-def test_a_missing_image_is_magenta_and_named(stage: Any, export: Any) -> None:
-    target, _, nodes = stage
-    image = bpy.data.images.new("Lost", 8, 8)
-    image.source, image.filepath = "FILE", "//nowhere.png"
-    picture, mixed = nodes.new("TexImage"), nodes.new("MixRGB")
-    picture.image = image
-    mixed.inputs["Fac"].default_value = 0.5
-    mixed.inputs["Color1"].default_value = (0.0, 0.0, 0.0, 1.0)
-    nodes.tree.links.new(picture.outputs[0], mixed.inputs["Color2"])
-    nodes.tree.links.new(mixed.outputs[0], nodes.principled.inputs["Base Color"])
-    report = export(target)
-    bsdf = shape_of(report)[0]
-    color = report.request["materials"][bsdf]["sockets"]["Base Color"]
-    np.testing.assert_allclose(color["value"], (0.5, 0.0, 0.5), atol=1e-4)
-    assert "texture" not in color  # the same everywhere
-    said = (
-        "Material 'Ball': the image 'Lost' of the node 'Image Texture' is missing; it is magenta, as in Cycles. If the "
-        "reference shows it, find it first: File > External Data > Find Missing Files."
-    )
-    assert said in report.notes
-
-
-def _circle(nodes: Nodes) -> None:
-    first, second = nodes.new("MixShader"), nodes.new("MixShader")
-    nodes.tree.links.new(first.outputs[0], second.inputs[1])
-    nodes.tree.links.new(second.outputs[0], first.inputs[1])
-    nodes.tree.links.new(first.outputs[0], nodes.surface)
-
-
-def _group_without_output(nodes: Nodes) -> None:
-    node = nodes.new("Group")
-    node.node_tree = bpy.data.node_groups.new("Empty", "ShaderNodeTree")
-    node.node_tree.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
-    nodes.tree.links.new(node.outputs[0], nodes.surface)
-
-
-@pytest.mark.parametrize("build", [_circle, _group_without_output])
-def test_broken_trees_end_in_a_material(build: Callable[[Nodes], None], stage: Any, export: Any) -> None:
-    target, ball, nodes = stage
-    build(nodes)
-    before = sorted(node.name for node in nodes.tree.nodes)
-    report = export(target)
-    assert any("'Ball' is baked" in note for note in report.notes)
-    assert shape_of(report)[0] == "baked_0001"
-    assert sorted(node.name for node in nodes.tree.nodes) == before
-    assert ball.name == "Ball"
-
-
-def test_without_a_second_blender_the_nearest_model_stays(
-    stage: Any, export: Any, monkeypatch: Any, tmp_path: Path
-) -> None:
-    from blender_addon.bake import baker
-    from blender_addon.probe import client
-
-    target, _, nodes = stage
-    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    ask = baker.Baker.ask
-
-    def killed(self: Any, *words: Any, **more: Any) -> int:
-        number = ask(self, *words, **more)
-        client.signal_group(self._probe.pid, signal.SIGKILL)
-        return number
-
-    monkeypatch.setattr(baker.Baker, "ask", killed)
-    report = export(target)
-    assert any("'Ball' of 'Ball' could not be baked by Cycles: The second Blender" in note for note in report.notes)
-    assert any(note.startswith("Base Color of material 'Ball' is linked to") for note in report.notes)
-    assert [path.name for path in tmp_path.iterdir()] == ["job"]
-
-
-@pytest.mark.parametrize("asked", [False, True])
-def test_a_surface_with_two_sides_is_said(asked: bool, stage: Any, export: Any) -> None:
-    target, _, nodes = stage
-    geometry = nodes.new("NewGeometry")
-    nodes.tree.links.new(
-        geometry.outputs["Backfacing" if asked else "Pointiness"], nodes.principled.inputs["Roughness"]
-    )
-    said = "Material 'Ball' asks for Backfacing: in the fit both sides are as its front is."
-    assert (said in export(target).notes) is asked
 
 
 @pytest.mark.parametrize("owner", ["world", "scene", "layer"])

@@ -27,7 +27,7 @@ ADDON = "bl_ext.user_default.material_fit_mfo.blender_addon"
 LOOK = 0.005  # seconds between two looks
 running_job, previews, waiting_backend = (
     importlib.import_module(f"{ADDON}.{name}")
-    for name in ("running.running_job", "result.previews", "process.waiting_backend")
+    for name in ("running.running_job", "pictures.previews", "process.waiting_backend")
 )
 parser = argparse.ArgumentParser()
 parser.add_argument("blend")

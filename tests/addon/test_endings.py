@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How fits end otherwise than with a result: cancelled, killed, by another file, with the add-on, refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from .fake_backend import RECOVERED
+from .test_operators import FLOAT32, fit, plain, runtime, sockets, step_until
+
+
+def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.running import running_job
+
+    monkeypatch.setattr("blender_addon.process.job_process.CANCEL_GRACE", 3600.0)  # the fake answers, nobody kills it
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
+    assert fit(scene, wait=False) == {"FINISHED"}
+    assert not scene.bpy.ops.mfo.fit.poll()
+    step_until(scene, lambda: runtime(scene).fraction > 0)
+    assert runtime(scene).progress_text.startswith("Refining · ")
+    for stage, said in (("Floor: start", "Refining · "), ("refine", "Checking the values")):
+        running_job._handle(running_job.current, {"event": "stage_end", "stage": stage})
+        assert runtime(scene).progress_text.startswith(said)
+    assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
+    assert not scene.bpy.ops.mfo.cancel.poll()
+    step_until(scene, lambda: runtime(scene).state != "CANCELLING")
+    assert runtime(scene).has_result
+    assert "best values so far" in runtime(scene).sentence
+    assert scene.bpy.ops.mfo.apply() == {"FINISHED"}
+
+
+def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    bpy = scene.bpy
+    before = {s.name: plain(s) for s in sockets(bpy) if hasattr(s, "default_value")}
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": "killed"}))
+    with pytest.raises(RuntimeError, match=r"killed \(SIGKILL\).*best values so far are kept and can be applied"):
+        fit(scene)
+    assert runtime(scene).state == "FAILED"
+    assert runtime(scene).has_result
+    assert {r.name: r.result for r in runtime(scene).values}["Roughness"] == "0.312"
+    kept = bpy.data.materials["Glaze"].mfo
+    assert [(entry.partial, entry.job_folder) for entry in kept.history] == [(True, scene.job)]
+    assert {s.name: plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before  # until Apply
+
+    assert bpy.ops.mfo.apply() == {"FINISHED"}
+    assert sockets(bpy)["Roughness"].default_value == pytest.approx(RECOVERED["roughness"], abs=FLOAT32)
+    assert bpy.ops.mfo.toggle(material="Glaze") == {"FINISHED"}
+    assert sockets(bpy)["Roughness"].default_value == pytest.approx(0.5, abs=FLOAT32)
+    assert bpy.ops.mfo.revert() == {"FINISHED"}
+    assert {s.name: plain(s) for s in sockets(bpy) if hasattr(s, "default_value")} == before
+    assert bpy.ops.mfo.apply(job_folder=scene.job) == {"FINISHED"}  # as in a later session
+    left = json.loads(Path(scene.job, "result.json").read_text("utf-8"))
+    assert (left["partial"], left["status"]) == (True, "failed")
+    assert not Path(scene.job, "partial.json").exists()
+    Path(scene.job, "partial.json").write_text("{}")
+    monkeypatch.setenv("MFO_FAKE", "{}")
+    assert fit(scene) == {"FINISHED"}  # a folder with one is still taken for a job, and is emptied
+    assert not Path(scene.job, "partial.json").exists()
+
+
+def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.running import running_job
+
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60, "end": "deaf"}))
+    fit(scene, wait=False)
+    process = running_job.current.process
+    scene.bpy.ops.wm.read_factory_settings()
+    assert process.outcome is not None
+    assert running_job.current is None
+    assert runtime(scene).state == "IDLE"
+
+
+def test_disable_and_enable_with_a_running_fit(scene: SimpleNamespace, addon, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.running import running_job
+
+    bpy = scene.bpy
+    handlers = {name: len(getattr(bpy.app.handlers, name)) for name in ("load_pre", "load_post", "undo_post")}
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
+    for _ in range(3):
+        fit(scene, wait=False)
+        process = running_job.current.process
+        addon.unregister()
+        assert process.outcome is not None
+        assert not hasattr(bpy.types.Scene, "mfo")
+        assert not hasattr(bpy.types.Material, "mfo")
+        assert not hasattr(bpy.types.WindowManager, "mfo_runtime")
+        assert not [n for n in dir(bpy.types) if n.startswith("MFO_")]
+        assert not hasattr(bpy.ops.mfo, "fit") or "fit" not in dir(bpy.ops.mfo)
+        addon.register()
+        Path(scene.job, "result.json").unlink(missing_ok=True)
+        scene.job += "x"
+    assert {name: len(getattr(bpy.app.handlers, name)) for name in handlers} == handlers
+
+
+@pytest.mark.parametrize("end", ["refused", "failed", "crash"])
+def test_a_refusal_is_said_until_what_it_was_about_is_changed(
+    scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    from blender_addon.running import running_job
+
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": end}))
+    context, settings = scene.bpy.context, scene.bpy.context.scene.mfo
+    settings.reference_path = "/nowhere/reference.exr" if end == "refused" else scene.reference
+    with pytest.raises(RuntimeError):
+        scene.bpy.ops.mfo.fit(job_folder=scene.job)
+    assert runtime(scene).state == "FAILED"
+    assert not running_job.is_answered(context)
+    settings.reference_path = scene.reference + " other"
+    assert running_job.is_answered(context) == (end != "crash")  # which no other picture mends
