@@ -28,7 +28,9 @@ OPPOSITE, OPPOSITE_WIDTH = (1.0 - METAL, METAL), 0.3
 # A metal as smooth as the dielectric ended beside it on rough half metals, without noise in 2 of 100 scenes; a rougher
 # one in none. Under noise it costs a thirtieth more passes and gains nothing.
 ROUGHER_WIDTH = 0.6
-EVALUATIONS = 4  # of the residuals, for one node. No measurement
+# Of the residuals, for one node. With 2 and 8 the first 14 scenes of `base` end at the same FLIP, for 0.95 and 1.04 of
+# the passes; those of `noise` with 2, for 0.98
+EVALUATIONS = 4
 
 
 @dataclass(frozen=True)
