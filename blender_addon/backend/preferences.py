@@ -63,6 +63,14 @@ def backend_root() -> Path:
         return Path(bpy.utils.user_resource("DATAFILES"), "material_fit_mfo", "backend")
 
 
+def shelf_folder() -> Path:
+    """Where it is noted which results are not saved in their files yet. It need not exist."""
+    try:
+        return Path(bpy.utils.extension_path_user(ADDON_ID, path="shelf", create=False))
+    except ValueError:  # not installed as an extension
+        return Path(tempfile.gettempdir()) / "material_fit_shelf"
+
+
 def _default_root() -> str:
     try:
         return bpy.utils.extension_path_user(ADDON_ID, path="jobs", create=True)

@@ -14,7 +14,7 @@ from ..result import history, shown_result
 from ..result.job_result import JobResult, JobResultError, must_ask, read_job_result, result_folders
 from ..result.local_copy import unwritable
 from ..result.write_back import WriteBackError, apply_values
-from ..running import running_job
+from ..running import kept_results, running_job
 from ..sentences.translated import translated
 from .apply import PRESS_AGAIN, was_asked
 
@@ -131,6 +131,7 @@ class MFO_OT_remove_past(_PastResult, bpy.types.Operator):
         material = _material(context)
         assert material is not None
         kept = material.mfo
+        kept_results.forget(Path(kept.history[kept.history_index].job_folder))
         kept.history.remove(kept.history_index)
         kept.history_index = max(0, min(kept.history_index, len(kept.history) - 1))
         return {"FINISHED"}

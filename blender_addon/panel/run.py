@@ -54,6 +54,8 @@ class Run:
 def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What the last fit came to: its verdict, or why it failed."""
     runtime = context.window_manager.mfo_runtime
+    if runtime.state == "IDLE" and runtime.sentence:  # of a file that was left, or of results that came back
+        draw_sentence(layout.box(), context, runtime.sentence, "INFO")
     if runtime.state not in {"DONE", "FAILED"} or running_job.is_answered(context):
         return
     failed = runtime.state == "FAILED"

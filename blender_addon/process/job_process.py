@@ -157,7 +157,7 @@ class JobProcess:
             fallback = _EXIT_SENTENCES.get(code, "The backend ended") + "."
             return Outcome(str(last.get("status", "failed")), str(last.get("sentence") or fallback))
         if self._cancelled:
-            kept = "only its best values so far were kept" if self._keep_best() else "nothing of this run was kept"
+            kept = "only its best values so far were kept" if keep_best(self.folder) else "nothing of this run was kept"
             return Outcome("cancelled", f"Cancelled; the backend did not answer in time, so {kept}.")
         if code < 0:
             name = _signal_name(-code)
@@ -166,7 +166,7 @@ class JobProcess:
             cause = f"The backend {ended} ({name}); the memory may have run out, so try a lower resolution"
         else:
             cause = _EXIT_SENTENCES.get(code, f"The backend ended with the unknown exit code {code}")
-        if self._keep_best():
+        if keep_best(self.folder):
             cause += "; the best values so far are kept and can be applied"
         tail = log_tail(self.folder / LOG)
         reason = next((line.strip() for line in reversed(tail.splitlines()) if line.strip()), "")
@@ -175,15 +175,6 @@ class JobProcess:
         )
         return Outcome(_EXIT_STATUS.get(code, "failed"), sentence, tail)
 
-    def _keep_best(self) -> bool:
-        """Make the best values so far of a dead process the result, unless it has written one."""
-        result, partial = self.folder / RESULT, self.folder / PARTIAL
-        with contextlib.suppress(OSError):
-            if partial.is_file() and not result.exists():
-                os.replace(partial, result)
-                return True
-        return False
-
     def _stop_after(self, seconds: float) -> None:
         now = time.monotonic()
         self._deadlines = [(now + seconds, TERMINATE), (now + seconds + TERMINATE_GRACE, KILL)]
@@ -191,6 +182,16 @@ class JobProcess:
     def _escalate(self) -> None:
         if self._deadlines and time.monotonic() >= self._deadlines[0][0] and self.backend.is_alive:
             signal_group(self.pid, self._deadlines.pop(0)[1])
+
+
+def keep_best(folder: Path) -> bool:
+    """Make the best values so far of a process that has ended the result, unless it has written one."""
+    result, partial = folder / RESULT, folder / PARTIAL
+    with contextlib.suppress(OSError):
+        if partial.is_file() and not result.exists():
+            os.replace(partial, result)
+            return True
+    return False
 
 
 def log_tail(path: Path, lines: int = 40) -> str:

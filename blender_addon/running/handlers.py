@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What must happen when Blender opens another file, when something changes, and after an undo."""
+"""What must happen when Blender opens or saves a file, when something changes, and after an undo."""
 
 from __future__ import annotations
 
@@ -8,21 +8,38 @@ from bpy.app.handlers import persistent
 
 from ..check import preflight
 from ..pictures import comparison
-from . import cycles_check, running_export, running_job
+from . import cycles_check, kept_results, notice, running_export, running_job
+
+_ended = ""  # what is to be said of the file that is left
 
 
 @persistent
 def _before_load(*_args: object) -> None:
+    global _ended
     running_export.close()
-    running_job.close()  # the objects and materials it works on go away
+    _ended = running_job.close_for_load()  # the objects and materials it works on go away
     cycles_check.close()
     preflight.reset()
 
 
 @persistent
 def _after_load(*_args: object) -> None:
+    global _ended
     comparison.forget()
-    running_job.reset()  # the window manager comes out of the file, with the state of another day
+    said = [_ended] if _ended else []
+    _ended = ""
+    if not bpy.app.background:  # a script gets the file as it is
+        said += kept_results.restore()
+    running_job.reset(" ".join(said))  # the window manager comes out of the file, with the state of another day
+    if said:
+        notice.show(" ".join(said))
+
+
+@persistent
+def _after_save(*args: object) -> None:
+    # a copy of the file, as an export writes it, is not the file
+    if not bpy.app.background and args and args[0] == bpy.data.filepath:
+        kept_results.saved(running_job.folders())
 
 
 @persistent
@@ -38,6 +55,7 @@ def _after_change(*_args: object) -> None:
 _HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
+    "save_post": _after_save,
     "depsgraph_update_post": _after_change,
     "undo_pre": _before_undo,
     "redo_pre": _before_undo,

@@ -20,13 +20,18 @@ _TONE, _FADE, _VOLUME = 0.14, 0.05, 0.25  # seconds, seconds, of 1
 _held: list[Any] = []  # a sound ends with its handle
 
 
-def tell(sentence: str) -> None:
-    """Show the sentence in the user's language in every window for a while, and make the noise that was asked for."""
-    text = translated(sentence)
-    _show(f"Material Fit: {text}")
+def show(sentence: str) -> None:
+    """Show the sentence in the user's language in every window for a while."""
+    _show(f"Material Fit: {translated(sentence)}")
     if bpy.app.timers.is_registered(_clear):
         bpy.app.timers.unregister(_clear)
     bpy.app.timers.register(_clear, first_interval=SHOWN, persistent=True)
+
+
+def tell(sentence: str) -> None:
+    """`show`, with the noise that was asked for."""
+    show(sentence)
+    text = translated(sentence)
     asked = preference(bpy.context, "when_done")
     if asked == "SOUND":
         _play()

@@ -31,7 +31,7 @@ from ..result.local_copy import unwritable
 from ..result.shown_result import add_message
 from ..result.write_back import WriteBackError
 from ..versions import is_modal_operator_running
-from . import fit_queue, notice
+from . import fit_queue, kept_results, notice
 from .fit_queue import PreparedFit
 
 TICK = 0.1  # seconds between two looks at the process
@@ -81,8 +81,10 @@ def start(fit: PreparedFit, *, timer: bool) -> None:
     runtime.progress_text = "Starting"
     for note in fit.notes:
         add_message(runtime, note, "INFO")
-    if timer and not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+    if timer:
+        kept_results.keep(fit.folder)
+        if not bpy.app.timers.is_registered(_tick):
+            bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
     redraw()
 
 
@@ -121,7 +123,7 @@ def cancel() -> None:
 
 
 def close() -> None:
-    """End a running fit within about a second, empty the queue and stop the timer."""
+    """End a running fit within about a second, empty the queue and stop the timer; what it has found is kept."""
     global current
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
@@ -133,9 +135,35 @@ def close() -> None:
         current = None
 
 
-def reset() -> None:
-    """Forget the last fit: its result, pictures and messages."""
-    shown_result.clear(_runtime())
+def close_for_load() -> str:
+    """`close` before another file is opened; returns what is to be said of the fits that end with it."""
+    job, waiting, blend = current, len(fit_queue.waiting), bpy.data.filepath
+    close()
+    if job is None:
+        return ""
+    said = [f"The fit of {job.fit.material_name} was ended as another file was opened."]
+    if not (job.process.folder / "result.json").is_file():
+        said.append("It had found no values yet.")
+    elif blend:
+        said.append(f"Its best values so far are in the history when {Path(blend).name} is opened again.")
+    else:
+        said.append(f"Load Result shows its best values so far, from its folder: {job.process.folder}")
+    if waiting:
+        said.insert(1, f"Fits of the queue that were not begun: {waiting}.")
+    return " ".join(said)
+
+
+def reset(sentence: str = "") -> None:
+    """Forget the last fit: its result, pictures and messages; `sentence` is said of the file that was left."""
+    runtime = _runtime()
+    shown_result.clear(runtime)
+    runtime.sentence = sentence
+
+
+def folders() -> list[Path]:
+    """Job folders of the fit that runs and of those that wait; they are the open file's."""
+    running = [current.process.folder] if current is not None else []
+    return running + [fit.folder for fit in fit_queue.waiting]
 
 
 def fail(sentences: Sequence[str]) -> None:
@@ -268,6 +296,8 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
             runtime.state = "FAILED" if died else "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
+    if not runtime.has_result:
+        kept_results.forget(job.process.folder)
     icon = shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO") if runtime.state == "DONE" else "ERROR"
     fit_queue.ended(job.fit.material_name, runtime.sentence, icon)
     if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:

@@ -248,6 +248,13 @@ FIT = {
     "only its best values so far were kept": "seules ses meilleures valeurs jusque-là sont gardées",
     "nothing of this run was kept": "rien de cet essai n'est gardé",
     "The export was ended by an undo or another file: press Fit again.": "L'export a été arrêté par une annulation ou un autre fichier : appuyer de nouveau sur Ajuster.",
+    "The fit of {} was ended as another file was opened.": "L'ajustement de {} a été arrêté à l'ouverture d'un autre fichier.",
+    "It had found no values yet.": "Il n'avait pas encore trouvé de valeurs.",
+    "Its best values so far are in the history when {} is opened again.": "Ses meilleures valeurs jusque-là seront dans l'historique quand {} sera rouvert.",
+    "Load Result shows its best values so far, from its folder: {}": "Charger un résultat montre ses meilleures valeurs jusque-là, depuis son dossier : {}",
+    "Fits of the queue that were not begun: {}.": "Ajustements de la file qui n'ont pas été commencés : {}.",
+    "A result that was not saved is of {}, which this file does not have: {}": "Un résultat non enregistré est de {}, que ce fichier n'a pas : {}",
+    "The history of {} has results that were not saved: save the file to keep them.": "L'historique de {} a des résultats qui n'étaient pas enregistrés : enregistrer le fichier pour les garder.",
     "Something that was being exported is not in the file any more: press Fit again.": "Quelque chose qui était en cours d'export n'est plus dans le fichier : appuyer de nouveau sur Ajuster.",
     # the backend's installation
     "About 130 MB to download, 450 MB on the disk.": "Environ 130 Mo à télécharger, 450 Mo sur le disque.",

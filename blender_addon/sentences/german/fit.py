@@ -248,6 +248,13 @@ FIT = {
     "only its best values so far were kept": "sind nur seine bisher besten Werte aufgehoben",
     "nothing of this run was kept": "ist von diesem Lauf nichts aufgehoben",
     "The export was ended by an undo or another file: press Fit again.": "Rückgängig oder eine andere Datei hat den Export beendet: noch einmal Anpassen drücken.",
+    "The fit of {} was ended as another file was opened.": "Die Anpassung von {} wurde beendet, als eine andere Datei geöffnet wurde.",
+    "It had found no values yet.": "Sie hatte noch keine Werte gefunden.",
+    "Its best values so far are in the history when {} is opened again.": "Ihre bisher besten Werte sind im Verlauf, wenn {} wieder geöffnet wird.",
+    "Load Result shows its best values so far, from its folder: {}": "Ergebnis laden zeigt ihre bisher besten Werte, aus ihrem Ordner: {}",
+    "Fits of the queue that were not begun: {}.": "Anpassungen der Warteschlange, die nicht begonnen wurden: {}.",
+    "A result that was not saved is of {}, which this file does not have: {}": "Ein nicht gespeichertes Ergebnis ist von {}, was diese Datei nicht hat: {}",
+    "The history of {} has results that were not saved: save the file to keep them.": "Der Verlauf von {} hat Ergebnisse, die nicht gespeichert waren: die Datei speichern, um sie zu behalten.",
     "Something that was being exported is not in the file any more: press Fit again.": "Etwas, was gerade exportiert wurde, ist nicht mehr in der Datei: noch einmal Anpassen drücken.",
     # the backend's installation
     "About 130 MB to download, 450 MB on the disk.": "Etwa 130 MB zum Herunterladen, 450 MB auf der Festplatte.",
