@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import time
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +16,19 @@ from .findings import ExportError, Findings
 from .fitted_slot import FittedSlot, check_slots
 from .leaves_by_pictures import leaves_by_pictures
 from .materials.wanted_values import fits_of_each, wanted_values
-from .partial_export import MITSUBA, Found, PartialExport, Steps, partial_export
+from .partial_export import MITSUBA, PartialExport, partial_export
 from .reference.picture_setup import PictureSetup, check_setups, named, shown
 from .reference.reference import Picture
 from .reference.reference_view import SCENE
 from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_file import scene_files
+from .steps import Steps, drained, held
 
 NOWHERE = "Material '{material}' of '{obj}' is in none of the pictures: leave it out, or add a picture that shows it."
 MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
-_LOOK_SECONDS = 0.01  # between two looks at a second Blender that is waited for
+READING = "Picture {} of {}"
 
 __all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job", "export_steps"]
 
@@ -65,40 +66,79 @@ def export_job(
     ExportError
         If the scene, the reference or the folder cannot be used. Then `folder` is as it was.
     """
-    if not isinstance(reference, Sequence):
-        return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
-    check_setups(reference)
-    if len(reference) > 1:  # what is named wrongly is so in all of them
+    return drained(export_steps(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
+
+
+def export_steps(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    folder: Path,
+    reference: Picture | Sequence[PictureSetup] | None,
+    fit: dict[str, Any],
+    reference_view: str,
+    upright: bool,
+    tell: Callable[[float], None] = lambda _share: None,
+    targets: Sequence[FittedSlot] = (),
+) -> Steps[ExportReport]:
+    """`export_job` in steps, which need the same context each: it pauses while a second Blender works.
+
+    Of one picture the scene has been read when a pause does not hold it. Closing the steps ends the second Blender and
+    leaves `folder` as it was.
+    """
+    if isinstance(reference, Sequence):
+        return (yield from _several(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
+    with new_job_folder(Path(folder)) as partial:
+        part = yield from partial_export(
+            context, obj, partial, reference, fit, reference_view, upright, tell, targets=targets
+        )
+        part.write_request(partial)
+    return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
+
+
+def _several(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    folder: Path,
+    pictures: Sequence[PictureSetup],
+    fit: dict[str, Any],
+    reference_view: str,
+    upright: bool,
+    tell: Callable[[float], None],
+    targets: Sequence[FittedSlot],
+) -> Steps[ExportReport]:
+    """One picture after the other; while it pauses the file shows what it did before."""
+    check_setups(pictures)
+    count = len(pictures)
+    if count > 1:  # what is named wrongly is so in all of them
         check_slots(targets)
         _check_names(obj, fit, targets)
     first: PartialExport | None = None
     notes: list[str] = []
     unseen = set(range(len(targets)))
-    leaves = leaves_by_pictures(context, obj, reference, fit, targets) if len(reference) > 1 and targets else None
+    leaves: Sequence[str | None] | None = None
+    if count > 1 and targets:
+        leaves = yield from leaves_by_pictures(context, obj, pictures, fit, targets)
     with new_job_folder(Path(folder)) as partial:
-        paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in reference[1:])]
-        for done, (setup, path) in enumerate(zip(reference, paths, strict=True)):
+        paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in pictures[1:])]
+        for done, (setup, path) in enumerate(zip(pictures, paths, strict=True)):
             here = partial / path
             here.mkdir(parents=True, exist_ok=True)
-            with (
-                named(setup, len(reference)),
-                shown(context, setup, obj, own_size=len(reference) > 1) as there,
-            ):
-                steps = partial_export(
-                    there,
-                    obj,
-                    here,
-                    setup.reference,
-                    fit,
-                    reference_view,
-                    upright,
-                    several=len(reference) > 1,
-                    is_first=first is None,
-                    leaves=leaves,
-                    targets=targets,
-                )
-                part = drained(steps)
-                part.request["picture"] = setup.request(there)
+            steps = _one_of_several(
+                context,
+                obj,
+                here,
+                setup,
+                fit,
+                reference_view,
+                upright,
+                several=count > 1,
+                is_first=first is None,
+                leaves=leaves,
+                targets=targets,
+            )
+            show = functools.partial(shown, context, setup, obj, own_size=count > 1)
+            with named(setup, count):
+                part = yield from held(steps, show, READING.format(done + 1, count), done / count)
             leaves, unseen = part.leaves, unseen & part.unseen
             if first is None:
                 first, notes = part, list(part.findings.notes)
@@ -110,7 +150,7 @@ def export_job(
                     part.request["notes"].append(MOVING_VALUES.format(label=setup.label))
                 part.write_request(here)
                 share_files(partial, here)
-            tell((done + 1) / len(reference))
+            tell((done + 1) / count)
         for number in sorted(unseen):
             each = targets[number]
             assert each.material is not None  # it was read
@@ -118,6 +158,22 @@ def export_job(
         assert first is not None
         first.write_request(partial)
     return ExportReport(Path(folder), first.request, tuple(notes))
+
+
+def _one_of_several(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    folder: Path,
+    setup: PictureSetup,
+    fit: dict[str, Any],
+    reference_view: str,
+    upright: bool,
+    **how: Any,
+) -> Steps[PartialExport]:
+    """What the picture needs, with what its request says of it, as the context shows it."""
+    part = yield from partial_export(context, obj, folder, setup.reference, fit, reference_view, upright, **how)
+    part.request["picture"] = setup.request(context)
+    return part
 
 
 def _check_names(obj: bpy.types.Object, fit: dict[str, Any], targets: Sequence[FittedSlot]) -> None:
@@ -130,39 +186,6 @@ def _check_names(obj: bpy.types.Object, fit: dict[str, Any], targets: Sequence[F
 def _moves(first: Mapping[Any, Any], other: Mapping[Any, Any]) -> bool:
     """Whether a value that two pictures have is not the same in both."""
     return any(first[name] != other[name] for name in first.keys() & other.keys())
-
-
-def export_steps(
-    context: bpy.types.Context,
-    obj: bpy.types.Object,
-    folder: Path,
-    reference: Picture | None,
-    fit: dict[str, Any],
-    reference_view: str,
-    upright: bool,
-    tell: Callable[[float], None] = lambda _share: None,
-    targets: Sequence[FittedSlot] = (),
-) -> Steps[ExportReport]:
-    """`export_job` of one picture in steps: it yields while a second Blender works, and needs the same context then.
-
-    The scene has been read when it yields first. Closing it ends the second Blender and leaves `folder` as it was.
-    """
-    with new_job_folder(Path(folder)) as partial:
-        part = yield from partial_export(
-            context, obj, partial, reference, fit, reference_view, upright, tell, targets=targets
-        )
-        part.write_request(partial)
-    return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
-
-
-def drained(steps: Steps[Found]) -> Found:
-    """What steps return in the end, waited for."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
-        time.sleep(_LOOK_SECONDS)
 
 
 def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[list[str], list[str]]:

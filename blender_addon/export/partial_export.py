@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any
 
 import bpy
 
@@ -35,11 +35,9 @@ from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import SceneData, target_bsdf
 from .scene.scene_file import scene_files
+from .steps import Pause, Steps
 
 MITSUBA = "mitsuba_principled"
-
-Found = TypeVar("Found")
-Steps: TypeAlias = Generator[None, None, Found]  # yields while it would have to wait
 
 
 @dataclass(frozen=True)
@@ -107,10 +105,11 @@ def partial_export(
         # names that the user chose are those of the leaf that the panel shows
         by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
         if leaves is None:
-            leaves = [
-                largest_leaf(probe, context, f, region=region) if probe is not None and by_share else f.leaf
-                for f in fitted
-            ]
+            found: list[str | None] = []
+            for each in fitted:
+                asks = probe is not None and by_share
+                found.append((yield from largest_leaf(probe, context, each, region=region)) if asks else each.leaf)
+            leaves = found
         for number, leaf in enumerate(leaves):
             if leaf is not None:  # whose numbers and values are others
                 wanted[number] = wanted_values(fitted[number], asked[number], Findings(), leaf)
@@ -138,10 +137,10 @@ def partial_export(
             with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:
                 write_copy(folder)  # as it was read
-            while not bakes.is_ready():
-                yield
+            yield Pause(bakes.is_ready)
             finish_scene(data, findings, bakes)
         findings.raise_first()
+        yield Pause()
         graphs: list[NodeGraph | None] = [None for _ in fitted]
         unseen = set(data.unseen)
         for number, each in enumerate(fitted):
@@ -155,6 +154,7 @@ def partial_export(
             if number not in unseen:
                 name_shares(described, findings)
         files = scene_files(data, findings)
+        yield Pause()
         tell(0.5)
         paths = [f"{TARGETS}/{number}" for number in range(1, len(fitted) + 1)] if targets else [""]
         whole = WholeRequest(context.scene, data, files, picture, findings)
@@ -164,6 +164,7 @@ def partial_export(
         else:
             requests[""] |= candidates(context.scene, data)
         files.write(folder)
+        yield Pause()
         tell(0.9)
         if picture is not None and reference is not None:
             reference_entry = picture.write(folder)

@@ -10,7 +10,7 @@ from bpy.props import IntProperty, StringProperty
 from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
 from ..export.fitted_slot import FittedSlot
-from ..export.job import drained
+from ..export.steps import drained
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..result import shown_result

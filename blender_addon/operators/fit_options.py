@@ -14,13 +14,14 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.preferences import chosen_python, new_job_folder
 from ..export.fitted_slot import FittedSlot
-from ..export.job import ExportError, Steps, drained, export_job, export_steps
+from ..export.job import ExportError, export_steps
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.counted_part import CountedPart
 from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference import Picture
 from ..export.reference.reference_view import REFERENCE_VIEWS
+from ..export.steps import Steps, drained
 from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
 from ..properties import chosen_of, crossed_limits, node_value_key
@@ -81,7 +82,7 @@ class FitOptions:
     def steps(
         self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str, targets: Sequence[FittedSlot] = ()
     ) -> Steps[PreparedFit]:
-        """`prepare` in steps, which yields while a second Blender works; the operator is not needed any more then.
+        """`prepare` in steps, which pause while a second Blender works; the operator is not needed any more then.
 
         With `targets` the materials of those slots are fitted together instead of the object's active one.
         """
@@ -108,14 +109,9 @@ class FitOptions:
         if targets and settings.queue:
             chosen["queue"] = True
         try:
-            if isinstance(reference, Sequence):  # each picture changes the scene's frame while it is exported
-                report = export_job(
-                    context, obj, folder, reference=reference, fit=chosen, reference_view=made, targets=targets
-                )
-            else:
-                report = yield from export_steps(
-                    context, obj, folder, reference, chosen, made, upright=False, targets=targets
-                )
+            report = yield from export_steps(
+                context, obj, folder, reference, chosen, made, upright=False, targets=targets
+            )
         except ExportError as error:
             raise FitError(str(error)) from error
         return PreparedFit(python, folder, name, uids, report.notes, is_new)

@@ -85,10 +85,11 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What is waited for, how long already, and the way out."""
-    seconds = running_export.seconds()
-    share = seconds / (seconds + _USUAL_SECONDS)  # how long it takes is not known
-    text = word("Cycles prepares the scene")
-    _draw_bar(layout, context, share, f"{text} · {seconds:.0f} s")
+    seconds, (share, text) = running_export.seconds(), running_export.progress()
+    if share is None:
+        share = seconds / (seconds + _USUAL_SECONDS)  # how long it takes is not known
+    said = translated(text) if text else word("Cycles prepares the scene")
+    _draw_bar(layout, context, share, f"{said} · {seconds:.0f} s")
 
 
 def _draw_bar(layout: bpy.types.UILayout, context: bpy.types.Context, share: float, text: str) -> None:

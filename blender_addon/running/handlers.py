@@ -52,11 +52,17 @@ def _after_change(*_args: object) -> None:
     preflight.request()
 
 
+@persistent
+def _after_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    running_export.changed(depsgraph)
+    preflight.request()
+
+
 _HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
     "save_post": _after_save,
-    "depsgraph_update_post": _after_change,
+    "depsgraph_update_post": _after_update,
     "undo_pre": _before_undo,
     "redo_pre": _before_undo,
     "undo_post": _after_change,

@@ -1,59 +1,71 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An export that waits for a second Blender while this one stays usable: a timer takes its steps.
+"""An export that gives the windows back between its steps, which a timer takes.
 
-The scene is read in the first step, at once. What the steps hold of Blender's data does not outlive an undo or another
-file, so both end it.
+What the steps hold of Blender's data does not outlive an undo or another file, so both end it. What is still to be read
+must be as it was when the user pressed, so a change ends it then.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 
-from ..check.preflight import redraw
+from ..check.preflight import look, redraw
+from ..export.steps import Pause, Steps, advance
 from . import running_job
 from .fit_queue import PreparedFit
 
-TICK = 0.1  # seconds between two steps
+TICK = 0.1  # seconds between two looks at what is waited for
+DRAWN = 0.01  # seconds that Blender has to draw where nothing is waited for
 _UNDONE = "The export was ended by an undo or another file: press Fit again."
 _GONE = "Something that was being exported is not in the file any more: press Fit again."
+_CHANGED = "The scene was changed while it was read for the fit: press Fit again, and leave it as it is meanwhile."
 
 
 @dataclass
 class RunningExport:
     """The steps, the scene and view layer they need as context, and who gets what they return."""
 
-    steps: Generator[None, None, PreparedFit]
+    steps: Steps[PreparedFit]
     scene: str
     view_layer: str
     then: Callable[[PreparedFit], None]
     began: float
+    pause: Pause
+    seen: object  # settings that no update of the depsgraph tells of
+    is_changed: bool = False
 
 
 current: RunningExport | None = None
+_is_stepping = False  # what changes then is the export's own doing
 
 
-def start(
-    context: bpy.types.Context, steps: Generator[None, None, PreparedFit], then: Callable[[PreparedFit], None]
-) -> None:
-    """Take the first step; where it does not end there, a timer takes the others. Errors of the first are raised."""
+def start(context: bpy.types.Context, steps: Steps[PreparedFit], then: Callable[[PreparedFit], None]) -> None:
+    """Take the first steps; where they do not end there, a timer takes the others. Errors of the first are raised."""
     global current
+    seen = look(context.scene, context.view_layer)
     try:
-        next(steps)
+        pause = advance(steps)
     except StopIteration as end:
         then(end.value)
         return
-    current = RunningExport(steps, context.scene.name, context.view_layer.name, then, time.monotonic())
-    bpy.app.timers.register(_tick, first_interval=TICK)
+    current = RunningExport(steps, context.scene.name, context.view_layer.name, then, time.monotonic(), pause, seen)
+    bpy.app.timers.register(_tick, first_interval=_interval(pause))
+    running_job.forget_refusal()
     redraw()
 
 
 def seconds() -> float:
     """How long it has taken so far."""
     return time.monotonic() - current.began if current is not None else 0.0
+
+
+def progress() -> tuple[float | None, str]:
+    """How much of it is done and what is being done; None and empty where that is not known."""
+    return (current.pause.share, current.pause.text) if current is not None else (None, "")
 
 
 def close(sentence: str = "") -> None:
@@ -73,16 +85,40 @@ def undone() -> None:
     close(_UNDONE)
 
 
+def changed(depsgraph: bpy.types.Depsgraph) -> None:
+    """To be called after an update of the depsgraph: the next step ends an export that has not read everything."""
+    if current is None or _is_stepping or not current.pause.holds_scene:
+        return
+    current.is_changed |= any(map(_tells_of_a_change, depsgraph.updates))
+
+
+def _tells_of_a_change(update: bpy.types.DepsgraphUpdate) -> bool:
+    """Not of what is selected, nor of a frame or camera that was put back: these are of scene and objects, as shading.
+
+    Settings of the scene are compared.
+    """
+    if isinstance(update.id, bpy.types.Scene):
+        return False
+    is_shaded = update.is_updated_shading and not isinstance(update.id, bpy.types.Object)
+    return update.is_updated_geometry or update.is_updated_transform or is_shaded
+
+
 def _tick() -> float | None:
-    global current
+    global current, _is_stepping
     job = current
     if job is None:
         return None
     try:
-        window = bpy.context.window_manager.windows[0]
         scene = bpy.data.scenes[job.scene]
-        with bpy.context.temp_override(window=window, scene=scene, view_layer=scene.view_layers[job.view_layer]):
-            next(job.steps)
+        view_layer = scene.view_layers[job.view_layer]
+        if job.pause.holds_scene and (job.is_changed or look(scene, view_layer) != job.seen):
+            close(_CHANGED)
+            return None
+        if job.pause.is_over():
+            window = bpy.context.window_manager.windows[0]
+            _is_stepping = True
+            with bpy.context.temp_override(window=window, scene=scene, view_layer=view_layer):
+                job.pause = advance(job.steps)
     except StopIteration as end:
         current = None
         _hand_over(job, end.value)
@@ -94,8 +130,14 @@ def _tick() -> float | None:
         current = None
         running_job.fail([str(error)])
         return None
+    finally:
+        _is_stepping = False
     redraw()  # the seconds go on
-    return TICK
+    return _interval(job.pause)
+
+
+def _interval(pause: Pause) -> float:
+    return DRAWN if pause.is_over() else TICK
 
 
 def _hand_over(job: RunningExport, fit: PreparedFit) -> None:

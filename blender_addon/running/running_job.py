@@ -180,6 +180,13 @@ def fail(sentences: Sequence[str]) -> None:
     redraw()
 
 
+def forget_refusal() -> None:
+    """Say nothing any more of what kept an earlier fit from starting, or of a file that was left."""
+    runtime = _runtime()
+    if not runtime.has_result and current is None:
+        shown_result.clear(runtime)
+
+
 def is_answered(context: bpy.types.Context) -> bool:
     """Whether the last fit was refused for what has been changed since, so that nothing of it need be said any more."""
     runtime = _runtime()

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Iterator
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,12 +24,18 @@ def taken(scene: SimpleNamespace) -> Iterator[list[object]]:
     running_export.close()
 
 
-def steps(log: list[str], *, fails: bool = False) -> Generator[None, None, str]:
+def steps(log: list[str], *, fails: bool = False, holds_scene: bool = False):
+    """Steps that wait after each until the log says `go`."""
+    from blender_addon.export.steps import Pause
+
+    def is_over() -> bool:
+        return log[-1:] == ["go"]
+
     try:
         log.append("first")
-        yield
+        yield Pause(is_over, holds_scene)
         log.append("second")
-        yield
+        yield Pause(is_over, holds_scene)
         if fails:
             raise ValueError("A node is of no use.")
     finally:
@@ -44,8 +51,12 @@ def test_a_timer_takes_the_steps(scene: SimpleNamespace, taken: list[object]) ->
     assert log == ["first"]
     assert not scene.bpy.ops.mfo.fit.poll()
     assert scene.bpy.ops.mfo.cancel.poll()
+    assert running_export._tick() == running_export.TICK
+    assert log == ["first"]  # which it waits for
+    log.append("go")
     assert running_export._tick() is not None
-    assert (log, taken) == (["first", "second"], [])
+    assert (log, taken) == (["first", "go", "second"], [])
+    log.append("go")
     assert running_export._tick() is None
     assert taken == ["fit"]
     assert running_export.current is None
@@ -68,10 +79,68 @@ def test_cancel_ends_it_silently_and_an_undo_with_a_word(scene: SimpleNamespace,
 def test_an_error_of_a_later_step_is_told(scene: SimpleNamespace, taken: list[object]) -> None:
     from blender_addon.running import running_export
 
-    running_export.start(scene.bpy.context, steps([], fails=True), taken.append)
+    log: list[str] = []
+    running_export.start(scene.bpy.context, steps(log, fails=True), taken.append)
+    log.append("go")
     running_export._tick()
+    log.append("go")
     assert running_export._tick() is None
     assert (runtime(scene).state, runtime(scene).sentence) == ("FAILED", "A node is of no use.")
+
+
+def test_steps_that_need_not_wait_are_taken_at_once(scene: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.export.steps import Pause
+    from blender_addon.running import running_export
+
+    def plain():
+        yield Pause()
+        yield Pause()
+        return "fit"
+
+    running_export.start(scene.bpy.context, plain(), taken.append)
+    assert (taken, running_export.current) == (["fit"], None)
+
+
+def test_long_steps_give_the_windows_back(scene: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.export.steps import STEP_SECONDS, Pause
+    from blender_addon.running import running_export
+
+    def long():
+        for _ in range(3):
+            time.sleep(1.2 * STEP_SECONDS)
+            yield Pause(share=0.5, text="Picture 2 of 4")
+        return "fit"
+
+    running_export.start(scene.bpy.context, long(), taken.append)
+    assert running_export.progress() == (0.5, "Picture 2 of 4")
+    assert [running_export._tick() for _ in range(3)] == [running_export.DRAWN, running_export.DRAWN, None]
+    assert taken == ["fit"]
+
+
+@pytest.mark.parametrize("holds_scene", [True, False])
+@pytest.mark.parametrize("change", ["move", "resolution", "select"])
+def test_a_change_ends_what_is_still_to_be_read(
+    scene: SimpleNamespace, taken: list[object], holds_scene: bool, change: str
+) -> None:
+    from blender_addon.running import handlers, running_export
+
+    bpy, log = scene.bpy, []
+    bpy.context.view_layer.update()
+    running_export.start(bpy.context, steps(log, holds_scene=holds_scene), taken.append)
+    target = bpy.data.objects["Väse"]
+    if change == "move":
+        target.location.x += 1.0
+    elif change == "resolution":
+        bpy.context.scene.render.resolution_x = 50
+    else:
+        bpy.data.objects["Light"].select_set(True)
+    assert handlers._after_update in bpy.app.handlers.depsgraph_update_post
+    bpy.context.view_layer.update()
+    log.append("go")
+    running_export._tick()
+    ends = holds_scene and change != "select"
+    assert ("second" in log, "closed" in log) == (not ends, ends)
+    assert (runtime(scene).sentence[:21] == "The scene was changed") == ends
 
 
 def test_an_export_that_is_ended_leaves_nothing(scene: SimpleNamespace, tmp_path: Path) -> None:

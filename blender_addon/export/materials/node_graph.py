@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material, Socket
 from ..nodes.target_shader import chosen_leaf, fitted_leaves, leaf_name, target_shader
+from ..steps import Pause, Steps
 from .read_material import read_target
 
 FOLDER = "graph"
@@ -99,10 +100,11 @@ def largest_leaf(
     *,
     may_miss: bool = False,
     region: Region | None = None,
-) -> str | None:
+) -> Steps[str | None]:
     """The name of the leaf that covers most of the target in the picture, which may show a `region` of the frame.
 
-    None where there is nothing to choose, or the camera does not see a target that it `may_miss`.
+    None where there is nothing to choose, or the camera does not see a target that it `may_miss`. The scene is read by
+    it, and must be as in the copy that was asked.
 
     Raises
     ------
@@ -114,7 +116,8 @@ def largest_leaf(
     leaves = fitted_leaves(fitted.material)
     asked = [{"node": leaf.path, "sockets": [], "weight": leaf.is_linked} for leaf in leaves]
     _send(probe, context, fitted, asked, 1, probe.folder, elsewhere=False, may_miss=may_miss, region=region)
-    answer = probe.receive()  # waited for: the scene is read by it, and must be as in the copy that was asked
+    yield Pause(probe.is_answered, holds_scene=True)
+    answer = probe.receive()
     if not answer.get("seen", True):
         return None
     shares = [
@@ -161,8 +164,8 @@ def evaluate_graph(
     may_miss: bool = False,
     region: Region | None = None,
     origin: NDArray[np.float64] | None = None,
-) -> Generator[None, None, tuple[Material, NodeGraph | None]]:
-    """The material with the mean of each socket of its graph, and the pictures of them; yields while Cycles works.
+) -> Steps[tuple[Material, NodeGraph | None]]:
+    """The material with the mean of each socket of its graph, and the pictures of them; pauses while Cycles works.
 
     Several fitted materials have different numbers, so that their files do not meet. One that the camera does not see
     and `may_miss` stays as it is, without pictures.
@@ -185,8 +188,7 @@ def evaluate_graph(
     folder.mkdir(exist_ok=True)
     depths = DEPTHS if material.passes_light else 1
     _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss, region=region, origin=origin)
-    while not probe.is_answered():
-        yield
+    yield Pause(probe.is_answered)
     answer = probe.receive()
     if not answer.get("seen", True):
         return _perhaps_glowing(material), None

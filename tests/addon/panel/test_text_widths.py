@@ -100,6 +100,11 @@ def while_it_exports(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Itera
 
     patch.setattr(running_export, "current", object())
     patch.setattr(running_export, "seconds", lambda: 188.0)
+    patch.setattr(running_export, "progress", lambda: (0.4, "Picture 12 of 32"))
+    yield
+    patch.setattr(running_export, "progress", lambda: (0.0, "Cycles looks at picture 12"))
+    yield
+    patch.setattr(running_export, "progress", lambda: (None, ""))
     yield
 
 

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work in steps, between which Blender draws its windows: what they wait for, and how they are taken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from typing import TypeAlias, TypeVar
+
+# Steps that need not wait are taken together for so long: a window that is drawn 20 times a second does not stutter
+STEP_SECONDS = 0.05
+_LOOK_SECONDS = 0.01  # between two looks at what is waited for
+
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Where steps can be left: they go on when `is_over` says so.
+
+    Attributes
+    ----------
+    holds_scene
+        What is read next must be as it was until then.
+    text, share
+        What is being done, and how much of all of it has been; empty and None where that is not known.
+    """
+
+    is_over: Callable[[], bool] = lambda: True
+    holds_scene: bool = False
+    text: str = ""
+    share: float | None = None
+
+
+Steps: TypeAlias = Generator[Pause, None, Found]
+
+
+def advance(steps: Steps[object]) -> Pause:
+    """Take steps until one has to wait or a moment has passed; the end of the steps is their `StopIteration`."""
+    end = time.monotonic() + STEP_SECONDS
+    pause = next(steps)
+    while time.monotonic() < end and pause.is_over():
+        pause = next(steps)
+    return pause
+
+
+def drained(steps: Steps[Found]) -> Found:
+    """What steps return in the end, waited for."""
+    while True:
+        try:
+            pause = next(steps)
+        except StopIteration as end:
+            return end.value
+        while not pause.is_over():
+            time.sleep(_LOOK_SECONDS)
+
+
+def held(
+    steps: Steps[Found], show: Callable[[], AbstractContextManager[object]], text: str, share: float
+) -> Steps[Found]:
+    """Steps that each need what `show` shows; it is put back while they pause, and the scene must stay as it is."""
+    try:
+        while True:
+            with show():
+                try:
+                    pause = advance(steps)
+                except StopIteration as end:
+                    return end.value
+            yield replace(pause, holds_scene=True, text=text, share=share)
+    finally:
+        steps.close()
