@@ -17,19 +17,16 @@ from ..export.camera.read_camera import has_camera, note_picture_settings
 from ..export.camera.render_region import Size, pictured_region, pictured_size, render_region
 from ..export.findings import ExportError, Findings, Fix
 from ..export.images.image_pixels import UnreadableImageError, is_data, read_pixels, without_pixels
-from ..export.images.picture_header import read_header
+from ..export.images.picture_header import PictureHeader
 from ..export.materials.read_material import read_target
 from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import TargetShader, fits_all_leaves, target_shader
+from ..export.reference.chosen_file import DISPLAY_SUFFIXES, LINEAR_SUFFIXES, chosen_file
 from ..export.reference.counted_part import CountedPart
 from ..export.reference.picture_setup import size_of
 from ..export.reference.reference import (
-    DISPLAY_SUFFIXES,
-    LINEAR_SUFFIXES,
     holds_display_colours,
-    refuse_kind,
     refuse_size,
-    refuse_suffix,
 )
 from ..export.reference.reference_colour import other_space
 from ..export.reference.reference_view import SCENE, mixed_by, needs_table, output_view
@@ -213,8 +210,8 @@ def _more_pictures(scene: bpy.types.Scene) -> list[Finding]:
         path, shows = Path(bpy.path.abspath(entry.path)), entry.scene or scene
         if not entry.path:
             found.append(Finding(TO_CHOOSE, f"Choose the file of picture {number}, or do not use it."))
-        elif not path.is_file():
-            found.append(Finding(STOPS, f"Picture {number} ({path}) does not exist: choose another file."))
+        elif problem := _file_problem(entry.path):
+            found.append(Finding(STOPS, f"Picture {number}: {problem}"))
         elif not shows.frame_start <= entry.frame <= shows.frame_end:
             frames = f"{shows.frame_start} to {shows.frame_end}"
             found.append(Finding(STOPS, f"Picture {number}: frame {entry.frame} is outside of the frames {frames}."))
@@ -238,8 +235,6 @@ def _reference(scene: bpy.types.Scene) -> list[Finding]:
         found = _image_reference(settings.reference_image) if is_image else _file_reference(scene)
     except ExportError as problem:
         return [Finding(STOPS, str(problem), problem.fixes)]
-    except OSError as problem:
-        return [Finding(STOPS, f"The reference cannot be read ({problem.strerror or problem}): choose another file.")]
     problems = []
     if all(found.size):
         wanted = pictured_size(scene.render, found.size)
@@ -297,16 +292,24 @@ class _Picture:
     turned: tuple[str, ...] = ()  # what is to be said of a turn by EXIF data
 
 
-def _file_reference(scene: bpy.types.Scene) -> _Picture:
-    settings = scene.mfo
-    path = Path(bpy.path.abspath(settings.reference_path))
-    if not path.is_file():
-        raise ExportError(f"The reference {path} does not exist: choose another file.")
-    refuse_suffix(path)
-    header = read_header(path)
-    refuse_kind(path, header)
+def _file_problem(given: str) -> str:
+    """Why there is no picture at a path."""
+    try:
+        _promised_file(given)
+    except ExportError as problem:
+        return str(problem)
+    return ""
+
+
+def _promised_file(given: str) -> tuple[Path, PictureHeader]:
+    path, header = chosen_file(given)
     if header is None:
         raise ExportError(f"The reference {path.name} holds no picture its name promises: choose another file.")
+    return path, header
+
+
+def _file_reference(scene: bpy.types.Scene) -> _Picture:
+    path, header = _promised_file(scene.mfo.reference_path)
     kind = f"{header.depth} {header.kind}".strip()
     words = f"{header.width} x {header.height}, {kind}" if header.width else header.kind
     is_linear = path.suffix.lower() in LINEAR_SUFFIXES

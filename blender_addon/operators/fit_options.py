@@ -17,6 +17,7 @@ from ..export.fitted_slot import FittedSlot
 from ..export.job import ExportError, export_steps
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
+from ..export.reference.chosen_file import absolute
 from ..export.reference.counted_part import CountedPart
 from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference import Picture
@@ -233,8 +234,15 @@ def _reference(settings: bpy.types.PropertyGroup, given: str) -> Picture:
     path = given or settings.reference_path
     if not path:
         raise FitError("No reference is chosen: give the picture whose material is to be recovered.")
-    picture = Path(bpy.path.abspath(path))
+    picture = _absolute(path)
     return picture if given else counted_part(picture, settings.first_picture.part)
+
+
+def _absolute(given: str, of: str = "") -> Path:
+    try:
+        return absolute(given)
+    except ExportError as error:
+        raise FitError(f"{of}{error}") from error
 
 
 def counted_part(picture: Path | bpy.types.Image, part: bpy.types.PropertyGroup) -> Picture:
@@ -263,7 +271,7 @@ def _pictures(settings: bpy.types.PropertyGroup, first: Picture) -> list[Picture
             continue
         if number > 1 and not entry.path:
             raise FitError(f"Picture {number} has no file: choose it, or do not use this picture.")
-        reference = first if number == 1 else counted_part(Path(bpy.path.abspath(entry.path)), entry.part)
+        reference = first if number == 1 else counted_part(_absolute(entry.path, f"Picture {number}: "), entry.part)
         camera = entry.camera.name if entry.camera is not None else ""
         scene = entry.scene.name if entry.scene is not None else ""
         found.append(PictureSetup(reference, number, entry.frame, camera, scene, exposure=entry.exposure))

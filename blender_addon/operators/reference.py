@@ -8,7 +8,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..check import preflight
-from ..export.reference.reference import DISPLAY_SUFFIXES, LINEAR_SUFFIXES
+from ..export.reference.chosen_file import DISPLAY_SUFFIXES, LINEAR_SUFFIXES
 from ..pictures import overlay
 from ..sentences.translated import translated
 

@@ -19,7 +19,7 @@ from .hdr_file import read_hdr
 from .picture_kind import SHOWN, refuse_another_kind
 from .picture_size import Size, check_declared_size
 from .png_file import deep_colour
-from .scene_xml import is_file
+from .scene_xml import is_file, is_folder
 
 if TYPE_CHECKING:
     from PIL import Image as PillowImage
@@ -55,10 +55,12 @@ def read_image(path: Path | str, size: Size | None = None) -> Image:
     Raises
     ------
     BadInputError
-        If the file is missing, of another kind, damaged, too large or without colour channels.
+        If it is missing, a folder, of another kind, damaged, too large or without colour channels.
     """
     path = Path(path)
     suffix = path.suffix.lower()
+    if is_folder(path):
+        raise BadInputError(f"Image {str(path)!r} is a folder: give one picture in it.")
     if suffix not in _SUFFIXES:
         raise BadInputError(f"Image {path.name!r} is of an unknown kind: use {', '.join(s[1:] for s in _SUFFIXES)}.")
     if not is_file(path):

@@ -60,6 +60,14 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def is_folder(path: Path) -> bool:
+    """Whether a folder is there; False also for a name that the system cannot even look up."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def find_target(scene: Element, shape_id: str) -> Target:
     """The material of shape `shape_id`; an inline one is moved to the top of the scene and referred to.
 

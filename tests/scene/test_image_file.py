@@ -398,3 +398,10 @@ def test_negative_reference_pixels_are_clipped_with_a_note():
     assert check_reference(good, 7, 9) == (good, ())
     dark = with_pixel(0.0)
     assert check_reference(dark, 7, 9) == (dark, ())  # 0 is black, not negative
+
+
+def test_a_folder_is_called_one(tmp_path):
+    for name in ("pictures", "pictures.exr"):
+        (tmp_path / name).mkdir()
+        with pytest.raises(BadInputError, match=rf"{name}' is a folder: give one picture in it"):
+            read_image(tmp_path / name)

@@ -17,16 +17,14 @@ from ..files.exr_file import REC709, write_exr
 from ..files.png_file import write_png
 from ..findings import ExportError, Fix
 from ..images.image_pixels import SRGB_NAMES, UnreadableImageError, read_pixels
-from ..images.picture_header import PictureHeader, read_header
+from .chosen_file import LINEAR_SUFFIXES, chosen_file
 from .counted_part import WHOLE, CountedPart
 from .reference_colour import file_notes, image_notes
 from .reference_view import SCENE, needs_table, view_note
 from .turned_picture import turn_notes, turned
 from .view_lut import ViewLut, bake_view_lut
 
-LINEAR_SUFFIXES = (".exr", ".hdr")
 LINEAR_FORMATS = ("OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR")  # other float images are 16-bit display pictures
-DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 
 Picture: TypeAlias = Path | bpy.types.Image | CountedPart  # what may be given as a reference
 
@@ -105,13 +103,8 @@ def read_reference(
     if isinstance(reference, bpy.types.Image):
         found = _from_image(reference, scene, size, rendered, made, alpha=alpha)
         return replace(found, notes=(*found.notes, *image_notes(reference)))
-    path = Path(bpy.path.abspath(str(reference)))
-    if not path.is_file():
-        raise ExportError(f"The reference {path} does not exist: choose another file.")
+    path, header = chosen_file(reference)
     suffix = path.suffix.lower()
-    refuse_suffix(path)
-    header = read_header(path)
-    refuse_kind(path, header)
     turn = header.orientation if header is not None and upright else 1
     said = () if header is None or upright else turn_notes(path.name, header, rendered, f"reference{suffix}")
     is_linear = suffix in LINEAR_SUFFIXES
@@ -131,21 +124,6 @@ def read_reference(
         found = Reference(f"reference{suffix}", "srgb", source=path, **_view(scene, path.name, made))
     colours = file_notes(path, found.name, header, scene) if is_linear else ()
     return replace(found, notes=(*found.notes, *said, *colours))
-
-
-def refuse_kind(path: Path, header: PictureHeader | None) -> None:
-    """Raise `ExportError` for a scene-linear file with the name of a display picture, or the other way round."""
-    if header is None:
-        return
-    is_linear = header.kind in ("OpenEXR", "Radiance HDR")
-    if is_linear != (path.suffix.lower() in LINEAR_SUFFIXES):
-        raise ExportError(f"The reference {path.name} is a {header.kind} file: give its name the ending of that kind.")
-
-
-def refuse_suffix(path: Path) -> None:
-    """Raise `ExportError` for the name of something that is no picture the backend reads."""
-    if path.suffix.lower() not in LINEAR_SUFFIXES + DISPLAY_SUFFIXES:
-        raise ExportError(f"The reference {path.name} is no picture we read: use EXR, HDR, PNG, JPEG or TIFF.")
 
 
 def holds_display_colours(image: bpy.types.Image) -> bool:

@@ -134,6 +134,7 @@ FIT = {
     "No light reaches the target: add a light or a world background.": "Aucune lumière n'atteint l'objet : ajouter une lumière ou un fond de monde.",
     "Reference has {} pixels with NaN and {} with infinite values: render or export it without them.": "La référence a {} pixels non valides (NaN) et {} infinis : la rendre ou l'exporter sans eux.",
     "Reference is all black: it must show the lit object, so check the lights and the file.": "La référence est toute noire : elle doit montrer l'objet éclairé, donc vérifier les lumières et le fichier.",
+    "Image {} is a folder: give one picture in it.": "L'image {} est un dossier : donner une image dedans.",
     "Image {} is of an unknown kind: use {}.": "L'image {} est d'une sorte inconnue : utiliser {}.",
     "Image {} does not exist: check the path.": "L'image {} n'existe pas : vérifier le chemin.",
     "Image {} cannot be written: {}.": "L'image {} ne peut pas être écrite : {}.",

@@ -134,6 +134,7 @@ FIT = {
     "No light reaches the target: add a light or a world background.": "Kein Licht erreicht das Objekt: ein Licht oder einen Welthintergrund hinzufügen.",
     "Reference has {} pixels with NaN and {} with infinite values: render or export it without them.": "Die Referenz hat {} Pixel mit ungültigen (NaN) und {} mit unendlichen Werten: sie ohne diese rendern oder exportieren.",
     "Reference is all black: it must show the lit object, so check the lights and the file.": "Die Referenz ist ganz schwarz: sie muss das beleuchtete Objekt zeigen, also Lichter und Datei prüfen.",
+    "Image {} is a folder: give one picture in it.": "Bild {} ist ein Ordner: ein Bild darin angeben.",
     "Image {} is of an unknown kind: use {}.": "Bild {} ist von unbekannter Art: {} verwenden.",
     "Image {} does not exist: check the path.": "Bild {} gibt es nicht: den Pfad prüfen.",
     "Image {} cannot be written: {}.": "Bild {} kann nicht geschrieben werden: {}.",

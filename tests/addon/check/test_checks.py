@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -144,19 +145,40 @@ def test_a_mended_shader_keeps_its_colour_and_the_old_node(scene: SimpleNamespac
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("/nowhere/a.exr", "does not exist"), ("text.txt", "no picture we read"),
-     ("text.png", "no picture its name promises")],
+    [("/nowhere/a.exr", "is in a folder that does not exist: connect its drive"),
+     ("a.exr", "a.exr does not exist: choose another file"), ("text.txt", "no picture we read"),
+     ("text.png", "no picture its name promises"), ("folder", "is a folder: choose one picture in it"),
+     ("folder.exr", "is a folder: choose one picture in it"), ("text.mp4", "is a movie: save one frame of it"),
+     ("text.blend", "is a Blender file: render a picture of it"), ("empty.png", "is empty: wait until it is written"),
+     ("//a.exr", "beside the .blend, which was never saved: save it")],
 )  # fmt: skip
-def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: str, words: str) -> None:
+@pytest.mark.parametrize("number", [1, 2])
+def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: str, words: str, number: int) -> None:
+    """In the panel's check and, by the same words, from the export."""
     path = tmp_path / name
     if name.startswith("text"):
         path.write_text("words")
+    elif name.startswith("folder"):
+        path.mkdir()
+    elif name.startswith("empty"):
+        path.touch()
     check(scene)
-    scene.bpy.context.scene.mfo.reference_path = str(path)
+    settings = scene.bpy.context.scene.mfo
+    settings.reference_path = scene.reference
+    if number == 2:
+        assert scene.bpy.ops.mfo.add_picture() == {"FINISHED"}
+    place, attribute = (settings, "reference_path") if number == 1 else (settings.pictures[0], "path")
+    setattr(place, attribute, name if name.startswith("//") else str(path))
     from blender_addon.check.checks import quick_check
 
     found = quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer)
-    assert any(f.level == "stops" and words in f.sentence for f in found), found
+    said = [f.sentence for f in found if f.level == "stops"]
+    assert len(said) == 1, said
+    assert words in said[0]
+    assert said[0].startswith("Picture 2: The reference" if number == 2 else "The reference")
+    if "promises" not in words:  # which the backend says
+        with pytest.raises(RuntimeError, match=re.escape(words)):
+            scene.bpy.ops.mfo.fit(object="Väse", job_folder=scene.job)
 
 
 def test_a_scene_without_a_reference_is_asked_for_one_and_accused_of_nothing(scene: SimpleNamespace) -> None:
