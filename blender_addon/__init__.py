@@ -12,7 +12,7 @@ from .backend import backend_state, preferences_page
 from .check import preflight
 from .operators import CLASSES as OPERATORS
 from .operators import part
-from .panel import menu
+from .panel import menu, thumbnails
 from .pictures import comparison, previews
 from .process import waiting_backend
 from .running import cycles_check, handlers, live, notice, running_export, running_job
@@ -49,6 +49,7 @@ def unregister() -> None:
     handlers.unregister()
     preflight.reset()
     comparison.forget()
+    thumbnails.close()
     menu.unregister()
     translations.unregister()
     previews.unregister()

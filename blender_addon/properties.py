@@ -282,6 +282,11 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
         update=_split_moved,
         options={"SKIP_SAVE"},
     )
+    shows_difference: BoolProperty(
+        name="Difference",
+        description="Show where the preliminary result differs, in the place of the reference",
+        options={"SKIP_SAVE"},
+    )
     cycles_text: StringProperty()  # how far the check in Cycles is, or what it found
     cycles_flip: FloatProperty(default=-1.0)
     messages: CollectionProperty(type=MFO_PG_message)

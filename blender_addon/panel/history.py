@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
+from ..result import history
 from ..result.shown_result import VERDICT_ICONS
 from ..sentences.translated import word
 from ..text_width import text_width
 from ..translations import CONTEXT
 from .layout import ICON, UNIT, buttons_side_by_side, fits, room
+from .thumbnails import thumbnail
 
 _AROUND = 26.0  # a list's margins and its bar, pixels at a scale of 1
 _GAP = 6.0  # after the date
+_ROWS = 4.0  # height of a picture, in rows of the interface
 
 
 class MFO_UL_history(bpy.types.UIList):
@@ -44,6 +49,18 @@ class MFO_UL_history(bpy.types.UIList):
         split.label(text=reached if has_number else "", icon=icon, translate=False)
 
 
+def _draw_pictures(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Reference and result of the marked one, as long as its job folder is there."""
+    marked = history.chosen(context.object.active_material)
+    folder = Path(marked.job_folder) / "pictures" / "thumbnails" if marked is not None else None
+    icons = [thumbnail(folder / f"{name}.ppm") for name in ("reference", "result")] if folder is not None else []
+    if not all(icons):
+        return
+    row = layout.row(align=True)
+    for icon in icons:
+        row.template_icon(icon_value=icon, scale=_ROWS)
+
+
 class History:
     """Go back to an earlier result."""
 
@@ -60,6 +77,7 @@ class History:
         """Draw the list and what can be done with the marked result."""
         layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
         layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
+        _draw_pictures(layout, context)
         row = layout.row(align=True)
         buttons = buttons_side_by_side(row, context, "Restore", "Show", taken=UNIT)
         buttons.operator("mfo.apply_past", text="Restore", icon="LOOP_BACK")

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from ..check import preflight
@@ -12,6 +14,9 @@ from ..running import running_job
 from ..sentences.translated import translated, word
 from .layout import BOX, BUTTON, NAMED_NUMBER, buttons_side_by_side, names_of, side_by_side
 from .part import draw_part
+from .thumbnails import thumbnail
+
+_ROWS = 4.0  # height of a picture of several, in rows of the interface
 
 
 class Reference:
@@ -54,13 +59,23 @@ def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, setti
     if pictures:
         box = column.box().column(align=True)
         _draw_what_it_shows(box, context, first, "1")
+        if settings.reference_source == "FILE":
+            _draw_thumbnail(box, settings.reference_path)
     draw_part(box, context, first.part)
     for index, picture in enumerate(pictures):
         box = column.box().column(align=True)
         _draw_what_it_shows(box, context, picture, str(index + 2), index)
         box.prop(picture, "path", text="")
+        _draw_thumbnail(box, picture.path)
         draw_part(box, context, picture.part, index + 2)
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
+
+
+def _draw_thumbnail(box: bpy.types.UILayout, path: str) -> None:
+    """The picture itself, by which one of several is told from the others."""
+    icon = thumbnail(Path(bpy.path.abspath(path))) if path else 0
+    if icon:
+        box.template_icon(icon_value=icon, scale=_ROWS)
 
 
 def _draw_what_it_shows(

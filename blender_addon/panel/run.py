@@ -113,8 +113,12 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     if is_one and (own is None or runtime.material != own.name):
         draw_sentence(column, context, f"Of material {runtime.material}", "MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
-    if "current" in shown:
-        draw_pictures(column, context, shown)
+    if "current" not in shown:
+        return
+    has_choice = "difference" in shown and previews.pair("reference", "current") is not None  # two share a square
+    draw_pictures(column, context, ("difference", "current") if has_choice and runtime.shows_difference else shown)
+    if has_choice:
+        column.prop(runtime, "shows_difference", toggle=True)
 
 
 def _draw_queue(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

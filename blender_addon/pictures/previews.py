@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from .thumbnail import Thumbnail, is_wide, opaque, paired, read_thumbnail
 
 # names of pictures that are compared with each other
-PAIRS = (("reference", "current"), ("reference", "result"), ("reference", "cycles"), ("cycles", "engine"))
+PAIRS = (
+    ("reference", "current"),
+    ("difference", "current"),
+    ("reference", "result"),
+    ("reference", "cycles"),
+    ("cycles", "engine"),
+)
 
 _collection: Any = None
 _shown: dict[str, str] = {}
@@ -53,9 +59,21 @@ def show(name: str, pictures: Path) -> None:
     path = pictures / f"{name}.png"
     if path.is_file():
         _thumbnails.pop(name, None)
-        key = _next_key(name)
-        _collection.load(key, str(path), "IMAGE")
-        _replace(name, key)
+        _load(name, path)
+
+
+def show_file(name: str, path: Path) -> None:
+    """Make a thumbnail, or any picture that Blender reads, the icon called `name`.
+
+    Raises
+    ------
+    OSError
+        If a thumbnail cannot be read.
+    """
+    if path.suffix == ".ppm":
+        _make(name, opaque(read_thumbnail(path)))
+    elif _collection is not None and not bpy.app.background:
+        _load(name, path)
 
 
 def show_thumbnail(name: str, path: Path) -> None:
@@ -121,6 +139,12 @@ def _make(name: str, pixels: NDArray[np.uint8]) -> None:
     made = _collection.new(key)
     made.image_size = pixels.shape[1::-1]
     made.image_pixels.foreach_set(np.ascontiguousarray(pixels[::-1]).view(np.int32).ravel())
+    _replace(name, key)
+
+
+def _load(name: str, path: Path) -> None:
+    key = _next_key(name)
+    _collection.load(key, str(path), "IMAGE")
     _replace(name, key)
 
 

@@ -14,7 +14,7 @@ CHECKED = ("cycles", "cycles_difference", "engine", "engine_difference")  # by t
 PICTURES = ("reference", "start", "result", "difference", "current", "curve", *CHECKED)
 _ERROR_LABELS = {"flip": "FLIP", "hdr_flip": "HDR-FLIP"}  # others are for the report
 VERDICT_ICONS = {"same": "CHECKMARK", "close": "QUESTION", "different": "ERROR"}  # others have no verdict
-_KEPT = ("split",)  # settings of the view, not of a fit
+_KEPT = ("split", "shows_difference")  # settings of the view, not of a fit
 
 result: JobResult | None = None
 material_uid = 0  # session_uid of its material, 0 when it came from another session

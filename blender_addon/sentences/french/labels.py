@@ -122,6 +122,8 @@ LABELS = {
     "Picture to match": "Image à reproduire",
     "Start": "Départ",
     "Copy the recovered values as text, one a line": "Copier les valeurs trouvées comme texte, une par ligne",
+    "Difference": "Différence",
+    "Show where the preliminary result differs, in the place of the reference": "Montrer où le résultat provisoire diffère, à la place de la référence",
     "How much of the picture in the Image Editor is the reference; the rest is the result": "Part de l'image de l'éditeur d'images qui est la référence ; le reste est le résultat",
     "How the reference was made, which a PNG or JPEG does not tell": "Comment la référence a été faite, ce qu'un PNG ou un JPEG ne dit pas",
     "How the values are searched": "Comment les valeurs sont cherchées",

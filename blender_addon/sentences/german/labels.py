@@ -122,6 +122,8 @@ LABELS = {
     "Picture to match": "Bild, das nachgebildet wird",
     "Start": "Anfang",
     "Copy the recovered values as text, one a line": "Die gefundenen Werte als Text kopieren, je Zeile einen",
+    "Difference": "Unterschied",
+    "Show where the preliminary result differs, in the place of the reference": "Zeigen, wo das vorläufige Ergebnis abweicht, anstelle der Referenz",
     "How much of the picture in the Image Editor is the reference; the rest is the result": "Wie viel vom Bild im Bildeditor die Referenz ist; der Rest ist das Ergebnis",
     "How the reference was made, which a PNG or JPEG does not tell": "Wie die Referenz entstanden ist, was ein PNG oder JPEG nicht sagt",
     "How the values are searched": "Wie die Werte gesucht werden",

@@ -200,3 +200,64 @@ def test_a_killed_fit_has_the_pictures_that_it_left(
     buttons = {"Result", "Start", "Split"}
     assert buttons.intersection(texts) == (set() if killed else buttons)
     assert ("Preliminary" in texts) == killed
+
+
+def test_thumbnails_are_loaded_by_a_timer_and_anew_when_their_file_is_written(
+    icons: Collection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from blender_addon.panel import thumbnails
+
+    timers: list[Any] = []
+    app = SimpleNamespace(
+        background=False,
+        timers=SimpleNamespace(is_registered=timers.__contains__, register=lambda f, first_interval: timers.append(f)),
+    )
+    monkeypatch.setattr(thumbnails, "bpy", SimpleNamespace(app=app))
+    monkeypatch.setattr(thumbnails, "redraw", lambda: None)
+    path = tmp_path / "thumbnails" / "result.ppm"
+    assert thumbnails.thumbnail(path) == 0
+    assert timers == []  # there is none
+    fake_backend.thumbnail(tmp_path, "result", (200, 60, 40))
+    assert thumbnails.thumbnail(path) == 0
+    assert timers.pop()() is None
+    first = thumbnails.thumbnail(path)
+    assert first > 0
+    path.write_bytes(b"P6 4 2 255\n" + bytes(24))
+    assert thumbnails.thumbnail(path) == 0
+    timers.pop()()
+    assert thumbnails.thumbnail(path) not in (0, first)
+    path.write_bytes(b"no picture")
+    assert thumbnails.thumbnail(path) == 0
+    timers.pop()()
+    assert thumbnails.thumbnail(path) == 0
+    assert timers == []  # it is not asked for again
+    thumbnails.close()
+
+
+@pytest.mark.parametrize("shows", [False, True])
+@pytest.mark.parametrize("size", [(1920, 1080), (256, 256)])
+def test_the_difference_of_a_running_fit_takes_the_place_of_the_reference(
+    scene: SimpleNamespace, icons: Collection, tmp_path: Path, size: tuple[int, int], shows: bool
+) -> None:
+    """Where two pictures share a square; else all three are there."""
+    from blender_addon.panel import run
+
+    shown(("reference", "current", "difference"), tmp_path, size)
+    context = scene.bpy.context
+    state = context.window_manager.mfo_runtime
+    state.material, state.progress_text, state.shows_difference = "Glaze", "Refining · 50%", shows
+    layout = Layout(_untranslated())
+    narrow = SimpleNamespace(
+        object=context.object, window_manager=context.window_manager, preferences=context.preferences,
+        region=SimpleNamespace(width=280.0),
+    )  # fmt: skip
+    run._draw_progress(layout, narrow)  # type: ignore[arg-type]  # stand for Blender's
+    texts = [
+        text
+        for text in _texts(layout)
+        if text in {"Reference", "Preliminary", "Difference", "Goal", "Current", "Error"}
+    ]
+    if size[0] == size[1]:
+        assert len(texts) == 3
+    else:
+        assert texts == [*(("Difference", "Preliminary") if shows else ("Reference", "Preliminary")), "Difference"]
