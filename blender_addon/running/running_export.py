@@ -48,7 +48,7 @@ def start(context: bpy.types.Context, steps: Steps[PreparedFit], then: Callable[
     global current
     seen = look(context.scene, context.view_layer)
     try:
-        pause = advance(steps)
+        pause = _advance(steps, context.view_layer)
     except StopIteration as end:
         then(end.value)
         return
@@ -118,7 +118,7 @@ def _tick() -> float | None:
             window = bpy.context.window_manager.windows[0]
             _is_stepping = True
             with bpy.context.temp_override(window=window, scene=scene, view_layer=view_layer):
-                job.pause = advance(job.steps)
+                job.pause = _advance(job.steps, view_layer)
     except StopIteration as end:
         current = None
         _hand_over(job, end.value)
@@ -134,6 +134,14 @@ def _tick() -> float | None:
         _is_stepping = False
     redraw()  # the seconds go on
     return _interval(job.pause)
+
+
+def _advance(steps: Steps[PreparedFit], view_layer: bpy.types.ViewLayer) -> Pause:
+    """Steps with what they put back: else Blender's next update would tell of it as of a change by the user."""
+    pause = advance(steps)
+    if pause.holds_scene:
+        view_layer.update()
+    return pause
 
 
 def _interval(pause: Pause) -> float:
