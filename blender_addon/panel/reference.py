@@ -12,11 +12,11 @@ from ..check.checks import asks_view
 from ..pictures import overlay
 from ..running import running_job
 from ..sentences.translated import translated, word
-from .layout import BOX, BUTTON, NAMED_NUMBER, buttons_side_by_side, names_of, side_by_side
+from .layout import BOX, BUTTON, NAMED_NUMBER, UNIT, buttons_side_by_side, fits, names_of, room, side_by_side
 from .part import draw_part
 from .thumbnails import thumbnail
 
-_ROWS = 4.0  # height of a picture of several, in rows of the interface
+_ROWS, _SHARE = 4.0, 0.37  # of a picture of several: its height in rows of the interface, its share of the width
 
 
 class Reference:
@@ -58,48 +58,48 @@ def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, setti
     box = column
     if pictures:
         box = column.box().column(align=True)
-        _draw_what_it_shows(box, context, first, "1")
-        if settings.reference_source == "FILE":
-            _draw_thumbnail(box, settings.reference_path)
+        path = settings.reference_path if settings.reference_source == "FILE" else ""
+        _draw_what_it_shows(box, context, first, path)
     draw_part(box, context, first.part)
     for index, picture in enumerate(pictures):
         box = column.box().column(align=True)
-        _draw_what_it_shows(box, context, picture, str(index + 2), index)
-        box.prop(picture, "path", text="")
-        _draw_thumbnail(box, picture.path)
+        _draw_what_it_shows(box, context, picture, picture.path, index)
         draw_part(box, context, picture.part, index + 2)
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
-
-
-def _draw_thumbnail(box: bpy.types.UILayout, path: str) -> None:
-    """The picture itself, by which one of several is told from the others."""
-    icon = thumbnail(Path(bpy.path.abspath(path))) if path else 0
-    if icon:
-        box.template_icon(icon_value=icon, scale=_ROWS)
 
 
 def _draw_what_it_shows(
     box: bpy.types.UILayout,
     context: bpy.types.Context,
     picture: bpy.types.PropertyGroup,
-    number: str,
+    path: str,
     index: int | None = None,
 ) -> None:
+    """The settings of one of several pictures, beside the picture itself by which it is told from the others."""
     row = box.row(align=True)
-    row.prop(picture, "use", text=translated(f"Picture {number}"))
+    row.prop(picture, "use", text=translated(f"Picture {1 if index is None else index + 2}"))
     if index is not None:
         row.operator("mfo.remove_picture", text="", icon="X").index = index
-    rest = box.column(align=True)
+    rest, taken = box.column(align=True), BOX
     rest.active = picture.use
-    rest.prop(picture, "camera", text="", icon="CAMERA_DATA")
     numbers = (f"{word('EV')} {picture.exposure:.3f}", f"{word('Frame')} {picture.frame}")
-    row = side_by_side(rest, context, *numbers, margins=NAMED_NUMBER, taken=BOX)
+    icon = thumbnail(Path(bpy.path.abspath(path))) if path else 0
+    if icon:
+        inner = room(context) - BOX
+        if fits(context, inner * (1.0 - _SHARE) - NAMED_NUMBER, *numbers):
+            split, taken = rest.split(factor=_SHARE), BOX + inner * _SHARE
+            split.template_icon(icon_value=icon, scale=min(inner * _SHARE / UNIT, _ROWS))
+            rest = split.column(align=True)
+        else:
+            rest.template_icon(icon_value=icon, scale=_ROWS)
+    rest.prop(picture, "camera", text="", icon="CAMERA_DATA")
+    row = side_by_side(rest, context, *numbers, margins=NAMED_NUMBER, taken=taken)
     row.prop(picture, "exposure", text="EV")
     row.prop(picture, "frame")
-    if index is not None and len(bpy.data.scenes) > 1:
-        row = box.row()
-        row.active = picture.use
-        row.prop(picture, "scene", text="", icon="SCENE_DATA")
+    if index is not None:
+        rest.prop(picture, "path", text="")
+        if len(bpy.data.scenes) > 1:
+            rest.prop(picture, "scene", text="", icon="SCENE_DATA")
 
 
 def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

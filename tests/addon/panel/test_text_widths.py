@@ -222,10 +222,16 @@ def with_a_mix_and_motion(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) ->
     yield
 
 
-def with_several_pictures(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+def with_several_pictures(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    from blender_addon.panel import reference
+
     settings = scene.bpy.context.scene.mfo
     settings.reference_path = scene.reference
     scene.bpy.ops.mfo.add_picture()
+    settings.pictures[0].exposure, settings.pictures[0].frame = -12.5, 1250
+    patch.setattr(reference, "thumbnail", lambda path: 1)
+    yield
+    patch.setattr(reference, "thumbnail", lambda path: 0)
     settings.first_picture.part.left = 10.0
     scene.bpy.ops.mfo.list_materials()
     yield
