@@ -334,7 +334,8 @@ def _open(path: Path) -> Any:
     from . import properties
 
     if not path.is_file():
-        raise HeadlessError(f"{path} does not exist: give a .blend file.")
+        what = "is a folder" if path.is_dir() else "does not exist"
+        raise HeadlessError(f"{path} {what}: give a .blend file.")
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False, use_scripts=False)
     except RuntimeError as error:

@@ -12,7 +12,7 @@ from ..result.shown_result import VERDICT_ICONS
 from ..sentences.translated import word
 from ..text_width import text_width
 from ..translations import CONTEXT
-from .layout import ICON, UNIT, buttons_side_by_side, fits, room
+from .layout import ICON, UNIT, buttons_side_by_side, draw_sentence, fits, room
 from .thumbnails import thumbnail
 
 _AROUND = 26.0  # a list's margins and its bar, pixels at a scale of 1
@@ -76,6 +76,8 @@ class History:
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the list and what can be done with the marked result."""
         layout, kept = self.layout, context.object.active_material.mfo  # type: ignore[attr-defined]  # from Panel
+        if context.scene.mfo.targets:  # the panels above are of all of them
+            draw_sentence(layout, context, f"Of material {context.object.active_material.name}", "MATERIAL")
         layout.template_list(MFO_UL_history.bl_idname, "", kept, "history", kept, "history_index", rows=3)
         _draw_pictures(layout, context)
         row = layout.row(align=True)

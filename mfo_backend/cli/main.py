@@ -60,6 +60,7 @@ EXAMPLES = {
     "completion": ('eval "$(mfo completion bash)"', "mfo completion fish > ~/.config/fish/completions/mfo.fish"),
     "run": ("mfo run job",),
 }
+_INTERRUPTED = "Interrupted."
 _WIDTH = 100  # letters of a line of help
 _EPILOG = "Exit codes: 0 done, 1 failed, 2 bad input, 3 something is not installed, 4 cancelled, 5 no match."
 
@@ -69,10 +70,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     use_kernel_cache()
     remove_abandoned()
     words = list(sys.argv[1:] if arguments is None else arguments)
+    stream = sys.stdout if "--json" in words else None
     try:
-        parsed = _parser(words).parse_args(words)  # loads the command's module and what that needs
+        parsed = _parser(words).parse_args(words)  # loads the command's module and what that needs: seconds
     except ImportError as error:
-        return report_error(Status.SETUP, _not_importable(error), stream=sys.stdout if "--json" in words else None)
+        return report_error(Status.SETUP, _not_importable(error), stream=stream)
+    except KeyboardInterrupt:
+        return report_error(Status.CANCELLED, _INTERRUPTED, stream=stream)
     stream = sys.stdout if getattr(parsed, "json", False) else None
     try:
         return parsed.func(parsed)
@@ -81,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MfoError as error:
         return report_error(error.status, str(error), stream=stream)
     except KeyboardInterrupt:
-        return report_error(Status.CANCELLED, "Interrupted.", stream=stream)
+        return report_error(Status.CANCELLED, _INTERRUPTED, stream=stream)
     except BrokenPipeError:  # the reader of our output has closed it (`mfo doctor | head -1`)
         sys.stderr.close()
         return Status.FAILED.exit_code

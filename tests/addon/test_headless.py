@@ -38,3 +38,11 @@ def test_the_process_ends_with_its_code_and_leaves_no_files(
     assert done.returncode == code
     assert json.loads(done.stdout.strip().splitlines()[-1])["status"] == status
     assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(("name", "words"), [("", "is a folder"), ("none.blend", "does not exist")])
+def test_what_is_no_blend_file_is_called_what_it_is(addon: object, tmp_path: Path, name: str, words: str) -> None:
+    from blender_addon.headless import HeadlessError, _open
+
+    with pytest.raises(HeadlessError, match=f"{words}: give a .blend file"):
+        _open(tmp_path / name)

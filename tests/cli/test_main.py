@@ -158,6 +158,20 @@ def test_an_error_is_one_line_and_a_code(
     assert bool(shown.out) == as_json
 
 
+@pytest.mark.parametrize("words", [["compare"], ["compare", "--json"]])
+def test_an_interrupt_while_modules_load_is_one_line_and_a_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, words: list[str]
+) -> None:
+    def load(_words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "_parser", load)
+    assert command.main(words) == 4
+    shown = capsys.readouterr()
+    assert shown.err == "mfo: Interrupted.\n"
+    assert bool(shown.out) == ("--json" in words)
+
+
 def test_the_module_is_the_command() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "mfo_backend", "run", "/no/such/job", "--progress", "json"],

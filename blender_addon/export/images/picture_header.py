@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 START = 1 << 20  # bytes that are read; a JPEG may have thumbnails and profiles before its size
+_PNG = b"\x89PNG\r\n\x1a\n"
 _DIRECTORY = 4096  # bytes of a TIFF's first directory, of 12 an entry; cameras write some 40 entries
 _EXR_DEPTH = {0: "32-bit integer", 1: "16-bit float", 2: "32-bit float"}
 
@@ -51,6 +52,24 @@ def read_header(path: Path) -> PictureHeader | None:
     except (struct.error, ValueError, IndexError):
         return None  # cut off or damaged; the backend says more
     return None
+
+
+def is_cut_off(path: Path) -> bool:
+    """Whether a PNG ends before its last chunk, as one does that is being written; of other formats False.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    with open(path, "rb") as file:
+        if file.read(8) != _PNG:
+            return False
+        while len(chunk := file.read(8)) == 8:
+            if chunk[4:] == b"IEND":
+                return False
+            file.seek(struct.unpack(">I", chunk[:4])[0] + 4, 1)  # and its checksum
+    return True
 
 
 def _with_directory(file: BinaryIO, data: bytes) -> bytes:
@@ -152,7 +171,7 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
 
 
 _READERS = (
-    (b"\x89PNG\r\n\x1a\n", _png),
+    (_PNG, _png),
     (b"\xff\xd8", _jpeg),
     (b"\x76\x2f\x31\x01", _exr),
     (b"#?", _radiance),

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..findings import ExportError
-from ..images.picture_header import PictureHeader, read_header
+from ..images.picture_header import PictureHeader, is_cut_off, read_header
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
 DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
@@ -45,6 +45,10 @@ def _file(given: str | Path) -> tuple[Path, PictureHeader | None]:
     refuse_suffix(path)
     if path.stat().st_size == 0:
         raise ExportError(f"The reference {path.name} is empty: wait until it is written, or choose another file.")
+    if is_cut_off(path):
+        raise ExportError(
+            f"The reference {path.name} is not complete: wait until it is written, or choose another file."
+        )
     header = read_header(path)
     refuse_kind(path, header)
     return path, header

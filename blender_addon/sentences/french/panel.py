@@ -62,6 +62,7 @@ PANEL = {
     "The reference {} is looked for beside the .blend, which was never saved: save it, or choose the picture anew.": "La référence {} est cherchée à côté du .blend, qui n'a jamais été enregistré : l'enregistrer, ou choisir l'image de nouveau.",
     "The reference {} is a folder: choose one picture in it.": "La référence {} est un dossier : choisir une image dedans.",
     "The reference {} is in a folder that does not exist: connect its drive, or choose another file.": "La référence {} est dans un dossier qui n'existe pas : connecter son lecteur, ou choisir un autre fichier.",
+    "The reference {} is not complete: wait until it is written, or choose another file.": "La référence {} n'est pas complète : attendre qu'elle soit écrite, ou choisir un autre fichier.",
     "The reference {} is empty: wait until it is written, or choose another file.": "La référence {} est vide : attendre qu'elle soit écrite, ou choisir un autre fichier.",
     "The reference {} is a movie: save one frame of it as EXR or PNG and choose that.": "La référence {} est un film : en enregistrer une image en EXR ou PNG et choisir celle-ci.",
     "The reference {} is a Blender file: render a picture of it and choose that.": "La référence {} est un fichier Blender : en rendre une image et choisir celle-ci.",

@@ -62,6 +62,7 @@ PANEL = {
     "The reference {} is looked for beside the .blend, which was never saved: save it, or choose the picture anew.": "Die Referenz {} wird neben der .blend gesucht, die nie gespeichert wurde: sie speichern, oder das Bild neu wählen.",
     "The reference {} is a folder: choose one picture in it.": "Die Referenz {} ist ein Ordner: ein Bild darin wählen.",
     "The reference {} is in a folder that does not exist: connect its drive, or choose another file.": "Die Referenz {} ist in einem Ordner, den es nicht gibt: sein Laufwerk verbinden, oder eine andere Datei wählen.",
+    "The reference {} is not complete: wait until it is written, or choose another file.": "Die Referenz {} ist nicht vollständig: warten, bis sie geschrieben ist, oder eine andere Datei wählen.",
     "The reference {} is empty: wait until it is written, or choose another file.": "Die Referenz {} ist leer: warten, bis sie geschrieben ist, oder eine andere Datei wählen.",
     "The reference {} is a movie: save one frame of it as EXR or PNG and choose that.": "Die Referenz {} ist ein Film: ein Einzelbild davon als EXR oder PNG speichern und dieses wählen.",
     "The reference {} is a Blender file: render a picture of it and choose that.": "Die Referenz {} ist eine Blender-Datei: ein Bild daraus rendern und dieses wählen.",

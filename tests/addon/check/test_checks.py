@@ -150,6 +150,7 @@ def test_a_mended_shader_keeps_its_colour_and_the_old_node(scene: SimpleNamespac
      ("text.png", "no picture its name promises"), ("folder", "is a folder: choose one picture in it"),
      ("folder.exr", "is a folder: choose one picture in it"), ("text.mp4", "is a movie: save one frame of it"),
      ("text.blend", "is a Blender file: render a picture of it"), ("empty.png", "is empty: wait until it is written"),
+     ("half.png", "is not complete: wait until it is written"),
      ("//a.exr", "beside the .blend, which was never saved: save it")],
 )  # fmt: skip
 @pytest.mark.parametrize("number", [1, 2])
@@ -162,6 +163,9 @@ def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: 
         path.mkdir()
     elif name.startswith("empty"):
         path.touch()
+    elif name.startswith("half"):
+        whole = Path(scene.reference).read_bytes()
+        path.write_bytes(whole[: len(whole) // 2])
     check(scene)
     settings = scene.bpy.context.scene.mfo
     settings.reference_path = scene.reference

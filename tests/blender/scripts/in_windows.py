@@ -233,12 +233,23 @@ def survive():
     assert "was killed" in runtime().sentence
     yield from shot("14_killed")
 
-    process = fit(60)
+    left = str(folder / "left.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=left)
+    process = fit(8)
     yield from until(lambda: runtime().fraction > 0, 10)
     bpy.ops.wm.read_homefile(app_template="")
     assert not alive(process)
     yield 1.0
     assert runtime().state == "IDLE"
+    assert "was ended as another file was opened" in runtime().sentence
+    assert "in the history when left.blend is opened again" in runtime().sentence
+    yield from shot("15_left")
+    bpy.ops.wm.open_mainfile(filepath=left)
+    yield 1.0
+    assert "has results that were not saved" in runtime().sentence
+    assert str(process.folder) in [entry.job_folder for entry in material().mfo.history]
+    yield from shot("16_came_back")
+    bpy.ops.wm.read_homefile(app_template="")
     yield from show_tab()
     settings()
 

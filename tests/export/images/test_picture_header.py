@@ -10,7 +10,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from blender_addon.export.images.picture_header import read_header
+from blender_addon.export.images.picture_header import is_cut_off, read_header
 from mfo_backend.scene.image_file import write_exr
 
 WIDTH, HEIGHT = 37, 21
@@ -107,3 +107,17 @@ def test_what_is_cut_off_raises_nothing(tmp_path: Path, suffix: str) -> None:
         read_header(path)
     path.write_bytes(b"\x00" * 100)
     assert read_header(path) is None
+
+
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "TIFF"])
+def test_a_png_that_is_being_written_is_cut_off_at_any_place(tmp_path: Path, kind: str) -> None:
+    """And a whole one is not, with whatever a program has left behind its end."""
+    path = tmp_path / "picture"
+    noise = np.random.default_rng(3).integers(0, 255, (40, 60, 3), np.uint8)
+    Image.fromarray(noise).save(path, format=kind)
+    whole = path.read_bytes()
+    for count in (9, 20, 33, 60, len(whole) // 2, len(whole) - 13):
+        path.write_bytes(whole[:count])
+        assert is_cut_off(path) == (kind == "PNG")
+    path.write_bytes(whole + b"older picture")
+    assert not is_cut_off(path)
