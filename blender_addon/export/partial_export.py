@@ -103,12 +103,14 @@ def partial_export(
     region = pictured_region(context.scene.render, size)
     with probe_for(fitted, always=any(each.values for each in wanted)) as probe:
         # names that the user chose are those of the leaf that the panel shows
-        by_share = probe is not None and isinstance(fit.get("parameters", "all"), str)
+        by_share = isinstance(fit.get("parameters", "all"), str)
         if leaves is None:
             found: list[str | None] = []
             for each in fitted:
-                asks = probe is not None and by_share
-                found.append((yield from largest_leaf(probe, context, each, region=region)) if asks else each.leaf)
+                if probe is not None and by_share:
+                    found.append((yield from largest_leaf(probe, context, each, region=region)))
+                else:
+                    found.append(each.leaf)
             leaves = found
         for number, leaf in enumerate(leaves):
             if leaf is not None:  # whose numbers and values are others

@@ -37,11 +37,14 @@ class Pause:
 Steps: TypeAlias = Generator[Pause, None, Found]
 
 
-def advance(steps: Steps[object]) -> Pause:
-    """Take steps until one has to wait or a moment has passed; the end of the steps is their `StopIteration`."""
-    end = time.monotonic() + STEP_SECONDS
+def advance(steps: Steps[object], seconds: float = STEP_SECONDS) -> Pause:
+    """Take steps until one has to wait, has put something back, or a moment has passed.
+
+    The end of the steps is their `StopIteration`.
+    """
+    end = time.monotonic() + seconds
     pause = next(steps)
-    while time.monotonic() < end and pause.is_over():
+    while time.monotonic() < end and pause.is_over() and not pause.holds_scene:
         pause = next(steps)
     return pause
 
@@ -63,9 +66,11 @@ def held(
     """Steps that each need what `show` shows; it is put back while they pause, and the scene must stay as it is."""
     try:
         while True:
+            began = time.monotonic()
             with show():
+                shown = time.monotonic() - began
                 try:
-                    pause = advance(steps)
+                    pause = advance(steps, max(STEP_SECONDS, 2.0 * shown))  # as long as to show and to put back
                 except StopIteration as end:
                     return end.value
             yield replace(pause, holds_scene=True, text=text, share=share)

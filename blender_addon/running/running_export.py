@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import bpy
 
 from ..check.preflight import look, redraw
-from ..export.steps import Pause, Steps, advance
+from ..export.steps import STEP_SECONDS, Pause, Steps, advance
 from . import running_job
 from .fit_queue import PreparedFit
 
 TICK = 0.1  # seconds between two looks at what is waited for
+AT_ONCE = 1.0  # seconds that a press may take: the export of a plain scene is done then, and its fit has begun
 DRAWN = 0.01  # seconds that Blender has to draw where nothing is waited for
 _UNDONE = "The export was ended by an undo or another file: press Fit again."
 _GONE = "Something that was being exported is not in the file any more: press Fit again."
@@ -48,7 +49,7 @@ def start(context: bpy.types.Context, steps: Steps[PreparedFit], then: Callable[
     global current
     seen = look(context.scene, context.view_layer)
     try:
-        pause = _advance(steps, context.view_layer)
+        pause = _advance(steps, context.view_layer, AT_ONCE)
     except StopIteration as end:
         then(end.value)
         return
@@ -118,7 +119,7 @@ def _tick() -> float | None:
             window = bpy.context.window_manager.windows[0]
             _is_stepping = True
             with bpy.context.temp_override(window=window, scene=scene, view_layer=view_layer):
-                job.pause = _advance(job.steps, view_layer)
+                job.pause = _advance(job.steps, view_layer, STEP_SECONDS)
     except StopIteration as end:
         current = None
         _hand_over(job, end.value)
@@ -136,9 +137,9 @@ def _tick() -> float | None:
     return _interval(job.pause)
 
 
-def _advance(steps: Steps[PreparedFit], view_layer: bpy.types.ViewLayer) -> Pause:
+def _advance(steps: Steps[PreparedFit], view_layer: bpy.types.ViewLayer, seconds: float) -> Pause:
     """Steps with what they put back: else Blender's next update would tell of it as of a change by the user."""
-    pause = advance(steps)
+    pause = advance(steps, seconds)
     if pause.holds_scene:
         view_layer.update()
     return pause

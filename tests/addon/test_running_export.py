@@ -106,6 +106,7 @@ def test_long_steps_give_the_windows_back(scene: SimpleNamespace, taken: list[ob
     from blender_addon.running import running_export
 
     def long():
+        time.sleep(1.02 * running_export.AT_ONCE)
         for _ in range(3):
             time.sleep(1.2 * STEP_SECONDS)
             yield Pause(share=0.5, text="Picture 2 of 4")
@@ -114,6 +115,48 @@ def test_long_steps_give_the_windows_back(scene: SimpleNamespace, taken: list[ob
     running_export.start(scene.bpy.context, long(), taken.append)
     assert running_export.progress() == (0.5, "Picture 2 of 4")
     assert [running_export._tick() for _ in range(3)] == [running_export.DRAWN, running_export.DRAWN, None]
+    assert taken == ["fit"]
+
+
+def test_windows_are_drawn_between_pictures(scene: SimpleNamespace, taken: list[object]) -> None:
+    """Each needs something shown, which is put back before they are; pieces of one picture are taken together."""
+    from contextlib import contextmanager
+
+    from blender_addon.export.steps import Pause, held
+    from blender_addon.running import running_export
+
+    log: list[str] = []
+
+    @contextmanager
+    def show():
+        log.append("shown")
+        yield
+        log.append("back")
+
+    def picture():
+        log.append("read")
+        yield Pause()
+        log.append("written")
+        yield Pause(lambda: log[-1] == "evaluated")
+        log.append("more")
+        return "fit"
+
+    def both():
+        for number in (1, 2):
+            fit = yield from held(picture(), show, f"Picture {number} of 2", number / 2)
+        return fit
+
+    running_export.start(scene.bpy.context, both(), taken.append)
+    piece = ["shown", "read", "written", "back"]
+    assert log == piece
+    assert running_export._tick() == running_export.TICK
+    assert log == piece  # nothing is shown for a look at what is waited for
+    log.append("evaluated")
+    running_export._tick()
+    assert log == [*piece, "evaluated", "shown", "more", "back", *piece]
+    assert running_export.progress() == (1.0, "Picture 2 of 2")
+    log.append("evaluated")
+    assert running_export._tick() is None
     assert taken == ["fit"]
 
 

@@ -247,7 +247,8 @@ def survive():
     bpy.ops.wm.open_mainfile(filepath=left)
     yield 1.0
     assert "has results that were not saved" in runtime().sentence
-    assert str(process.folder) in [entry.job_folder for entry in material().mfo.history]
+    history = bpy.data.objects["Cube renamed"].active_material.mfo.history
+    assert str(process.folder) in [entry.job_folder for entry in history]
     yield from shot("16_came_back")
     bpy.ops.wm.read_homefile(app_template="")
     yield from show_tab()
