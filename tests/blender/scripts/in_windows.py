@@ -247,10 +247,10 @@ def survive():
     bpy.ops.wm.open_mainfile(filepath=left)
     yield 1.0
     assert "has results that were not saved" in runtime().sentence
-    history = bpy.data.objects["Cube renamed"].active_material.mfo.history
-    assert str(process.folder) in [entry.job_folder for entry in history]
+    assert str(process.folder) in [e.job_folder for m in bpy.data.materials for e in m.mfo.history]
     yield from shot("16_came_back")
     bpy.ops.wm.read_homefile(app_template="")
+    yield 1.0
     yield from show_tab()
     settings()
 
