@@ -6,6 +6,9 @@ q_g = J_g^T r_g. It needs no model of the noise, unlike s^2 H^-1, which is sever
 pixels or channels share their noise. Where a few pixels rule a value, as those of a highlight do, they count with the
 residual that a solution without them would leave (`solve.leverage`). No value leaves its box, so none is less sure than
 one that may lie anywhere in it, and what trades against it gains by that.
+
+What nodes give is sampled, and an error of that is the same wherever a pattern is: no residual shows it. How far the
+solution would move with half the samples along a pixel stands for it, as a further error that all values share.
 """
 
 from __future__ import annotations
@@ -36,6 +39,12 @@ BOX_SD = 3.0**-0.5
 # what no pixel shows loses its digits.
 FAR = 10.0
 
+# Error of what nodes give at the fineness of a fit, of what half of it would move the solution by: 1 where errors fall
+# as the width of a subpixel does, as at edges, and 1/3 where they fall as its square. Of 27 determined values of ten
+# graphs under a lamp 3 are off by more than three deviations without it and none with it
+# (docs/notebook/graph_values.md). Larger: fine patterns are called weak. Smaller: they are wrong in silence.
+HALF_AS_FINE = 0.5
+
 
 @dataclass(frozen=True)
 class Further:
@@ -51,12 +60,15 @@ def covariance(
     table: ParameterTable,
     model_error: float = MODEL_ERROR,
     further: Further | None = None,
+    coarser: tuple[Vector, Vector | None] | None = None,
 ) -> Vector:
     """Covariance (k, k) in widths of the box from weighted residuals and their derivatives (g, 3, 1 + k), in the box.
 
     `own` is the recording's noise in them, half the difference of two samples (None for none): squares of derivatives
     hold it, too, and would make every value look better determined. `model_error` is the least error of a residual;
     the default is for relative ones. With what `further` groups would tell, it is that which is to be expected.
+    `coarser` are `rows` and `own` as of half the subpixels of what nodes give: how far these would move the solution
+    stands for an error of all values together.
     """
     k = rows.shape[2] - 1
     width = table.upper - table.lower
@@ -85,12 +97,22 @@ def covariance(
         moved = moved + _products(q)
     g = len(known) + len(told)
     found = inverse @ (moved + ridge * ridge * FAR**2 * np.eye(k)) @ inverse
-    return _in_box(inflation**2 * g / max(g - k / 3, 1) * found)
+    found = inflation**2 * g / max(g - k / 3, 1) * found
+    if coarser is not None:
+        away = HALF_AS_FINE * inverse @ (width * (_gradient(rows, own) - _gradient(*coarser)))
+        found = found + np.outer(away, away)
+    return _in_box(found)
 
 
 def _products(rows: Vector) -> Vector:
     """Sum of the products of rows (g, n, k) by themselves, (k, k)."""
     return np.einsum("gnk,gnl->kl", rows, rows, optimize=True)
+
+
+def _gradient(rows: Vector, own: Vector | None) -> Vector:
+    """Sum of derivatives times residuals, without the recording's own noise, (k,)."""
+    found = np.einsum("gck,gc->k", rows[:, :, 1:], rows[:, :, 0], optimize=True)
+    return found if own is None else found - np.einsum("gck,gc->k", own[:, :, 1:], own[:, :, 0], optimize=True)
 
 
 def _in_box(spread: Vector) -> Vector:

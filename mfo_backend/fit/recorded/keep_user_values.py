@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...render.paths.recorded_image import RecordedImage
 from ...solve.bounded_least_squares import step_in_box
 from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
@@ -112,8 +113,8 @@ class Judged:
     def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
         """All of them."""
         problem, table = self._problem, self._setting.table
-        rows, own = self.rows(x)
-        spread = covariance(rows, own, table, model_error=self.model_error)
+        coarser = None if problem.coarser is None else self._rows_of(problem.coarser, x)
+        spread = covariance(*self.rows(x), table, self.model_error, coarser=coarser)
         spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
         return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table, spread), spread
 
@@ -124,10 +125,13 @@ class Judged:
 
     def rows(self, x: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         """Residuals and derivatives (g, 3, 1 + k) that certainty is taken from, and the recording's noise in them."""
-        problem, residual = self._problem, self._problem.residual
+        return self._rows_of(self._problem.evaluate, x)
+
+    def _rows_of(self, evaluate: RecordedImage, x: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        residual = self._problem.residual
         if not self._weighted:
-            residual = RelativeResidual(problem.groups.average(self._setting.reference))
-        return rows_of_samples(problem.evaluate.samples(x), residual)
+            residual = RelativeResidual(self._problem.groups.average(self._setting.reference))
+        return rows_of_samples(evaluate.samples(x), residual)
 
     def noise(self, cost: float) -> float:
         """Mean square of a residual that is noise."""

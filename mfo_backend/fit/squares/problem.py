@@ -23,12 +23,14 @@ class Problem:
     """One least-squares problem: what to average, against what.
 
     Where the recording has two samples of the light, the cost holds its own noise as it is at `near` and nowhere else.
+    Where nodes are evaluated `coarser` is what to average by half their samples along a pixel.
     """
 
     evaluate: RecordedImage
     residual: Residual
     groups: LaneGroups
     near: Vector | None = None
+    coarser: RecordedImage | None = None
 
     @cached_property
     def equations(self) -> Callable[[Vector], NormalEquations]:

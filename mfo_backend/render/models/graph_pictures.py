@@ -174,6 +174,16 @@ class GraphPictures:
         seen = np.isfinite(found.positions).all(axis=2).ravel()
         return [{name_of(s): _flat(picture, seen) for s, picture in pictures.items()} for pictures in found.pictures]
 
+    def coarser(self, state: GraphState) -> GraphState:
+        """The state as of half the subpixels along a pixel: two by two have their mean, where the camera sees all."""
+        assert self._seen is not None
+        seen = np.isfinite(self._seen[0]).all(axis=2)
+        pictures = {name: _coarser(picture, seen) for name, picture in state.pictures.items()}
+        slopes = {
+            name: {j: _coarser(slope, seen) for j, slope in slopes.items()} for name, slopes in state.slopes.items()
+        }
+        return GraphState(pictures, slopes)
+
     def refusal(self) -> str | None:
         """Why the nodes cannot be evaluated, as a sentence; None where they can."""
         try:
@@ -273,6 +283,15 @@ def name_of(socket: str) -> str:
     leaf, _, own = socket.rpartition("/")
     name = DIRECTIONS.get(own) or ("weight" if own == WEIGHT else PARAMETER_OF_SOCKET[own])
     return f"leaf_{leaf}.{name}" if leaf else name
+
+
+def _coarser(flat: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """A flat picture of means over two by two subpixels, (subpixels + 1, numbers); where one is not seen all stay."""
+    rows, columns = seen.shape
+    blocks = flat[:-1].reshape(rows // 2, 2, columns // 2, 2, -1)
+    whole = seen.reshape(rows // 2, 2, columns // 2, 2).all(axis=(1, 3))[:, None, :, None, None]
+    means = blocks.mean(axis=(1, 3), keepdims=True)
+    return np.concatenate([np.where(whole, means, blocks).reshape(-1, flat.shape[1]), flat[-1:]])
 
 
 def _flat(picture: Picture, seen: NDArray[np.bool_]) -> NDArray[np.float32]:

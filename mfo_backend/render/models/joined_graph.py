@@ -28,17 +28,23 @@ class JoinedGraph:
         """Pictures and derivatives."""
         parts = [graph.state(vector) for graph in self._graphs]
         if self._last is None or any(a is not b for a, b in zip(parts, self._last[0], strict=True)):
-            self._last = (
-                parts,
-                GraphState(
-                    {name: np.concatenate([part.pictures[name] for part in parts]) for name in self.varying},
-                    {
-                        name: {j: np.concatenate([part.slopes[name][j] for part in parts]) for j in components}
-                        for name, components in self.varying.items()
-                    },
-                ),
-            )
+            self._last = parts, self._joined(parts)
         return self._last[1]
+
+    def _joined(self, parts: Sequence[GraphState]) -> GraphState:
+        return GraphState(
+            {name: np.concatenate([part.pictures[name] for part in parts]) for name in self.varying},
+            {
+                name: {j: np.concatenate([part.slopes[name][j] for part in parts]) for j in components}
+                for name, components in self.varying.items()
+            },
+        )
+
+    def coarser(self, state: GraphState) -> GraphState:
+        """See `GraphPictures.coarser`; of the state that was asked for last."""
+        assert self._last is not None
+        assert self._last[1] is state
+        return self._joined([graph.coarser(part) for graph, part in zip(self._graphs, self._last[0], strict=True)])
 
     def plain(self, vectors: Sequence[Vector]) -> list[Mapping[str, NDArray[np.float32]]]:
         """Pictures alone."""

@@ -327,6 +327,24 @@ class RecordedScene:
 
         return RecordedImage(at, recalled)
 
+    def coarser(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage | None:
+        """As `evaluator`, by pictures of half the fineness of what a graph gives; None without free values in one."""
+        varying = self._evaluated
+        if varying is None:
+            return None
+        constant = groups.average(paths.constant)
+        apart = paths.constant_difference
+        difference = None if apart is None else groups.average(apart)
+        lanes = Lanes.as_recorded(paths, groups, self._held)
+        cost = with_derivatives(self._share(groups), self.renderer.table.length)
+
+        def at(vector: NDArray[np.float64]) -> TwoSamples:
+            samples = self.jacobian(vector, lanes, groups, varying.coarser_arrays(vector))
+            self.renderer.counter.add(cost)
+            return TwoSamples.of(samples, constant, difference)
+
+        return RecordedImage(at)
+
     def _share(self, groups: LaneGroups) -> float:
         """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""
         return len(groups.pixels) / max(self._covered, 1)

@@ -70,13 +70,20 @@ class VaryingValues:
         if not derivatives:
             return self.plain_arrays(state.pictures)
         if self._last is None or self._last[0] is not state:
-            flat = []
-            for name, components in self._graph.varying.items():
-                flat.append(own_memory(state.pictures[name], mi.Float))
-                flat += [own_memory(state.slopes[name][j], mi.Float) for j in components]
-            dr.eval(flat)
-            self._last = state, tuple(flat)
+            self._last = state, self._with_slopes(state)
         return self._last[1]
+
+    def coarser_arrays(self, vector: NDArray[np.float64]) -> tuple[Any, ...]:
+        """The same with derivatives, as of pictures of half the fineness."""
+        return self._with_slopes(self._graph.coarser(self._graph.state(vector[self.first :])))
+
+    def _with_slopes(self, state: GraphState) -> tuple[Any, ...]:
+        flat = []
+        for name, components in self._graph.varying.items():
+            flat.append(own_memory(state.pictures[name], mi.Float))
+            flat += [own_memory(state.slopes[name][j], mi.Float) for j in components]
+        dr.eval(flat)
+        return tuple(flat)
 
     def sample(self, *, derivatives: bool) -> tuple[tuple[Any, ...], list[Any]]:
         """Stand-ins for pictures and for a lane, to trace a kernel that is never run."""

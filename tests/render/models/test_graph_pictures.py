@@ -107,6 +107,23 @@ def test_what_is_not_linear_is_extrapolated_nearby_alone() -> None:
     assert len(nodes.variants) == 4  # of 7
 
 
+def test_coarser_pictures_are_means_of_four_subpixels_where_the_camera_sees_all() -> None:
+    pictures = graph(Nodes())
+    state = pictures.state(np.array([0.2, 0.3, 0.5, 2.0]))
+    coarse = pictures.coarser(state)
+    of = [
+        (state.pictures["roughness"], coarse.pictures["roughness"]),
+        (state.slopes["base_color"][1], coarse.slopes["base_color"][1]),
+    ]
+    for fine, found in of:
+        np.testing.assert_array_equal(found[:16], fine[:16])  # of the first two rows one is beside the target
+        np.testing.assert_array_equal(found[-1], fine[-1])
+        for row, column in ((2, 0), (2, 6), (4, 4)):
+            four = [8 * (row + down) + column + right for down in (0, 1) for right in (0, 1)]
+            wanted = np.broadcast_to(np.mean([fine[k] for k in four], axis=0), (4, fine.shape[1]))
+            np.testing.assert_allclose(found[four], wanted, rtol=1e-6)
+
+
 def test_finer_pictures_are_kept() -> None:
     nodes = Nodes()
     pictures = graph(nodes)

@@ -11,12 +11,12 @@ from .test_graph_pictures import Nodes, graph
 
 
 class Fewer(Nodes):
-    """The same nodes seen by a camera with a row less."""
+    """The same nodes seen by a camera with two rows less."""
 
     def __call__(self, variants, *, scale, samples, elsewhere=False):
         found = super().__call__(variants, scale=scale, samples=samples, elsewhere=elsewhere)
-        pictures = [{name: picture[1:] for name, picture in known.items()} for known in found.pictures]
-        return type(found)(pictures, found.positions[1:], found.camera)
+        pictures = [{name: picture[2:] for name, picture in known.items()} for known in found.pictures]
+        return type(found)(pictures, found.positions[2:], found.camera)
 
 
 def test_rows_of_two_pictures() -> None:
@@ -27,9 +27,11 @@ def test_rows_of_two_pictures() -> None:
         state = joined.state(vector)
         assert joined.state(vector) is state
         assert joined.begins(vector) == [0, 49]
-        for part, rows in zip(parts, (slice(0, 49), slice(49, 90)), strict=True):
+        for part, rows in zip(parts, (slice(0, 49), slice(49, 82)), strict=True):
             own = part.state(vector)
             np.testing.assert_array_equal(state.pictures["base_color"][rows], own.pictures["base_color"])
             np.testing.assert_array_equal(state.slopes["roughness"][3][rows], own.slopes["roughness"][3])
+            coarse = part.coarser(own).pictures["base_color"]
+            np.testing.assert_array_equal(joined.coarser(state).pictures["base_color"][rows], coarse)
             (plain,) = part.plain([vector])
             np.testing.assert_array_equal(joined.plain([vector])[0]["roughness"][rows], plain["roughness"])
