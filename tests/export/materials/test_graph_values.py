@@ -126,6 +126,13 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     # what is path traced shows the same
     traced = renderer.image(there, seed=0, spp=64).reshape(-1, 3)[groups.pixels]
     assert abs(traced.mean() / truth.mean() - 1.0) < 0.01
+    coarser = recorded.coarser(paths, groups)
+    assert coarser is not None
+    plain = {name: halved(flat) for name, flat in renderer.graph.state(there[1:]).pictures.items()}
+    halved_image = recorded.images_of(paths, groups, there)(plain)
+    np.testing.assert_allclose(coarser(there)[:, :, 0], halved_image, rtol=1e-4, atol=1e-5)
+    change_of = coarser(there)[:, :, 0] - found[:, :, 0]
+    assert 1e-4 < np.sqrt(np.mean(change_of**2)) / truth.mean() < 0.1
     step = 0.02
     for k in range(1, len(there)):
         moved = there + step * (np.arange(len(there)) == k)
@@ -135,6 +142,13 @@ def test_the_recorded_picture_at_other_values_is_cycles(
         # the difference is taken over a few per cent of the range, where normals turn
         assert np.corrcoef(change_of.ravel(), slope.ravel())[0, 1] > 0.98, renderer.table.names
         assert abs((change_of * slope).sum() / (slope**2).sum() - 1.0) < 0.06
+
+
+def halved(flat: np.ndarray) -> np.ndarray:
+    """Means of two by two subpixels of a picture of 4 x 4 subpixels a pixel, square but for its last row."""
+    side = int(np.sqrt(len(flat) - 1))
+    blocks = flat[:-1].reshape(side // 2, 2, side // 2, 2, -1)
+    return np.concatenate([blocks.mean(axis=(1, 3)).repeat(2, axis=0).repeat(2, axis=1).reshape(flat[:-1].shape), flat[-1:]])
 
 
 def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:

@@ -158,3 +158,63 @@ def test_further_groups_count_as_the_mean_over_residuals_like_the_present_ones()
 
     expected = np.mean([drawn() for _ in range(3000)], axis=0)
     np.testing.assert_allclose(covariance(rows, None, table, 1e-6, told), expected, rtol=0.06, atol=2e-6)
+
+
+PIXELS, POINTS, SUBPIXELS, RAYS = 1000, 64, 4, 8
+GAIN = ParameterTable([Parameter("gain", 1, 0.0, 4.0, 1.0), Parameter("offset", 1, -1.0, 1.0, 0.0)])
+
+
+def edges(rng: np.random.Generator) -> np.ndarray:
+    at = np.arange(PIXELS * POINTS) / POINTS
+    where = np.sort(rng.uniform(0.0, PIXELS, PIXELS))
+    return rng.uniform(0.0, 1.0, PIXELS + 1)[np.searchsorted(where, at)]
+
+
+def waves(rng: np.random.Generator) -> np.ndarray:
+    at = 2.0 * np.pi * rng.uniform(0.15, 0.25) * np.arange(PIXELS * POINTS) / POINTS
+    return 0.5 + 0.2 * np.sin(at + rng.uniform(0.0, 6.0)) + 0.2 * np.sin(1.37 * at)
+
+
+@pytest.mark.parametrize(("pattern", "widest"), [(edges, 1.0), (waves, 4.0)])
+def test_deviations_hold_the_error_of_a_pattern_that_is_sampled(pattern, widest):
+    """Oracle: gain and offset of a pattern whose every point is known, found by one sample in each subpixel.
+
+    A pixel's rays read the sample of the subpixel that they meet; the picture is the mean of all points. `widest` is
+    how many times larger than the error deviations may be.
+    """
+    filter_ = np.minimum(np.arange(POINTS) + 1.0, POINTS - np.arange(POINTS))
+    truth = np.array([1.3, 0.2])
+    errors, without, stated = [], [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        fine = pattern(rng).reshape(PIXELS, POINTS)
+        picture = truth[0] * np.average(fine, axis=1, weights=filter_) + truth[1]
+        picture = picture[:, None] + rng.normal(size=(PIXELS, 3)) * 0.003
+        rays = (POINTS * (np.arange(RAYS) + rng.uniform(0.0, 1.0, (PIXELS, RAYS))) / RAYS).astype(int)
+        within = POINTS // SUBPIXELS
+        place = rng.integers(0, within, (PIXELS, SUBPIXELS, 1))
+        sampled = np.take_along_axis(fine.reshape(PIXELS, SUBPIXELS, within), place, axis=2)[:, :, 0]
+        halved = sampled.reshape(PIXELS, SUBPIXELS // 2, 2).mean(axis=2).repeat(2, axis=1)
+
+        def derivatives(of, rays=rays, within=within):
+            read = np.take_along_axis(of, rays // within, axis=1)
+            mean = (read * filter_[rays]).sum(axis=1) / filter_[rays].sum(axis=1)
+            return np.stack([mean, np.ones(PIXELS)], axis=1)
+
+        x = np.linalg.lstsq(derivatives(sampled), picture.mean(axis=1), rcond=None)[0]
+
+        def rows(of, x=x, picture=picture, derivatives=derivatives):
+            jacobian = derivatives(of)
+            return with_residual(np.repeat(jacobian[:, None], 3, axis=1), (jacobian @ x)[:, None] - picture)
+
+        errors.append(x - truth)
+        without.append(standard_deviations(covariance(rows(sampled), None, GAIN), GAIN))
+        coarser = (rows(halved), None)
+        stated.append(standard_deviations(covariance(rows(sampled), None, GAIN, coarser=coarser), GAIN))
+
+    def rms(values):
+        return np.sqrt(np.mean(np.square(values), axis=0))
+
+    assert (rms(np.array(errors) / without) > 2.5).all()
+    assert (rms(np.array(errors) / stated) < 2.0).all()
+    assert (rms(stated) < widest * rms(errors)).all()
