@@ -22,6 +22,10 @@ class ExportError(Exception):
         self.fixes = fixes
 
 
+class NotShownError(ExportError):
+    """A picture shows nothing of what is fitted."""
+
+
 @dataclass
 class Findings:
     """Errors (the fit would be wrong) and notes (ignored or approximated), each sentence once, in order.

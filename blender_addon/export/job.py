@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from .files.job_folder import MORE_PICTURES, new_job_folder, share_files
-from .findings import ExportError, Findings
+from .findings import ExportError, Findings, NotShownError
 from .fitted_slot import FittedSlot, check_slots
 from .leaves_by_pictures import leaves_by_pictures
 from .materials.wanted_values import fits_of_each, wanted_values
@@ -29,6 +29,7 @@ MOVING_VALUES = (
     "Picture {label}: the material has other values at its frame; the fit looks for one set for all pictures."
 )
 READING = "Picture {} of {}"
+LEFT_OUT = "A picture was left out, for it shows nothing of what is fitted. {why}"
 
 __all__ = ["ExportError", "ExportReport", "check_export", "export_findings", "export_job", "export_steps"]
 
@@ -59,7 +60,8 @@ def export_job(
     With `targets` the materials of those slots are fitted together instead. `reference` is one picture of the scene as
     it is, or pictures with what each of them shows. `reference_view` says how a display picture was made: "scene",
     rendered in this scene, or "standard", a photograph or a render under Standard. `upright` turns a picture as its
-    EXIF data say. `tell` gets the share that is done, of work that a million triangles make some seconds long.
+    EXIF data say. Pictures that show nothing of what is fitted are left out, as long as another one does. `tell` gets
+    the share that is done, of work that a million triangles make some seconds long.
 
     Raises
     ------
@@ -112,15 +114,17 @@ def _several(
     if count > 1:  # what is named wrongly is so in all of them
         check_slots(targets)
         _check_names(obj, fit, targets)
-    first: PartialExport | None = None
+    exported: list[PartialExport] = []
     notes: list[str] = []
+    left_out: list[NotShownError] = []
     unseen = set(range(len(targets)))
     leaves: Sequence[str | None] | None = None
     if count > 1 and targets:
         leaves = yield from leaves_by_pictures(context, obj, pictures, fit, targets)
     with new_job_folder(Path(folder)) as partial:
-        paths = ["", *(f"{MORE_PICTURES}/{setup.number}" for setup in pictures[1:])]
-        for done, (setup, path) in enumerate(zip(pictures, paths, strict=True)):
+        paths: list[str] = []  # of all but the first
+        for done, setup in enumerate(pictures):
+            path = f"{MORE_PICTURES}/{setup.number}" if exported else ""
             here = partial / path
             here.mkdir(parents=True, exist_ok=True)
             steps = _one_of_several(
@@ -132,31 +136,44 @@ def _several(
                 reference_view,
                 upright,
                 several=count > 1,
-                is_first=first is None,
+                is_first=not exported,
                 leaves=leaves,
                 targets=targets,
             )
             show = functools.partial(shown, context, setup, obj, own_size=count > 1)
-            with named(setup, count):
-                part = yield from held(steps, show, READING.format(done + 1, count), done / count)
+            try:
+                with named(setup, count):
+                    part = yield from held(steps, show, READING.format(done + 1, count), done / count)
+            except NotShownError as error:
+                left_out.append(error)
+                if path:
+                    here.rmdir()
+                continue
             leaves, unseen = part.leaves, unseen & part.unseen
-            if first is None:
-                first, notes = part, list(part.findings.notes)
-                first.request["more_pictures"] = paths[1:]
+            if not exported:
+                notes = list(part.findings.notes)
             else:
+                paths.append(path)
                 notes += [f"Picture {setup.label}: {note}" for note in part.findings.notes if note not in notes]
-                if _moves(first.values, part.values):
+                if _moves(exported[0].values, part.values):
                     notes.append(MOVING_VALUES.format(label=setup.label))
                     part.request["notes"].append(MOVING_VALUES.format(label=setup.label))
                 part.write_request(here)
                 share_files(partial, here)
+            exported.append(part)
             tell((done + 1) / count)
+        if not exported:
+            raise left_out[0]
         for number in sorted(unseen):
             each = targets[number]
             assert each.material is not None  # it was read
             raise ExportError(NOWHERE.format(material=each.material.name, obj=each.object.name))
-        assert first is not None
+        first = exported[0]
+        said = [LEFT_OUT.format(why=error) for error in left_out]
+        first.request["notes"] += said
+        first.request["more_pictures"] = paths
         first.write_request(partial)
+        notes += said
     return ExportReport(Path(folder), first.request, tuple(notes))
 
 

@@ -17,7 +17,7 @@ from ..result.local_copy import unwritable
 from ..versions import PRINCIPLED
 from .camera.render_region import pictured_region, region_parts
 from .files.job_folder import TARGETS, link_files
-from .findings import ExportError, Findings
+from .findings import ExportError, Findings, NotShownError
 from .fitted_slot import FittedSlot, check_slots
 from .material_model import Material
 from .materials.chosen_leaves import chosen_mix_values, name_shares, with_mix_values
@@ -35,6 +35,7 @@ from .scene.read_scene import finish_scene, read_scene
 from .scene.scene_bakes import SceneBakes
 from .scene.scene_data import SceneData, target_bsdf
 from .scene.scene_file import scene_files
+from .scene.visibility import OUTSIDE
 from .steps import Pause, Steps
 
 MITSUBA = "mitsuba_principled"
@@ -92,13 +93,19 @@ def partial_export(
 
     `several` says that it is one of several pictures, and `is_first` that it is the first of them; `leaves` are the
     fitted ones of mixes where they are known, and `targets` slots whose materials are fitted together.
+
+    Raises
+    ------
+    NotShownError
+        If it is one of several pictures and shows nothing of what is fitted.
+    ExportError
+        If the scene or the reference cannot be used.
     """
     findings = Findings(of_mitsuba=fit.get("model") == MITSUBA)
     fitted = list(targets) or ([FittedSlot.active(obj)] if obj is not None else [])
     check_slots(fitted)
     asked = fits_of_each(fitted, fit, several=bool(targets))
     wanted = [wanted_values(each, own, findings) for each, own in zip(fitted, asked, strict=True)]
-    may_miss = bool(targets) and several  # one of the materials, in this picture
     size = size_of(reference, upright=upright)
     region = pictured_region(context.scene.render, size)
     with probe_for(fitted, always=any(each.values for each in wanted)) as probe:
@@ -108,7 +115,7 @@ def partial_export(
             found: list[str | None] = []
             for each in fitted:
                 if probe is not None and by_share:
-                    found.append((yield from largest_leaf(probe, context, each, region=region)))
+                    found.append((yield from largest_leaf(probe, context, each, may_miss=several, region=region)))
                 else:
                     found.append(each.leaf)
             leaves = found
@@ -119,10 +126,12 @@ def partial_export(
             fitted = [replace(each, leaf=own) for each, own in zip(fitted, leaves, strict=True)]
             leaf = leaves[0] if leaves else None
             together = fitted if targets else ()
-            data = read_scene(context, obj, findings, bakes, leaf, together, may_miss=may_miss, picture=size)
+            data = read_scene(context, obj, findings, bakes, leaf, together, may_miss=several, picture=size)
             findings.raise_first()
             assert data is not None
             assert obj is not None
+            if len(data.unseen) == len(fitted):
+                raise NotShownError(data.unseen[0])
             fits = []
             for number, each in enumerate(fitted):
                 fits.append(_read_values(data, context, each, number, wanted[number], findings))
@@ -149,12 +158,14 @@ def partial_export(
             described = data.materials[target_bsdf(number)]
             if probe is not None and (described.asks_graph or wanted[number].values):
                 described, graphs[number] = yield from evaluate_graph(
-                    probe, context, each, described, number, may_miss=may_miss, region=region, origin=data.origin
+                    probe, context, each, described, number, may_miss=several, region=region, origin=data.origin
                 )
                 data.materials[target_bsdf(number)] = described
                 (unseen.add if graphs[number] is None else unseen.discard)(number)  # Cycles knows better than rays
             if number not in unseen:
                 name_shares(described, findings)
+        if len(unseen) == len(fitted):
+            raise NotShownError(OUTSIDE.format(obj=fitted[0].object.name))
         files = scene_files(data, findings)
         yield Pause()
         tell(0.5)

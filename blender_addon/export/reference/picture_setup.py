@@ -130,7 +130,7 @@ def named(setup: PictureSetup, count: int) -> Iterator[None]:
     except ExportError as error:
         if count == 1:
             raise
-        raise ExportError(f"Picture {setup.label}: {error}", *error.fixes) from error
+        raise type(error)(f"Picture {setup.label}: {error}", *error.fixes) from error
 
 
 def check_setups(setups: Sequence[PictureSetup]) -> None:

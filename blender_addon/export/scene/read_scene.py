@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain
 
 import bpy
 import numpy as np
@@ -123,16 +122,13 @@ def read_scene(
             return None
         walk.note_coincident_faces()
         walk.note_bent_normals(there)
-        unseen: dict[int, list[str]] = {}
         for number, (each, shape) in enumerate(there):
             of_one = Findings()
             check_visible(data, shape, each.object, each.slot, scene, depsgraph, of_one)
             if of_one.errors:
-                unseen[number] = of_one.errors
-        data.unseen.update(unseen)
-        if not may_miss or len(unseen) == len(there):
-            for sentence in chain(*unseen.values()):
-                findings.error(sentence)
+                data.unseen[number] = of_one.errors[0]
+                if not may_miss:
+                    findings.error(of_one.errors[0], *of_one.fixes[of_one.errors[0]])
     return data
 
 

@@ -83,7 +83,8 @@ class SceneData:
     materials: dict[str, Material] = field(default_factory=dict)
     target_count: int = 1
     origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    unseen: set[int] = field(default_factory=set)  # numbers of fitted materials that no ray of the camera was found for
+    # why no ray of the camera was found for a fitted material, by its number
+    unseen: dict[int, str] = field(default_factory=dict)
 
     @property
     def target(self) -> Shape | None:

@@ -14,6 +14,7 @@ from .scene_data import SceneData, Shape
 
 # rays towards as many points of the target are tried before it counts as hidden
 PROBES = 2000
+OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 
 
 def check_visible(
@@ -35,7 +36,7 @@ def check_visible(
         corners, corner_depths = camera.project(shape.mesh.positions.astype(np.float64))
         behind = (corner_depths < camera.clip_start).all() or (corner_depths > camera.clip_end).all()
         if behind or camera.beside(corners):
-            findings.error(f"The camera does not see '{target.name}': move it into the frame.", *_whole_frame(camera))
+            findings.error(OUTSIDE.format(obj=target.name), *_whole_frame(camera))
         return
     seen = points[inside]
     seen = seen[np.linspace(0, len(seen) - 1, min(len(seen), PROBES)).astype(int)]

@@ -97,6 +97,7 @@ FIT = {
     "Picture {} was made under another view transform than the first display picture: give all pictures of one fit as EXR, or render them under one view.": "L'image {} a été faite sous une autre transformation de vue que la première image d'affichage : donner toutes les images d'un ajustement en EXR, ou les rendre sous une seule vue.",
     "Several pictures are fitted together on recorded light paths only: leave out all pictures but one, or choose the preset 'paper'.": "Plusieurs images ne sont ajustées ensemble que sur des chemins de lumière enregistrés : omettre toutes les images sauf une, ou choisir le préréglage 'paper'.",
     "Picture {} is picture {} again, with the same scene: it was left out.": "L'image {} est de nouveau l'image {}, avec la même scène : elle a été omise.",
+    "A picture was left out, for it shows nothing of what is fitted. {}": "Une image a été omise, car elle ne montre rien de ce qui est ajusté. {}",
     "Pictures {} and {} are the same, but their scenes differ: one of them has a wrong file.": "Les images {} et {} sont les mêmes, mais leurs scènes diffèrent : l'une d'elles a un mauvais fichier.",
     "All pictures are the same one in the same scene: give one, or pictures that differ.": "Toutes les images sont la même dans la même scène : en donner une, ou des images qui diffèrent.",
     # ways to fit

@@ -97,6 +97,7 @@ FIT = {
     "Picture {} was made under another view transform than the first display picture: give all pictures of one fit as EXR, or render them under one view.": "Bild {} entstand unter einer anderen Ansichtstransformation als das erste Anzeigebild: alle Bilder einer Anpassung als EXR geben oder unter einer Ansicht rendern.",
     "Several pictures are fitted together on recorded light paths only: leave out all pictures but one, or choose the preset 'paper'.": "Mehrere Bilder werden nur auf aufgezeichneten Lichtpfaden zusammen angepasst: alle bis auf eines weglassen, oder die Voreinstellung 'paper' wählen.",
     "Picture {} is picture {} again, with the same scene: it was left out.": "Bild {} ist noch einmal Bild {}, mit derselben Szene: es wurde weggelassen.",
+    "A picture was left out, for it shows nothing of what is fitted. {}": "Ein Bild wurde weggelassen, denn es zeigt nichts von dem, was angepasst wird. {}",
     "Pictures {} and {} are the same, but their scenes differ: one of them has a wrong file.": "Bilder {} und {} sind gleich, aber ihre Szenen nicht: eines davon hat eine falsche Datei.",
     "All pictures are the same one in the same scene: give one, or pictures that differ.": "Alle Bilder sind dasselbe in derselben Szene: eines geben, oder verschiedene Bilder.",
     # ways to fit

@@ -148,7 +148,8 @@ def halved(flat: np.ndarray) -> np.ndarray:
     """Means of two by two subpixels of a picture of 4 x 4 subpixels a pixel, square but for its last row."""
     side = int(np.sqrt(len(flat) - 1))
     blocks = flat[:-1].reshape(side // 2, 2, side // 2, 2, -1)
-    return np.concatenate([blocks.mean(axis=(1, 3)).repeat(2, axis=0).repeat(2, axis=1).reshape(flat[:-1].shape), flat[-1:]])
+    means = blocks.mean(axis=(1, 3)).repeat(2, axis=0).repeat(2, axis=1)
+    return np.concatenate([means.reshape(flat[:-1].shape), flat[-1:]])
 
 
 def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from blender_addon.export.files.exr_file import write_exr
-from blender_addon.export.job import MOVING_VALUES, ExportError, export_job
+from blender_addon.export.job import LEFT_OUT, MOVING_VALUES, ExportError, export_job
 from blender_addon.export.reference.picture_setup import PictureSetup
 from tests.export.scenes import add_camera, add_light, add_quad, new_material
 from tests.export.test_untouched import describe
@@ -112,10 +112,25 @@ def test_what_the_file_does_not_have_is_refused_and_nothing_is_left(turning, tmp
     assert not (tmp_path / "job").exists()
 
 
-def test_a_camera_that_looks_away_is_refused_before_the_fit(turning, tmp_path):
+def test_a_camera_that_looks_away_is_left_out_with_a_sentence(turning, tmp_path):
     bpy.data.objects["Side"].rotation_euler[0] = 3.0
-    with pytest.raises(ExportError, match=r"Picture 2 \(side.exr\): .*camera"):
+    why = "Picture 2 (side.exr): The camera does not see 'Plane': move it into the frame."
+    for pictures in (setups(tmp_path), setups(tmp_path)[::-1]):  # the first one may be it, too
+        report = export(turning, tmp_path, pictures)
+        assert LEFT_OUT.format(why=why) in report.notes
+        written = json.loads((tmp_path / "job" / "request.json").read_text("utf-8"))
+        assert LEFT_OUT.format(why=why) in written["notes"]
+        assert (written["picture"]["number"], written["more_pictures"]) == (1, [])
+        assert (written["image"]["width"], written["image"]["height"]) == (32, 32)
+        assert not (tmp_path / "job" / "more_pictures" / "2").exists()
+
+
+def test_cameras_that_all_look_away_are_refused_before_the_fit(turning, tmp_path):
+    for camera in ("Front", "Side"):
+        bpy.data.objects[camera].rotation_euler[0] = 3.0
+    with pytest.raises(ExportError, match=r"Picture 1 \(front.exr\): .*camera"):
         export(turning, tmp_path, setups(tmp_path))
+    assert not (tmp_path / "job").exists()
 
 
 def test_values_inside_nodes_are_seen_by_each_picture(turning, tmp_path):
