@@ -259,3 +259,19 @@ def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(tmp_p
     written = json.loads((tmp_path / "read.json").read_text("utf-8"))
     for found in (floor, wall):
         assert written[found["object"]] == pytest.approx(found["recovered"]["base_color"], abs=1e-5)
+
+
+def test_one_material_is_fitted_to_the_pictures_that_show_it(corner: Path, tmp_path: Path) -> None:
+    """The first of two pictures shows nothing of the wall."""
+    done = run_mfo(
+        "blend", corner / "start.blend", "--object", "Wall", "--parameters", "base_color", "--preset", "fast",
+        "--reference", f"{corner / 'side.exr'}@camera=Side", "--reference", f"{corner / 'reference.exr'}@camera=Camera",
+        "--out", tmp_path / "job", "--json",
+    )  # fmt: skip
+    assert done.code in (0, 5), done.stderr  # the floor beside it is that of the start
+    said = [note for note in done.answer["notes"] if "was left out" in note]
+    assert said == [
+        "A picture was left out, for it shows nothing of what is fitted. Picture 1 (side.exr): The camera does not see "
+        "'Wall': move it into the frame."
+    ]
+    assert json.loads((tmp_path / "job" / "request.json").read_text("utf-8"))["picture"]["number"] == 2

@@ -154,7 +154,8 @@ class Recording:
         residual = make(groups.average(setting.calm if calm else setting.reference))
         if setting.clipped is not None:
             residual = OneSidedResidual(residual, groups.average(setting.clipped) > 0)
-        return Problem(self._evaluator(groups), residual, groups, near, setting.scene.coarser(self.paths, groups))
+        coarser = setting.scene.evaluator(self.paths, groups, coarser=True) if setting.scene.graph is not None else None
+        return Problem(self._evaluator(groups), residual, groups, near, coarser)
 
     def _evaluator(self, groups: LaneGroups) -> RecordedImage:
         if groups in self._evaluators:

@@ -282,14 +282,12 @@ class RecordedScene:
 
         It remembers two: solutions are compared in pairs.
         """
-        constant = groups.average(paths.constant)
-        apart = paths.constant_difference
-        difference = None if apart is None else groups.average(apart)
+        constant = _constant(paths, groups)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.counter.add(cost)
-            return TwoSamples.of(self._image(vector, lanes, groups), constant, difference)
+            return TwoSamples.of(self._image(vector, lanes, groups), *constant)
 
         return RecordedImage(at, 2)
 
@@ -312,38 +310,24 @@ class RecordedScene:
         table = self.renderer.table
         return RecordedJacobian(self.model, table, self._fixed, varying=self._evaluated, derivatives=False)
 
-    def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
-        """The function from a vector to image and Jacobian of the groups, background included."""
-        constant = groups.average(paths.constant)
-        apart = paths.constant_difference
-        difference = None if apart is None else groups.average(apart)
+    def evaluator(
+        self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1, *, coarser: bool = False
+    ) -> RecordedImage:
+        """The function from a vector to image and Jacobian of the groups, background included.
+
+        With `coarser` by pictures of half the fineness of what a graph gives.
+        """
+        constant = _constant(paths, groups)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         cost = with_derivatives(self._share(groups), self.renderer.table.length)
+        varying = self._evaluated if coarser else None
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
-            samples = self.jacobian(vector, lanes(), groups)
+            samples = self.jacobian(vector, lanes(), groups, varying and varying.coarser_arrays(vector))
             self.renderer.counter.add(cost)
-            return TwoSamples.of(samples, constant, difference)
+            return TwoSamples.of(samples, *constant)
 
         return RecordedImage(at, recalled)
-
-    def coarser(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage | None:
-        """As `evaluator`, by pictures of half the fineness of what a graph gives; None without free values in one."""
-        varying = self._evaluated
-        if varying is None:
-            return None
-        constant = groups.average(paths.constant)
-        apart = paths.constant_difference
-        difference = None if apart is None else groups.average(apart)
-        lanes = Lanes.as_recorded(paths, groups, self._held)
-        cost = with_derivatives(self._share(groups), self.renderer.table.length)
-
-        def at(vector: NDArray[np.float64]) -> TwoSamples:
-            samples = self.jacobian(vector, lanes, groups, varying.coarser_arrays(vector))
-            self.renderer.counter.add(cost)
-            return TwoSamples.of(samples, constant, difference)
-
-        return RecordedImage(at)
 
     def _share(self, groups: LaneGroups) -> float:
         """The share of the pixels that see the target in the groups: what an evaluation costs, in passes."""
@@ -364,6 +348,12 @@ class RecordedScene:
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
+
+
+def _constant(paths: RecordedPaths, groups: LaneGroups) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    """The part of the image of the groups that no value changes, and half the difference of two samples of it."""
+    apart = paths.constant_difference
+    return groups.average(paths.constant), None if apart is None else groups.average(apart)
 
 
 def _rays(squares: NDArray[np.int64], stride: int) -> int:

@@ -118,13 +118,11 @@ class RecordedSheet:
         """See `RecordedScene.pictures`."""
         return self._scenes[0].pictures(paths, groups)
 
-    def coarser(self, paths: RecordedPaths, groups: LaneGroups) -> RecordedImage | None:
-        """See `RecordedScene.coarser`."""
-        return self._scenes[0].coarser(paths, groups)
-
-    def evaluator(self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1) -> RecordedImage:
+    def evaluator(
+        self, paths: RecordedPaths, groups: LaneGroups, recalled: int = 1, *, coarser: bool = False
+    ) -> RecordedImage:
         """See `RecordedScene.evaluator`."""
-        return self._scenes[0].evaluator(paths, groups, recalled)
+        return self._scenes[0].evaluator(paths, groups, recalled, coarser=coarser)
 
 
 def _on_rows(paths: RecordedPaths, begin: int) -> RecordedPaths:

@@ -126,8 +126,7 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     # what is path traced shows the same
     traced = renderer.image(there, seed=0, spp=64).reshape(-1, 3)[groups.pixels]
     assert abs(traced.mean() / truth.mean() - 1.0) < 0.01
-    coarser = recorded.coarser(paths, groups)
-    assert coarser is not None
+    coarser = recorded.evaluator(paths, groups, coarser=True)
     plain = {name: halved(flat) for name, flat in renderer.graph.state(there[1:]).pictures.items()}
     halved_image = recorded.images_of(paths, groups, there)(plain)
     np.testing.assert_allclose(coarser(there)[:, :, 0], halved_image, rtol=1e-4, atol=1e-5)
