@@ -108,7 +108,8 @@ _CAUSES = {
     Cause.CAMERA_OR_SHAPE: "The difference lies at edges: check the camera and the shape of the object.",
     Cause.LIGHT: "The surroundings of the object are lit differently, too: check lamps, world and exposure.",
     Cause.SURROUNDINGS: "Something around the object differs as well: check what is missing, hidden or moved.",
-    Cause.PICTURE: "Hardly anything around the object agrees: check world, lamps and whether it is this scene.",
+    Cause.PICTURE: "The outline of the object is hardly in the picture: check whether it shows this scene, and world "
+    "and lamps.",
     Cause.NOTED: "The notes name what the fit does not know of this scene; that may be the reason.",
     Cause.MATERIAL: "The surroundings match, the object does not: it may have a texture that the scene lacks, or be of "
     "another kind of material than the chosen values can make.",

@@ -14,7 +14,7 @@ PANEL = {
     "The difference lies at edges: check the camera and the shape of the object.": "La différence est sur les bords : vérifier la caméra et la forme de l'objet.",
     "The surroundings of the object are lit differently, too: check lamps, world and exposure.": "L'entourage de l'objet est éclairé autrement, lui aussi : vérifier les lampes, le monde et l'exposition.",
     "Something around the object differs as well: check what is missing, hidden or moved.": "Autour de l'objet quelque chose diffère aussi : vérifier ce qui manque, est caché ou déplacé.",
-    "Hardly anything around the object agrees: check world, lamps and whether it is this scene.": "Autour de l'objet presque rien ne concorde : vérifier le monde, les lampes, et si c'est bien cette scène.",
+    "The outline of the object is hardly in the picture: check whether it shows this scene, and world and lamps.": "Le contour de l'objet n'est guère dans l'image : vérifier si elle montre cette scène, et le monde et les lampes.",
     "The notes name what the fit does not know of this scene; that may be the reason.": "Les remarques nomment ce que l'ajustement ne connaît pas de cette scène ; c'est peut-être la raison.",
     "The surroundings match, the object does not: it may have a texture that the scene lacks, or be of another kind of material than the chosen values can make.": "L'entourage concorde, l'objet non : il a peut-être une texture qui manque à la scène, ou il est d'une autre sorte de matériau que n'en donnent les valeurs choisies.",
     "{} of the reference's pixels count ({}); the others have no part in the fit and its verdict.": "{} des pixels de la référence comptent ({}) ; les autres n'entrent ni dans l'ajustement ni dans son verdict.",

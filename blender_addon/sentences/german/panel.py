@@ -14,7 +14,7 @@ PANEL = {
     "The difference lies at edges: check the camera and the shape of the object.": "Der Unterschied liegt an Kanten: Kamera und Form des Objekts prüfen.",
     "The surroundings of the object are lit differently, too: check lamps, world and exposure.": "Auch die Umgebung des Objekts ist anders beleuchtet: Lampen, Welt und Belichtung prüfen.",
     "Something around the object differs as well: check what is missing, hidden or moved.": "Auch um das Objekt herum ist etwas anders: prüfen, was fehlt, verborgen oder verschoben ist.",
-    "Hardly anything around the object agrees: check world, lamps and whether it is this scene.": "Um das Objekt herum stimmt fast nichts überein: Welt und Lampen prüfen, und ob es diese Szene ist.",
+    "The outline of the object is hardly in the picture: check whether it shows this scene, and world and lamps.": "Der Umriss des Objekts ist kaum im Bild: prüfen, ob es diese Szene zeigt, und Welt und Lampen.",
     "The notes name what the fit does not know of this scene; that may be the reason.": "Die Hinweise nennen, was die Anpassung von dieser Szene nicht kennt; das kann der Grund sein.",
     "The surroundings match, the object does not: it may have a texture that the scene lacks, or be of another kind of material than the chosen values can make.": "Die Umgebung passt, das Objekt nicht: vielleicht hat es eine Textur, die der Szene fehlt, oder es ist von einer anderen Art Material, als die gewählten Werte ergeben können.",
     "{} of the reference's pixels count ({}); the others have no part in the fit and its verdict.": "{} der Pixel der Referenz zählen ({}); die anderen haben keinen Anteil an der Anpassung und ihrem Urteil.",

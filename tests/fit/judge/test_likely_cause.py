@@ -52,3 +52,47 @@ def test_a_moved_picture_is_the_cameras(step):
     whole = textured(np.ones((SIZE, SIZE), bool))
     smooth = sum(np.roll(whole, (i, j), (0, 1)) for i in range(5) for j in range(5)) / 25
     assert likely_cause(smooth, np.roll(smooth, step, 1), disc(20), None, noted=False) is Cause.CAMERA_OR_SHAPE
+
+
+def lit(mask, level=0.6, floor=0.3, turn=0.0):
+    """A disc on a floor that is lit from one side; `turn` turns the light."""
+    slope = (X * np.cos(turn) + Y * np.sin(turn)) / SIZE - 0.5 * (np.cos(turn) + np.sin(turn))
+    return np.repeat(np.where(mask, level, floor + 0.1 * slope)[..., None], 3, axis=2)
+
+
+def surroundings(reference, result, mask):
+    """Both pictures and what is beside the disc, pixels being blocks."""
+    return reference, result, ~mask
+
+
+def cause_of(reference, result, mask):
+    around = surroundings(reference, result, mask)
+    return likely_cause(reference, result, mask, around, noted=False)
+
+
+def test_another_object_before_the_same_floor_is_another_picture():
+    mask = disc(14)
+    ring = disc(30) & ~disc(22)
+    assert cause_of(lit(ring), lit(mask), mask) is Cause.PICTURE
+
+
+@pytest.mark.parametrize("contrast", [1.0, 0.25])
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_what_hides_an_outline_is_no_other_picture(noise, contrast):
+    """Fog takes contrast, few samples add noise, and a lamp from behind makes the object the darker one."""
+    mask, draw = disc(14), np.random.default_rng(2)
+    for level in (0.6, 0.02):
+        foggy = 0.5 + contrast * (lit(mask, level, turn=2.0) - 0.3)
+        assert cause_of(foggy + noise * draw.normal(size=foggy.shape), lit(mask), mask) is Cause.LIGHT
+
+
+def test_what_stands_before_the_silhouette_is_in_the_surroundings():
+    mask = disc(14)
+    reference = lit(mask)
+    reference[(np.hypot(X - 47, Y - 31.5) < 7)] = (0.8, 0.1, 0.1)
+    assert cause_of(reference, lit(mask), mask) is Cause.SURROUNDINGS
+
+
+def test_an_object_that_is_a_little_larger_is_the_shapes_where_the_surroundings_agree():
+    mask = disc(14)
+    assert likely_cause(lit(disc(13)), lit(mask), mask, None, noted=False) is Cause.CAMERA_OR_SHAPE
