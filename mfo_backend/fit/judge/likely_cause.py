@@ -27,6 +27,10 @@ AT_RIM, MORE_THAN_AREA = 0.6, 2.0
 OUTLINE, NO_OUTLINE = 3, 0.35
 CHANCE = 2.0  # standard deviations by which a slope may be larger in truth
 DIFFERS, MOSTLY = 0.03, 0.5  # display values; part of the surroundings
+# Part of the target that differs from which on it is lit otherwise, where surroundings differ, too: a material makes up
+# for little of a light from elsewhere, and misses little of what is beside it. Turned lamps and probes 0.52 and more of
+# six, missing objects 0.06 at most of three (docs/notebook/verdicts.md).
+ON_TARGET = 0.3
 
 Shown = NDArray[np.floating]
 Mask = NDArray[np.bool_]
@@ -51,7 +55,8 @@ def likely_cause(
         return Cause.CAMERA_OR_SHAPE
     if around is not None and not _has_outline(reference, result, mask):
         return Cause.PICTURE
-    if around is not None and _mostly_differs(*around):
+    on_target = _differing(*(_calm(picture)[..., None] for picture in (reference, result)), mask)
+    if around is not None and (_differing(*around) > MOSTLY or on_target > ON_TARGET):
         return Cause.LIGHT
     # what stands before the object or throws a shadow on it is at its silhouette, too, and moves nothing
     if _is_at_rim(reference, result, mask) and (around is None or shift.is_away):
@@ -61,8 +66,9 @@ def likely_cause(
     return Cause.NOTED if noted else Cause.MATERIAL
 
 
-def _mostly_differs(first: Shown, second: Shown, outside: Mask) -> bool:
-    return bool((np.abs(first - second)[outside].mean(axis=-1) > DIFFERS).mean() > MOSTLY)
+def _differing(first: Shown, second: Shown, chosen: Mask) -> float:
+    """Part of what is chosen where two pictures (height, width, channels) differ."""
+    return float((np.abs(first - second)[chosen].mean(axis=-1) > DIFFERS).mean())
 
 
 def _has_outline(reference: Shown, result: Shown, mask: Mask) -> bool:

@@ -150,10 +150,11 @@ def test_few_pixels_have_no_verdict():
         (scene(ball=0.9, floor=0.45), scene(), Cause.LIGHT),
         (scene(red=1.6), scene(red=1.0), Cause.LIGHT),
         (np.where(MASK[..., None], scene(ball=0.2), scene()), scene(), Cause.MATERIAL),
-        (np.where((COLUMNS > 78)[..., None], scene() * 0.2, scene(ball=0.4)), scene(), Cause.SURROUNDINGS),
+        (np.where((COLUMNS > 78)[..., None], scene() * 0.2, scene()), scene(), Cause.SURROUNDINGS),
+        (np.where((COLUMNS > 78)[..., None], scene() * 0.2, scene(ball=0.4)), scene(), Cause.LIGHT),
         (np.random.default_rng(0).uniform(0, 1, (SIZE, SIZE, 3)), scene(), Cause.PICTURE),
     ],
-    ids=["camera", "light", "tinted light", "material", "object beside it", "another picture"],
+    ids=["camera", "light", "tinted light", "material", "object beside it", "light of both", "another picture"],
 )
 def test_the_cause_is_where_the_pictures_differ(reference, result, cause):
     if cause is Cause.PICTURE:
