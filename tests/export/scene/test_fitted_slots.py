@@ -13,6 +13,7 @@ import pytest
 
 from blender_addon.export.findings import ExportError
 from blender_addon.export.fitted_slot import FittedSlot
+from blender_addon.export.job import LEFT_OUT
 from blender_addon.export.reference.picture_setup import PictureSetup
 from blender_addon.export.scene.seen_slots import seen_slots
 from mfo_backend.job.folder.job_folder import JobFolder
@@ -172,8 +173,17 @@ def test_a_material_in_none_of_the_pictures_is_refused_by_name(apart: dict[str, 
     said = "Material 'Wood' of 'Floor' is in none of the pictures"
     with pytest.raises(ExportError, match=re.escape(said)):
         export(apart["Floor"], targets=slots[:2], reference=pictures_from("Right", "Right"))
-    with pytest.raises(ExportError, match=re.escape("Picture 2 (Left): The camera does not see 'Floor'")):
+    said = "Material 'Unseen' of 'Away' is in none of the pictures"
+    with pytest.raises(ExportError, match=re.escape(said)):  # and the second picture shows none of the two
         export(apart["Floor"], targets=slots[1:], reference=pictures_from("Right", "Left"))
+
+
+def test_a_picture_that_shows_none_of_the_materials_is_left_out(apart: dict[str, Any], export: Any) -> None:
+    slots = [FittedSlot(apart["Floor"], 1)]
+    report = export(apart["Floor"], targets=slots, reference=pictures_from("Right", "Left"))
+    why = "Picture 2 (Left): The camera does not see 'Floor'"
+    assert [note for note in report.notes if note.startswith(LEFT_OUT.format(why=why))]
+    assert read_request(JobFolder.open(report.folder)).more_pictures == ()
 
 
 def test_what_is_named_wrongly_is_said_of_no_picture(apart: dict[str, Any], export: Any) -> None:
