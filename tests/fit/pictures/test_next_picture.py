@@ -121,3 +121,18 @@ def test_what_chance_favours_is_looked_at_again(monkeypatch):
     found = next_picture.next_picture(scene, known, SimpleNamespace(), 0)
     assert found is not None
     assert found.turn == 90.0
+
+
+def test_a_recording_that_promises_too_much_is_one_of_several(monkeypatch):
+    """Of three recordings of the same candidate one met a narrow lobe: the geometric mean of all is what is said."""
+    table, told = TABLE, iter([0.05, 0.02, 0.02, 0.16])  # the first is the look at all candidates
+    turned = Choice(turn=90.0)
+    monkeypatch.setattr(next_picture, "_told", lambda *_, **__: iter(()))
+    monkeypatch.setattr(next_picture, "predictions", lambda *_: {turned: np.array([0.02, next(told)])})
+    monkeypatch.setattr(next_picture, "target_center", lambda shape: np.zeros(3))
+    scene = SimpleNamespace(renderer=SimpleNamespace(table=table, shape=None, counter=PassCounter()))
+    known = Known(np.full(2, 0.5), np.eye(2), ("coat_weight",), Evidence(np.zeros((1, 3, 3)), None, 0.0, 1))
+    found = next_picture.next_picture(scene, known, SimpleNamespace(), 0)
+    assert found is not None
+    width = table["coat_weight"].upper - table["coat_weight"].lower
+    assert found.predicted["coat_weight"] == pytest.approx(0.04 * width)
