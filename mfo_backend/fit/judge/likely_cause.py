@@ -55,7 +55,7 @@ def likely_cause(
         return Cause.CAMERA_OR_SHAPE
     if around is not None and not _has_outline(reference, result, mask):
         return Cause.PICTURE
-    on_target = _differing(*(_calm(picture)[..., None] for picture in (reference, result)), mask)
+    on_target = _differing(_calm(reference)[..., None], _calm(result)[..., None], mask)
     if around is not None and (_differing(*around) > MOSTLY or on_target > ON_TARGET):
         return Cause.LIGHT
     # what stands before the object or throws a shadow on it is at its silhouette, too, and moves nothing
