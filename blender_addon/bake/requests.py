@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the second Blender renders and bakes when it is asked: worlds, surfaces and displaced meshes. Painted images are
-put back before."""
+"""What the second Blender renders and bakes when it is asked: worlds, surfaces, displaced meshes and lamps. Painted
+images are put back before."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ..export.render_state import render_state
 from .bake_cache import cached
 from .bake_key import surface_key, world_key
 from .displaced import displaced_corners
+from .lamp import lamp_table
 from .panorama import world_panoramas
 from .surface import baked_surface
 
@@ -50,6 +51,14 @@ def displaced(request: Mapping[str, Any]) -> Mapping[str, Any]:
     with _shown(scene, request["view_layer"]):
         place = Path(request["folder"])
         return _of_instance(request["instance"], lambda one, graph: displaced_corners(scene, one, graph, place))
+
+
+def lamp(request: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Measure what the nodes of the lamp of `instance` do, into `folder`; see `lamp_table`."""
+    scene = bpy.data.scenes[request["scene"]]
+    with _shown(scene, request["view_layer"]):
+        place = Path(request["folder"])
+        return _of_instance(request["instance"], lambda one, _: lamp_table(scene, one, request["asked"], place))
 
 
 def paint(request: Mapping[str, Any]) -> Mapping[str, Any]:

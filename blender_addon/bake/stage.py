@@ -32,12 +32,12 @@ def staged(
     before, view_layer, name = window.scene, window.view_layer, original.name
     try:
         item.matrix_world = matrix
-        _copy_what_nodes_ask_for(original, item, mesh)
+        copy_what_nodes_ask_for(original, item, mesh)
         stage.collection.objects.link(item)
         stage.camera = scene.camera
         copy_properties((scene.world, scene, view_layer), stage)
         stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-        _set_up(stage, scene)
+        set_up(stage, scene)
         window.scene = stage
         yield Stage(stage, item)
     finally:
@@ -75,9 +75,12 @@ def copy_properties(owners: Iterable[bpy.types.ID | bpy.types.ViewLayer | None],
                 into[key] = owner[key]
 
 
-def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Generated coordinates, Object Info and attributes of the object."""
-    if hasattr(original.data, "texspace_location"):
+def copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh | None) -> None:
+    """Give `item` generated coordinates (if it has a `mesh`), Object Info and attributes of the object.
+
+    Its name becomes that of the original, which is to get it back.
+    """
+    if mesh is not None and hasattr(original.data, "texspace_location"):
         mesh.use_auto_texspace = False
         mesh.texspace_location = original.data.texspace_location
         mesh.texspace_size = original.data.texspace_size
@@ -88,7 +91,8 @@ def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object,
     item.name = name
 
 
-def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+def set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+    """Let Cycles bake in `stage` as it renders `scene`."""
     stage.render.engine = "CYCLES"
     stage.cycles.device, stage.cycles.shading_system = "CPU", scene.cycles.shading_system
     stage.cycles.use_adaptive_sampling = False

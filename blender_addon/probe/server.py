@@ -29,6 +29,7 @@ COMMANDS = {
     "values": ("probe.value_pictures", "answer"),
     "world": ("bake.requests", "world"),
     "displaced": ("bake.requests", "displaced"),
+    "lamp": ("bake.requests", "lamp"),
     "surfaces": ("bake.requests", "surfaces"),
     "paint": ("bake.requests", "paint"),
 }

@@ -6,6 +6,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from . import lamp_nodes
+from .lamp_nodes import Nodes
+
 SIZE = 32  # pixels along each side
 TILTED = {"location": (0.3, -0.2, 2.0), "rotation": (0.15, 0.1, 0.5)}
 _WIDE = {"energy": 100, "shape": "RECTANGLE", "size": 1.0, "size_y": 0.6, **TILTED}
@@ -79,7 +82,39 @@ SHINY: dict[str, Lights] = {
         ("SUN", {"energy": 0.5, "angle": 0.1, "rotation": (-0.1, 0.1, 0)}),
     ],
 }
-FLOORS = {"matt": MATT, "shiny": SHINY}
+_POINT = {"energy": 100, "shadow_soft_size": 0.2, **TILTED}
+_SPOT = {"energy": 300, "shadow_soft_size": 0.05, "spot_size": 0.9, "spot_blend": 0.2, **TILTED}
+NODES: dict[str, Lights] = {
+    "blackbody, point": [("POINT", {**_POINT, "nodes": lamp_nodes.blackbody})],
+    "blackbody, sun": [("SUN", {"energy": 3, "angle": 0.1, "rotation": (0.4, 0.3, 0.2), "nodes": lamp_nodes.blackbody})],
+    "blackbody, area": [("AREA", {**_ROUND, "nodes": lamp_nodes.blackbody})],
+    **{
+        f"{output} falloff, {kind}": [(kind.upper(), {**values, "nodes": lamp_nodes.falloff(output, smooth)})]
+        for output, smooth in (("Quadratic", 1.0), ("Linear", 0.0), ("Constant", 0.5))
+        for kind, values in (("point", _POINT), ("area", {**_WIDE, "spread": 2.0}))
+    },
+    "Linear falloff, spot, radius 0": [("SPOT", {**_SPOT, "shadow_soft_size": 0, "nodes": lamp_nodes.falloff("Linear", 0)})],
+    "ray length, point": [("POINT", {**_POINT, "nodes": lamp_nodes.ray_length})],
+    **{
+        f"IES, {kind}, radius {radius}": [(kind.upper(), {**_SPOT, "shadow_soft_size": radius, "nodes": lamp_nodes.ies})]
+        for kind in ("point", "spot")
+        for radius in (0.0, 0.05)
+    },
+    "IES, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.ies})],
+    "IES, scaled point": [("POINT", {**_POINT, "scale": (0.5, 1.5, 1), "nodes": lamp_nodes.ies})],
+    **{f"gobo by {c}, spot": [("SPOT", {**_SPOT, "nodes": lamp_nodes.gobo(c)})] for c in ("Normal", "UV")},
+    "gobo by Normal, deformed spot": [
+        ("SPOT", {**_SPOT, "use_soft_falloff": False, "scale": (0.5, 1.5, 1), "nodes": lamp_nodes.gobo("Normal")})
+    ],
+    "gobo by UV, point": [("POINT", {**_POINT, "nodes": lamp_nodes.gobo("UV")})],
+    "blinds, point, sphere": [("POINT", {**_POINT, "use_soft_falloff": False, "nodes": lamp_nodes.blinds})],
+    "softbox, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.softbox})],
+    "softbox, ellipse, spread 90°": [("AREA", {**_ROUND, "spread": 1.57, "nodes": lamp_nodes.softbox})],
+    "gobo by UV, area, spread 0°": [("AREA", {**_WIDE, "spread": 0.0, "nodes": lamp_nodes.gobo("UV")})],
+    "checks by Object, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.by_place})],
+}
+SHINY |= {f"nodes: {name}": NODES[name] for name in ("IES, area", "softbox, area", "blinds, point, sphere")}
+FLOORS = {"matt": MATT, "nodes": NODES, "shiny": SHINY}
 
 
 def build(floor: str, lights: Lights) -> Any:
@@ -103,8 +138,8 @@ def build(floor: str, lights: Lights) -> Any:
     cycles.max_bounces = 0
     data = bpy.data.cameras.new("Camera")
     camera = bpy.data.objects.new("Camera", data)
-    camera.location = (0, 0, 5 if floor == "matt" else 3)
-    if floor == "matt":
+    camera.location = (0, 0, 3 if floor == "shiny" else 5)
+    if floor != "shiny":
         data.type, data.ortho_scale = "ORTHO", 2.0
     else:
         data.sensor_width, data.lens = 36, 108
@@ -120,7 +155,12 @@ def build(floor: str, lights: Lights) -> Any:
 
 
 def add_light(
-    kind: str, location: Any = (0, 0, 3), rotation: Any = (0, 0, 0), scale: Any = (1, 1, 1), **settings: Any
+    kind: str,
+    location: Any = (0, 0, 3),
+    rotation: Any = (0, 0, 0),
+    scale: Any = (1, 1, 1),
+    nodes: Nodes | None = None,
+    **settings: Any,
 ) -> Any:
     """Add a light; without rotation it shines down."""
     import bpy
@@ -128,6 +168,10 @@ def add_light(
     data = bpy.data.lights.new("Light", kind)
     for name, value in settings.items():
         setattr(data, name, value)
+    if nodes is not None:
+        data.use_nodes = True
+        tree = data.node_tree
+        nodes(tree, tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node)
     item = bpy.data.objects.new("Light", data)
     item.location, item.rotation_euler, item.scale = location, rotation, scale
     bpy.context.scene.collection.objects.link(item)

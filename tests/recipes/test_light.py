@@ -28,7 +28,7 @@ def test_a_new_light_goes_from_blender_to_the_floor(tmp_path: Path) -> None:
         lamp.location.z = 3.0
         bpy.context.view_layer.update()
         light = read_light(lamp, np.array(lamp.matrix_world), 1.0, Findings())
-        element = ElementTree.fromstring(ElementTree.tostring(light_element(light, "ring"), "unicode"))
+        element = ElementTree.fromstring(ElementTree.tostring(light_element(light, "ring", str), "unicode"))
 
         from mfo_backend.render.machine.plugins import check_plugins
         from mfo_backend.render.machine.variant import load_variant

@@ -8,12 +8,13 @@ Mitsuba has an equal for point lights of no extent and for suns of no angle. All
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files.xml_scene import Element, add, boolean, plugin, rgb, scalar, transform
+from ..files.xml_scene import Element, add, bitmap, boolean, integer, plugin, rgb, scalar, string, transform
 from .light_model import Light, Vector, area_radiance, point_intensity, sphere_radiance, sun_irradiance, sun_radiance
 
 # Blender's spot, sun and area shine along local -Z, Mitsuba's along +Z
@@ -22,15 +23,28 @@ TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 NARROW_SUN = math.radians(0.01)
 
 
-def light_element(light: Light, identifier: str) -> Element:
-    """Return the emitter for `light`."""
+def light_element(light: Light, identifier: str, save: Callable[[NDArray[np.float32]], str]) -> Element:
+    """Return the emitter for `light`; `save` keeps a picture and returns its path."""
     element = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[light.kind](light, identifier)
+    _add_tables(element, light, save)
     return element if light.shadow else add(element, boolean("shadow", False))
 
 
+def _add_tables(element: Element, light: Light, save: Callable[[NDArray[np.float32]], str]) -> None:
+    """Add what the light's nodes make of it."""
+    if light.pattern is not None:
+        height, width = light.pattern.pixels.shape[:2]
+        add(element, bitmap("pattern", save(light.pattern.pixels), extension="clamp"))
+        add(element, string("pattern_by", light.pattern.by), scalar("pattern_rim", light.pattern.rim))
+        add(element, integer("pattern_halves", width // height))
+    if light.falloff is not None:
+        add(element, bitmap("falloff", save(light.falloff), extension="clamp"))
+
+
 def _point(light: Light, identifier: str) -> Element:
-    place = transform("to_world", _translation(light.position))
-    if light.radius <= 0.0 and not light.shadow:
+    shaped = light.pattern is not None or light.falloff is not None
+    place = transform("to_world", light.world @ TURN if shaped else _translation(light.position))
+    if light.radius <= 0.0 and (shaped or not light.shadow):
         return _sharp_spot(light, identifier, place, 360.0)
     if light.radius <= 0.0:
         return add(plugin("emitter", "point", identifier), place, rgb("intensity", point_intensity(light)))

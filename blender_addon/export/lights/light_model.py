@@ -7,10 +7,12 @@ Formulas: measured on renders of Cycles 5.0; P is power (sun: strength) times 2^
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .lamp_pattern import Lookup, Pattern, falloff_at
 
 Vector = NDArray[np.float64]
 
@@ -36,6 +38,9 @@ class Light:
     spread: float = math.pi
     camera: bool = False  # whether the camera sees it
     shadow: bool = True  # whether anything blocks its light
+    nodes: Lookup | None = None  # what is still to be measured
+    pattern: Pattern | None = None
+    falloff: NDArray[np.float32] | None = None  # factors by distance, (1, STEPS, 3)
 
     @property
     def position(self) -> Vector:
@@ -92,6 +97,8 @@ def irradiance_at(light: Light, point: Vector) -> float:
     if light.kind == "SUN":
         return float(sun_irradiance(light).mean())
     square = max(float(np.sum((light.position - point) ** 2)), 1e-6)
+    if light.falloff is not None:
+        light = replace(light, color=light.color * falloff_at(light.falloff, math.sqrt(square)), falloff=None)
     if light.kind == "AREA":
         return float(area_radiance(light).mean()) * area_of(light) / (square + area_of(light))
     if light.radius > 0.0:

@@ -12,7 +12,10 @@ from ..audit.object_table import LIGHT_CYCLES
 from ..audit.rules import name_settings
 from ..findings import Findings
 from ..images.color_space import to_rec709
+from ..nodes.graph_findings import note_missing_pictures
 from ..nodes.shader_graph import emission_of
+from .lamp_nodes import LampNodesError, lookup_of
+from .lamp_pattern import Lookup
 from .light_model import Light
 
 # cubic metres; a light thinner than any scene needs has no area that light could come from
@@ -30,16 +33,15 @@ def read_light(
         findings.note(f"Light '{name}' is a portal, which gives no light of its own; it is left out.")
         return None
     color = to_rec709(light_color(data))
-    tree = node_tree_of(data)
+    tree, nodes = node_tree_of(data), None
     if tree is not None:
         emission = emission_of(tree)
         if emission is None:
-            findings.error(
-                f"Light '{name}' has shader nodes other than one Emission with plain values: simplify them or turn "
-                "Use Nodes off."
-            )
-            return None
-        color = color * emission
+            nodes = _lookup(evaluated, tree, findings)
+            if nodes is None:
+                return None
+        else:
+            color = color * emission
     power = light_strength(data) * exposure
     if power < 0.0 or color.min() < 0.0:
         findings.error(f"Light '{name}' takes light away (negative power or colour): make it positive.")
@@ -67,11 +69,33 @@ def read_light(
         spread=getattr(data, "spread", np.pi) if data.type == "AREA" else np.pi,
         camera=evaluated.visible_camera,
         shadow=data.use_shadow,
+        nodes=nodes,
     )
     if light.kind in ("AREA", "SPOT") and abs(np.linalg.det(matrix[:3, :3])) * min(light.sizes) < LEAST_VOLUME:
         findings.error(f"Light '{name}' is scaled or sized to nothing: give it a size and a scale above 0.")
         return None
     return light
+
+
+def _lookup(evaluated: bpy.types.Object, tree: bpy.types.NodeTree, findings: Findings) -> Lookup | None:
+    """By what Cycles is to measure a lamp's nodes; None, with an error, where no table holds them."""
+    data, name = evaluated.data, evaluated.name
+    has_radius = getattr(data, "shadow_soft_size", 0.0) > 0.0
+    is_sphere = not getattr(data, "use_soft_falloff", True)
+    try:
+        found = lookup_of(tree, data.type, has_radius=has_radius, is_sphere=is_sphere)
+    except LampNodesError as problem:
+        findings.error(
+            f"Light '{name}' has nodes that ask for {problem}, which no table holds: simplify them or turn Use Nodes "
+            "off."
+        )
+        return None
+    note_missing_pictures(f"Light '{name}'", tree, findings)
+    if found.deep:
+        findings.note(
+            f"Light '{name}' asks Light Path for the depth of rays: in the fit it is on all surfaces as on the first."
+        )
+    return found
 
 
 def _note_rays(evaluated: bpy.types.Object, findings: Findings) -> None:

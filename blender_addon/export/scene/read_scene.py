@@ -223,6 +223,8 @@ class _Walk:
             if item.type == "LIGHT":
                 light = read_light(item, matrix, self.data.settings.exposure, self.findings)
                 if light is not None:
+                    if light.nodes is not None and self.bakes is not None:
+                        self.bakes.lamps.ask(instance, len(self.data.lights), light)
                     self.data.lights.append(light)
             elif item.type == "MESH":
                 # the faces of curves, texts and geometry nodes come as instances whose parent is the object itself

@@ -25,6 +25,7 @@ from ..camera.camera_model import Camera
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings
 from ..images.color_space import to_rec709
+from ..lights.lamp_tables import LampTables
 from ..lights.light_model import Light
 from ..material_model import grey
 from ..materials.baked_material import Baked
@@ -92,6 +93,7 @@ class SceneBakes:
     def __init__(self, context: bpy.types.Context, probe: Probe | None = None) -> None:
         self._baker = Baker(context.scene.name, rendered_layer(context.scene, context.view_layer).name, probe)
         self.displaced = DisplacedMeshes(self._baker)
+        self.lamps = LampTables(self._baker)
         self._world: tuple[int, bpy.types.World] | None = None
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
@@ -157,6 +159,7 @@ class SceneBakes:
         for sentence in self._failed:
             findings.error(sentence)
         self.displaced.finish(data, findings)
+        self.lamps.finish(data.lights, findings)
         if self._world is not None:
             self._put_world(data, findings, *self._world)
         if self._surfaces:

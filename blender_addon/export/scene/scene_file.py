@@ -87,7 +87,7 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     if world is not None:
         emitters.append((world, world_irradiance(scene.world)))
     for index, light in enumerate(scene.lights):
-        emitters.append((light_element(light, f"light_{index + 1:04d}"), irradiance_at(light, middle)))
+        emitters.append((light_element(light, f"light_{index + 1:04d}", files.picture), irradiance_at(light, middle)))
     _note_clamping(scene, sum(irradiance for _, irradiance in emitters), findings)
     _weigh(emitters)
     children += [element for element, _ in emitters]

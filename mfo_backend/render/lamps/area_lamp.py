@@ -47,6 +47,10 @@ class AreaLamp(Lamp):
         scale = tangent - half if half > SERIES_BELOW else half**3 / 3.0
         self.scale = dr.opaque(mi.Float, 0.0 if self.parallel else min(1.0 / scale, 1e30))
 
+    def frame(self, linear: np.ndarray) -> np.ndarray:
+        """See `Lamp`: without the light's size."""
+        return linear / np.linalg.norm(linear, axis=0)
+
     def towards(self, point: mi.Point3f, u: mi.Point2f) -> mi.Vector3f:
         """See `Lamp`. A point of the light, or where that is smaller, of the disk whose light reaches `point`."""
         line = point - self.center
@@ -64,12 +68,13 @@ class AreaLamp(Lamp):
         height = dr.dot(line, self.n)
         cosine = -dr.dot(direction, self.n)
         way = height / cosine
-        place = line + way * direction
-        hit = (height > 0) & (cosine > 0) & self._is_inside(dr.dot(place, self.u), dr.dot(place, self.v))
+        x, y = self._on_square(line + way * direction)
+        hit = (height > 0) & (cosine > 0) & self._is_inside(x, y)
         short = self.tangent - dr.norm(direction + cosine * self.n) / cosine
         radius = height * self.tangent
         area = dr.select(self._is_narrow(radius), dr.pi * dr.square(radius), self.area)
-        return Crossing(hit & (short > 0), way, dr.square(way) / (cosine * area), short * self.scale)
+        factor = self.pattern.of(short * self.scale, way, -direction, (x, y))
+        return Crossing(hit & (short > 0), way, dr.square(way) / (cosine * area), factor)
 
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
@@ -79,12 +84,15 @@ class AreaLamp(Lamp):
             return super().sample_direction(it, sample, active)
         line = it.p - self.center
         height = dr.dot(line, self.n)
-        hit = (height > 0) & self._is_inside(dr.dot(line, self.u), dr.dot(line, self.v))
-        beam = Crossing(hit, height, mi.Float(1), mi.Float(dr.pi))
+        x, y = self._on_square(line)
+        hit = (height > 0) & self._is_inside(x, y)
+        beam = Crossing(hit, height, mi.Float(1), self.pattern.of(mi.Float(dr.pi), height, self.n, (x, y)))
         return self._sampled(it, -self.n, height, beam, hit & active)
 
+    def _on_square(self, place: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
+        return dr.dot(place, self.u) / self.half_u, dr.dot(place, self.v) / self.half_v
+
     def _is_inside(self, x: mi.Float, y: mi.Float) -> mi.Bool:
-        x, y = x / self.half_u, y / self.half_v
         if self.round:
             return x * x + y * y <= RIM
         return (dr.abs(x) <= RIM) & (dr.abs(y) <= RIM)

@@ -75,6 +75,7 @@ def _moved(lamp: Any, turn: Turn) -> dict[str, Any]:
     cone = getattr(lamp, "cone", None)
     if isinstance(cone, SpotCone):
         found["cone"] = cone.turned(turn[:3, :3])
+    found["pattern"] = lamp.pattern.turned(turn[:3, :3])
     return found
 
 

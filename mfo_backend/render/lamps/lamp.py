@@ -22,11 +22,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .lamp_pattern import LampPattern
+
 
 @dataclass(frozen=True)
 class Crossing:
     """Where lines from a point cross a lamp: `distance` (infinite for a sun), whether they do, density per solid angle
-    of `Lamp.towards` for that direction, and `factor` of the lamp's radiance."""
+    of `Lamp.towards` for that direction, and `factor` of the lamp's radiance, one number or a colour."""
 
     hit: Any
     distance: Any
@@ -36,14 +38,19 @@ class Crossing:
 
 class Lamp(mi.Emitter):
     """Properties of all lamps: `radiance` (linear Rec.709), `to_world` (it shines along +Z), `camera` (false): whether
-    camera rays see it, and `shadow` (true): whether its light casts shadows."""
+    camera rays see it, `shadow` (true): whether its light casts shadows, and those of `LampPattern`."""
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
+        self.pattern = LampPattern(props, self.frame(matrix_of(props)[:3, :3]))
         self.m_flags = mi.EmitterFlags.SpatiallyVarying
         self.radiance = opaque_color(props["radiance"])
         self.camera = bool(props.get("camera", False))
         self.shadow = bool(props.get("shadow", True))
+
+    def frame(self, linear: np.ndarray) -> np.ndarray:
+        """The space (3, 3) that patterns lie in, of the linear part of `to_world`."""
+        return linear
 
     def towards(self, point: mi.Point3f, u: mi.Point2f) -> mi.Vector3f:
         """A unit direction from `point` to the lamp for random numbers `u` in [0, 1)."""

@@ -21,10 +21,12 @@ import mitsuba as mi
 import numpy as np
 
 from .lamp import Crossing, Lamp, cone_direction, matrix_of, opaque_color, opaque_vector
+from .lamp_pattern import LampPattern
 
 
 class PointLamp(Lamp):
-    """Further properties: `radius` (metres, above 0) and `soft_falloff` (true). Only the place of `to_world` counts."""
+    """Further properties: `radius` (metres, above 0) and `soft_falloff` (true). Only the place of `to_world` counts, and
+    for a pattern its rotation and scale."""
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
@@ -55,14 +57,16 @@ class PointLamp(Lamp):
             aside = dr.norm(direction - cosine * (line / distance)) * way
             hit = (cosine > 0) & (aside <= self.radius * (1 + 1e-5))  # rounding, at the rim of a sampled disk
             density = dr.square(way) / (dr.pi * dr.square(self.radius) * cosine)
-            return Crossing(hit, way, density, mi.Float(1))
+            return Crossing(hit, way, density, self.pattern.of(mi.Float(1), way, -direction))
         inside = distance <= self.radius
         least = dr.squared_norm(line - along * direction)
         depth = dr.square(self.radius) - least
         half = dr.safe_sqrt(depth)
         hit = (depth >= -2e-5 * dr.square(self.radius)) & (inside | (along > 0))
         density = dr.select(inside, dr.inv_four_pi, dr.inv_two_pi / self._cone(distance))
-        return Crossing(hit, along + dr.select(inside, half, -half), density, mi.Float(1))
+        way = along + dr.select(inside, half, -half)
+        away = dr.normalize(way * direction - line) if self.pattern.by == "normal" else -direction
+        return Crossing(hit, way, density, self.pattern.of(mi.Float(1), way, away))
 
     def _cone(self, distance: mi.Float) -> mi.Float:
         """1 - cos of the half angle under which the sphere appears."""
@@ -109,12 +113,12 @@ class SpotLamp(PointLamp):
         factor = self.cone.factor(direction)
         if not self.soft:
             factor = dr.select(dr.squared_norm(self.center - point) <= dr.square(self.radius), 1, factor)
-        return Crossing(found.hit, found.distance, found.density, factor)
+        return Crossing(found.hit, found.distance, found.density, found.factor * factor)
 
 
 class SharpSpot(mi.Emitter):
-    """A spot light of no extent: `intensity` (W/sr, linear Rec.709), `to_world`, the properties of `SpotCone` and
-    `shadow`, as of all lamps."""
+    """A spot light of no extent: `intensity` (W/sr, linear Rec.709), `to_world`, the properties of `SpotCone`
+    and `LampPattern`, and `shadow`, as of all lamps."""
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
@@ -123,6 +127,7 @@ class SharpSpot(mi.Emitter):
         self.shadow = bool(props.get("shadow", True))
         self.center = mi.Point3f(opaque_vector(matrix_of(props)[:3, 3]))
         self.cone = SpotCone(props)
+        self.pattern = LampPattern(props, matrix_of(props)[:3, :3])
 
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
@@ -135,7 +140,8 @@ class SharpSpot(mi.Emitter):
         ds.d = line / ds.dist
         ds.n, ds.time, ds.pdf, ds.delta = -ds.d, it.time, 1.0, True
         ds.emitter = mi.EmitterPtr(self)
-        value = self.intensity * (self.cone.factor(ds.d) / dr.square(ds.dist))
+        factor = self.pattern.of(self.cone.factor(ds.d), ds.dist, -ds.d)
+        value = self.intensity * (factor / dr.square(ds.dist))
         return ds, dr.select(mi.Bool(active), value, 0)
 
     def pdf_direction(self, it: mi.Interaction3f, ds: mi.DirectionSample3f, active: Any = True) -> mi.Float:

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the nodes of a lamp make of its light, measured by the Blender this runs in: light on small white faces.
+
+Cycles asks a lamp's nodes for every ray of light. So faces that look at the lamp are lit by it twice, by its nodes and
+by plain white ones, and the quotient is what the nodes give there: by direction, by place on the lamp, by distance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..export.lights.lamp_pattern import CONSTANT, PLACE, directions, distances, places
+from ..versions import active_output, node_tree_of
+from .stage import Stage, bake, copy_properties, copy_what_nodes_ask_for, set_up
+
+Numbers = NDArray[np.float64]  # (points, 3)
+
+# pixels along each side of a pattern, of textures or of anything else: 0.3 or 0.6 degrees, where it holds half a sphere
+FINE, COARSE = 512, 256
+DISTANCE = 1.0  # metres from the lamp, where nothing asks for it
+FACE = 1e-3  # size of a face, as a share of its distance from the lamp
+TINY = 1e-4  # metres; from a face an area light of that size lies in one direction
+WIDEST = 89.0  # degrees from an area light's axis, which shines on one side
+LOOKED_AT = 16  # directions that say whether all fall alike with the distance
+ALIKE = 2e-3  # the largest difference of two that do, of the larger one
+COLORS = "material_fit"
+TURN = np.diag([1.0, -1.0, -1.0])  # a Blender lamp shines along its -Z, a pattern's along +Z
+
+
+class LampError(Exception):
+    """What a lamp's nodes do has no table; the message is a sentence."""
+
+
+def lamp_table(
+    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, asked: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    """Measure what the nodes of an instance's lamp multiply its light with, and write it into `folder`.
+
+    `asked` says what it is looked up `by`, whether it `falls` with the distance, and for directions the `rim` of a disc
+    (degrees), how many `halves` there are and whether they are `fine`. The answer has a `color`, or the name of a `pattern` (points, 3) laid out
+    as `directions` or `places`, and where it falls the name of a `falloff` (distances, 3) that the rest is multiplied
+    with. All is linear, in Blender's working space.
+
+    Raises
+    ------
+    LampError
+        If the values are no such product, or no light.
+    """
+    with _lamp_stage(scene, instance) as (stage, lamp):
+        faces = _Faces(stage, lamp)
+        rim, halves, by = asked["rim"], asked["halves"], asked["by"]
+        falloff, distance = None, DISTANCE
+        side = FINE if asked["fine"] else COARSE
+        if asked["falls"] and lamp.data.type != "SUN":
+            apart = np.array([[0.0, 0.0, 1.0]]) if by in (CONSTANT, PLACE) else _spread(rim, halves)
+            steps = distances()
+            found = faces.around(np.repeat(apart, len(steps), axis=0), np.tile(steps, len(apart)))
+            falloff, distance = _by_distance(found.reshape(len(apart), len(steps), 3), steps)
+        if by == CONSTANT:
+            pixels = faces.around(np.array([[0.0, 0.0, 1.0]]), distance)
+        elif by == PLACE:
+            pixels = faces.before(places(side), distance)
+        else:
+            pixels = faces.around(directions(side, rim, halves), distance)
+    if not np.isfinite(pixels).all():
+        raise LampError("They give it no finite light.")
+    if pixels.min() < 0.0:
+        raise LampError("They take light away.")
+    answer: dict[str, Any] = {} if by != CONSTANT else {"color": pixels[0].tolist()}
+    for name, values in (("pattern", None if by == CONSTANT else pixels), ("falloff", falloff)):
+        if values is not None:
+            np.save(folder / f"{name}.npy", values.astype(np.float32))
+            answer[name] = f"{name}.npy"
+    return answer
+
+
+class _Faces:
+    """White faces that look at a lamp, and what its nodes multiply the light on them with."""
+
+    def __init__(self, stage: bpy.types.Scene, lamp: bpy.types.Object) -> None:
+        self._stage, self._lamp = stage, lamp
+        matrix = np.array(lamp.matrix_world, dtype=np.float64)
+        self._place, self._frame = matrix[:3, 3], matrix[:3, :3] @ TURN
+
+    def around(self, local: Numbers, distance: Any) -> Numbers:
+        """Factors in local directions at distances from the lamp, which is a point meanwhile."""
+        away = local @ self._frame.T
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        distance = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(away))[:, None]
+        _shrink(self._lamp.data)
+        return self._factors(self._place + distance * away, away, distance)
+
+    def before(self, on_square: Numbers, distance: float) -> Numbers:
+        """Factors at places on an area light, which shines straight ahead meanwhile."""
+        data = self._lamp.data
+        sizes = (data.size, data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size)
+        data.shape, data.size, data.size_y, data.spread = "RECTANGLE", *sizes, 0.0
+        away = np.cross(self._frame[:, 0], self._frame[:, 1])
+        away = np.broadcast_to(away / np.linalg.norm(away), (len(on_square), 3))
+        points = self._place + on_square * [sizes[0] / 2.0, sizes[1] / 2.0, 0.0] @ self._frame.T + distance * away
+        return self._factors(points, away, np.full((len(points), 1), distance))
+
+    def _factors(self, points: Numbers, away: Numbers, distance: Numbers) -> Numbers:
+        mesh = _faces(points, away, FACE * distance)
+        material = bpy.data.materials.new(COLORS)
+        item = bpy.data.objects.new(COLORS, mesh)
+        try:
+            if material.node_tree is None:  # before Blender 5
+                material.use_nodes = True
+            _shine(material.node_tree, "ShaderNodeBsdfDiffuse", (1.0, 1.0, 1.0, 1.0))
+            mesh.materials.append(material)
+            self._stage.collection.objects.link(item)
+            lit = _lit(Stage(self._stage, item))
+            with _plain(self._lamp.data):
+                plain = _lit(Stage(self._stage, item))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return np.where(plain > 0.0, lit / plain, 0.0)
+        finally:
+            bpy.data.objects.remove(item)
+            bpy.data.meshes.remove(mesh)
+            bpy.data.materials.remove(material)
+
+
+@contextmanager
+def _lamp_stage(
+    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance
+) -> Iterator[tuple[bpy.types.Scene, bpy.types.Object]]:
+    """A scene with a white copy of the instance's lamp, without a radius, a soft rim and shadows, and nothing else."""
+    original = instance.object.original
+    matrix, name = instance.matrix_world.copy(), original.name
+    stage = bpy.data.scenes.new("material_fit_lamp")
+    data = original.data.copy()
+    lamp = bpy.data.objects.new("material_fit_lamp", data)
+    window = bpy.context.window
+    before, view_layer = window.scene, window.view_layer
+    try:
+        lamp.matrix_world = matrix
+        data.color, data.energy, data.use_shadow = (1.0, 1.0, 1.0), 1.0, False
+        if hasattr(data, "use_temperature"):  # Blender 4.5
+            data.use_temperature = False
+        copy_what_nodes_ask_for(original, lamp, None)
+        stage.collection.objects.link(lamp)
+        stage.camera = scene.camera
+        copy_properties((scene.world, scene, view_layer), stage)
+        stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        set_up(stage, scene)
+        stage.cycles.samples, stage.cycles.light_sampling_threshold = 1, 0.0
+        settings = stage.render.bake
+        settings.target = "VERTEX_COLORS"
+        settings.use_pass_direct, settings.use_pass_indirect, settings.use_pass_color = True, False, False
+        window.scene = stage
+        yield stage, lamp
+    finally:
+        window.scene, window.view_layer = before, view_layer
+        bpy.data.objects.remove(lamp)
+        original.name = name
+        bpy.data.lights.remove(data)
+        bpy.data.scenes.remove(stage)
+
+
+def _shrink(data: Any) -> None:
+    """Make a light a point as far as it can be one; what its nodes are told of directions stays."""
+    if data.type in ("POINT", "SPOT"):
+        data.shadow_soft_size, data.use_soft_falloff = 0.0, True
+    if data.type == "SPOT":
+        data.spot_blend = 0.0
+    if data.type == "SUN":
+        data.angle = 0.0
+    if data.type == "AREA":
+        data.shape, data.size, data.spread = "SQUARE", TINY, math.pi
+
+
+@contextmanager
+def _plain(data: bpy.types.Light) -> Iterator[None]:
+    """The light with one plain white emission instead of its nodes."""
+    tree: Any = node_tree_of(data)
+    output: Any = active_output(tree)
+    before = [link.from_socket for link in output.inputs["Surface"].links]
+    emission = _shine(tree, "ShaderNodeEmission", (1.0, 1.0, 1.0, 1.0))
+    try:
+        yield
+    finally:
+        tree.nodes.remove(emission)
+        for socket in before:
+            tree.links.new(socket, output.inputs["Surface"])
+
+
+def _shine(tree: Any, kind: str, color: tuple[float, float, float, float]) -> bpy.types.Node:
+    """Put a shader of one colour on the surface of a tree."""
+    node = tree.nodes.new(kind)
+    node.inputs["Color"].default_value = color
+    tree.links.new(node.outputs[0], active_output(tree).inputs["Surface"])
+    return node
+
+
+def _faces(points: Numbers, away: Numbers, sizes: Numbers) -> Any:
+    """A mesh of triangles whose first corners are `points` and whose fronts look against `away`."""
+    helper = np.eye(3)[np.argmin(np.abs(away), axis=1)]
+    side = np.cross(away, helper)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    corners = np.stack([points, points + sizes * np.cross(away, side), points + sizes * side], axis=1)
+    count = len(points)
+    mesh: Any = bpy.data.meshes.new(COLORS)
+    mesh.vertices.add(3 * count)
+    mesh.vertices.foreach_set("co", corners.astype(np.float32).ravel())
+    mesh.loops.add(3 * count)
+    mesh.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
+    mesh.polygons.add(count)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    return mesh
+
+
+def _lit(stage: Stage) -> Numbers:
+    """The direct light at the first corner of each face."""
+    mesh: Any = stage.item.data
+    colors = mesh.color_attributes.new(COLORS, "FLOAT_COLOR", "CORNER")
+    name = colors.name
+    try:
+        mesh.color_attributes.active_color = colors
+        bake(stage, "DIFFUSE")
+        found = np.empty(len(mesh.loops) * 4, dtype=np.float32)
+        mesh.color_attributes[name].data.foreach_get("color", found)
+        return found.reshape(-1, 3, 4)[:, 0, :3].astype(np.float64)
+    finally:
+        mesh.color_attributes.remove(mesh.color_attributes[name])
+
+
+def _spread(rim: float, halves: int) -> Numbers:
+    """Unit vectors spread evenly over all directions, or up to `rim` degrees from +Z."""
+    number = np.arange(LOOKED_AT) + 0.5
+    least = -1.0 if halves == 2 else math.cos(math.radians(min(rim, WIDEST)))
+    up = 1.0 - (1.0 - least) * number / LOOKED_AT
+    turn = number * math.pi * (3.0 - math.sqrt(5.0))
+    across = np.sqrt(1.0 - up**2)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), up], axis=1)
+
+
+def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tuple[Numbers, float]:
+    """The factors (distances, 3) of the strongest of some directions (directions, distances, 3) over those at one
+    distance, and that.
+
+    Raises
+    ------
+    LampError
+        If the others do not change alike.
+    """
+    strongest = found[np.argmax((found / np.maximum(found.max(axis=(0, 2)), 1e-30)[:, None]).sum(axis=(1, 2)))]
+    lit = (strongest > 0.0).any(axis=1)
+    if not lit.any():
+        return np.zeros_like(strongest), DISTANCE
+    there = int(np.argmin(np.where(lit, np.abs(np.log(steps / DISTANCE)), np.inf)))
+    base = np.where(strongest[there] > 0.0, strongest[there], 1.0)
+    falloff = strongest / base
+    expected = found[:, there : there + 1] * falloff
+    most = np.maximum(np.maximum(found, expected).max(axis=(0, 2)), 1e-30)[:, None]
+    if float((np.abs(found - expected) / most).max()) > ALIKE:
+        raise LampError("Their light changes with the distance in another way in each direction.")
+    return falloff, float(steps[there])
