@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export.lights.lamp_pattern import CONSTANT, PLACE, directions, distances, places
+from ..export.lights.lamp_pattern import CONSTANT, NORMAL, PLACE, directions, distances, places
 from ..versions import active_output, node_tree_of
 from .stage import Stage, bake, copy_properties, copy_what_nodes_ask_for, set_up
 
@@ -26,8 +26,9 @@ Numbers = NDArray[np.float64]  # (points, 3)
 # pixels along each side of a pattern, of textures or of anything else: 0.3 or 0.6 degrees, where it holds half a sphere
 FINE, COARSE = 512, 256
 DISTANCE = 1.0  # metres from the lamp, where nothing asks for it
-FACE = 1e-3  # size of a face, as a share of its distance from the lamp
-TINY = 1e-4  # metres; from a face an area light of that size lies in one direction
+FACE = 1e-4  # size of a face, as a share of its distance from the lamp; Cycles looks up to a third of that beside its corner
+TINY = 1e-5  # metres; from a face an area light of that size lies in one direction
+SURE = 1e-1  # metres; nearer to it than that it does not
 WIDEST = 89.0  # degrees from an area light's axis, which shines on one side
 LOOKED_AT = 16  # directions that say whether all fall alike with the distance
 ALIKE = 2e-3  # the largest difference of two that do, of the larger one
@@ -44,8 +45,7 @@ def lamp_table(
 ) -> dict[str, Any]:
     """Measure what the nodes of an instance's lamp multiply its light with, and write it into `folder`.
 
-    `asked` says what it is looked up `by`, whether it `falls` with the distance, and for directions the `rim` of a disc
-    (degrees), how many `halves` there are and whether they are `fine`. The answer has a `color`, or the name of a `pattern` (points, 3) laid out
+    `asked` has a `Lookup`, and for directions the `rim` of a disc (degrees) and how many `halves` there are. The answer has a `color`, or the name of a `pattern` (points, 3) laid out
     as `directions` or `places`, and where it falls the name of a `falloff` (distances, 3) that the rest is multiplied
     with. All is linear, in Blender's working space.
 
@@ -54,7 +54,7 @@ def lamp_table(
     LampError
         If the values are no such product, or no light.
     """
-    with _lamp_stage(scene, instance) as (stage, lamp):
+    with _lamp_stage(scene, instance, asked) as (stage, lamp):
         faces = _Faces(stage, lamp)
         rim, halves, by = asked["rim"], asked["halves"], asked["by"]
         falloff, distance = None, DISTANCE
@@ -131,7 +131,7 @@ class _Faces:
 
 @contextmanager
 def _lamp_stage(
-    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance
+    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, asked: Mapping[str, Any]
 ) -> Iterator[tuple[bpy.types.Scene, bpy.types.Object]]:
     """A scene with a white copy of the instance's lamp, without a radius, a soft rim and shadows, and nothing else."""
     original = instance.object.original
@@ -142,7 +142,11 @@ def _lamp_stage(
     window = bpy.context.window
     before, view_layer = window.scene, window.view_layer
     try:
-        lamp.matrix_world = matrix
+        # far from zero the kernel's places are coarse
+        lamp.matrix_world = matrix if asked["placed"] else matrix.to_3x3().to_4x4()
+        if asked["by"] == NORMAL:  # which a cone does not limit
+            data.type = "POINT"
+            data = lamp.data
         data.color, data.energy, data.use_shadow = (1.0, 1.0, 1.0), 1.0, False
         if hasattr(data, "use_temperature"):  # Blender 4.5
             data.use_temperature = False
@@ -175,7 +179,7 @@ def _shrink(data: Any) -> None:
     if data.type == "SUN":
         data.angle = 0.0
     if data.type == "AREA":
-        data.shape, data.size, data.spread = "SQUARE", TINY, math.pi
+        data.shape, data.size, data.spread = "DISK", TINY, math.pi  # a square is sampled less exactly
 
 
 @contextmanager
@@ -262,6 +266,6 @@ def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tupl
     falloff = strongest / base
     expected = found[:, there : there + 1] * falloff
     most = np.maximum(np.maximum(found, expected).max(axis=(0, 2)), 1e-30)[:, None]
-    if float((np.abs(found - expected) / most).max()) > ALIKE:
+    if float((np.abs(found - expected) / most)[:, steps > SURE].max()) > ALIKE:
         raise LampError("Their light changes with the distance in another way in each direction.")
     return falloff, float(steps[there])

@@ -96,8 +96,8 @@ NODES: dict[str, Lights] = {
     "Linear falloff, spot, radius 0": [("SPOT", {**_SPOT, "shadow_soft_size": 0, "nodes": lamp_nodes.falloff("Linear", 0)})],
     "ray length, point": [("POINT", {**_POINT, "nodes": lamp_nodes.ray_length})],
     **{
-        f"IES, {kind}, radius {radius}": [(kind.upper(), {**_SPOT, "shadow_soft_size": radius, "nodes": lamp_nodes.ies})]
-        for kind in ("point", "spot")
+        f"IES, {kind}, radius {radius}": [(kind.upper(), {**values, "shadow_soft_size": radius, "nodes": lamp_nodes.ies})]
+        for kind, values in (("point", _POINT), ("spot", _SPOT))
         for radius in (0.0, 0.05)
     },
     "IES, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.ies})],

@@ -78,7 +78,8 @@ def lookup_of(tree: bpy.types.NodeTree, kind: str, *, has_radius: bool, is_spher
             by |= {DIRECTION, NORMAL} if each == "facing" and ball else {DIRECTION}
     if len(by) > 1:
         raise LampNodesError("directions and places on the lamp at once")
-    return Lookup(by.pop() if by else CONSTANT, "distance" in asked, "depth" in asked, "texture" in asked)
+    found = by.pop() if by else CONSTANT
+    return Lookup(found, *(each in asked for each in ("distance", "depth", "texture", "position")))
 
 
 def _asked(tree: bpy.types.NodeTree) -> Iterator[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MARGIN = 1  # pixels around a disc, which filtering may look at
-NEAR, FAR, STEPS = 1e-3, 1e5, 2048  # metres; between two steps a square is within 4e-5 of a line
+NEAR, FAR, STEPS = 1e-3, 1e3, 2048  # metres; between two steps a square is within 2e-5 of a line
 INSIDE = 1e-3  # share of a cone's angle that measurements keep away from its rim
 
 
@@ -26,12 +26,13 @@ CONSTANT, DIRECTION, NORMAL, PLACE = "constant", "direction", "normal", "place"
 @dataclass(frozen=True)
 class Lookup:
     """By what the values of a lamp's nodes are looked up, whether they change with the distance (`falls`) and from bounce
-    to bounce (`deep`), and whether textures make them `fine`."""
+    to bounce (`deep`), whether textures make them `fine`, and whether they are those of a place in the world."""
 
     by: str
     falls: bool
     deep: bool
     fine: bool
+    placed: bool
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import bpy
@@ -14,8 +14,7 @@ from ...bake.baker import BakeError, Baker
 from ...bake.requests import name_of
 from ..findings import Findings
 from ..images.color_space import to_rec709
-from .lamp_nodes import CONSTANT, Lookup
-from .lamp_pattern import Pattern
+from .lamp_pattern import CONSTANT, NORMAL, Lookup, Pattern
 from .light_model import Light
 
 
@@ -30,8 +29,8 @@ class LampTables:
         """Have the nodes of a light measured, which is that of an instance and has this place in the scene's list."""
         lookup = light.nodes
         assert lookup is not None
-        rim, halves = disc(light)
-        asked = {"by": lookup.by, "falls": lookup.falls, "fine": lookup.fine, "rim": rim, "halves": halves}
+        rim, halves = disc(light, lookup.by)
+        asked = asdict(lookup) | {"rim": rim, "halves": halves}
         found: int | BakeError
         try:
             found = self._baker.ask("lamp", instance=name_of(instance), asked=asked)
@@ -54,9 +53,11 @@ class LampTables:
         lights[:] = [light for light in lights if light.color.max() > 0.0]
 
 
-def disc(light: Light) -> tuple[float, int]:
-    """Half angle in degrees and number of the discs that hold all directions in which a light shines."""
-    return math.degrees(light.spot_size) / 2.0 if light.kind == "SPOT" else 90.0, 2 if light.kind == "POINT" else 1
+def disc(light: Light, by: str) -> tuple[float, int]:
+    """Half angle in degrees and number of the discs that hold all directions or normals of a light."""
+    if light.kind == "POINT" or by == NORMAL:
+        return 90.0, 2
+    return math.degrees(light.spot_size) / 2.0 if light.kind == "SPOT" else 90.0, 1
 
 
 def _shaped(light: Light, lookup: Lookup, answer: dict[str, object], folder: Path) -> Light:
@@ -69,7 +70,7 @@ def _shaped(light: Light, lookup: Lookup, answer: dict[str, object], folder: Pat
     if lookup.by == CONSTANT:
         color = to_rec709(answer["color"]).clip(0.0)  # type: ignore[arg-type]
         return replace(light, nodes=None, color=light.color * color, falloff=falloff)
-    rim, halves = disc(light)
+    rim, halves = disc(light, lookup.by)
     factors = read("pattern")
     mean = factors.mean(axis=0)
     side = math.isqrt(len(factors) // halves)

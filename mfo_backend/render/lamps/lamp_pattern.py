@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 
 MARGIN = 1  # pixels around a disc or a square
-NEAR, FAR = 1e-3, 1e5  # metres, of a falloff's first and last column, which are even in their logarithms
+NEAR, FAR = 1e-3, 1e3  # metres, of a falloff's first and last column, which are even in their logarithms
 
 
 class LampPattern:
