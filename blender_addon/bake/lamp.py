@@ -17,8 +17,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export.lights.lamp_pattern import CONSTANT, NORMAL, PLACE, directions, distances, places
+from ..probe.server import ProbeRequestError
 from ..versions import active_output, node_tree_of
+from .lamp_layout import CONSTANT, NORMAL, PLACE, directions, distances, places
 from .stage import Stage, bake, copy_properties, copy_what_nodes_ask_for, set_up
 
 Numbers = NDArray[np.float64]  # (points, 3)
@@ -26,7 +27,8 @@ Numbers = NDArray[np.float64]  # (points, 3)
 # pixels along each side of a pattern, of textures or of anything else: 0.3 or 0.6 degrees, where it holds half a sphere
 FINE, COARSE = 512, 256
 DISTANCE = 1.0  # metres from the lamp, where nothing asks for it
-FACE = 1e-4  # size of a face, as a share of its distance from the lamp; Cycles looks up to a third of that beside its corner
+# size of a face, as a share of its distance from the lamp; Cycles looks up to a third of that beside its corner
+FACE = 1e-4
 TINY = 1e-5  # metres; from a face an area light of that size lies in one direction
 SURE = 1e-1  # metres; nearer to it than that it does not
 WIDEST = 89.0  # degrees from an area light's axis, which shines on one side
@@ -36,22 +38,18 @@ COLORS = "material_fit"
 TURN = np.diag([1.0, -1.0, -1.0])  # a Blender lamp shines along its -Z, a pattern's along +Z
 
 
-class LampError(Exception):
-    """What a lamp's nodes do has no table; the message is a sentence."""
-
-
 def lamp_table(
     scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, asked: Mapping[str, Any], folder: Path
 ) -> dict[str, Any]:
     """Measure what the nodes of an instance's lamp multiply its light with, and write it into `folder`.
 
-    `asked` has a `Lookup`, and for directions the `rim` of a disc (degrees) and how many `halves` there are. The answer has a `color`, or the name of a `pattern` (points, 3) laid out
-    as `directions` or `places`, and where it falls the name of a `falloff` (distances, 3) that the rest is multiplied
-    with. All is linear, in Blender's working space.
+    `asked` has a `Lookup`, and for directions the `rim` of a disc (degrees) and how many `halves` there are. The answer
+    has a `color`, or the name of a `pattern` (points, 3) laid out as `directions` or `places`, and where it falls the
+    name of a `falloff` (distances, 3) that the rest is multiplied with. All is linear, in Blender's working space.
 
     Raises
     ------
-    LampError
+    ProbeRequestError
         If the values are no such product, or no light.
     """
     with _lamp_stage(scene, instance, asked) as (stage, lamp):
@@ -71,9 +69,9 @@ def lamp_table(
         else:
             pixels = faces.around(directions(side, rim, halves), distance)
     if not np.isfinite(pixels).all():
-        raise LampError("They give it no finite light.")
+        raise ProbeRequestError("Their light is not finite.")
     if pixels.min() < 0.0:
-        raise LampError("They take light away.")
+        raise ProbeRequestError("Their light is below zero.")
     answer: dict[str, Any] = {} if by != CONSTANT else {"color": pixels[0].tolist()}
     for name, values in (("pattern", None if by == CONSTANT else pixels), ("falloff", falloff)):
         if values is not None:
@@ -199,9 +197,10 @@ def _plain(data: bpy.types.Light) -> Iterator[None]:
 
 def _shine(tree: Any, kind: str, color: tuple[float, float, float, float]) -> bpy.types.Node:
     """Put a shader of one colour on the surface of a tree."""
-    node = tree.nodes.new(kind)
+    node, output = tree.nodes.new(kind), active_output(tree)
+    assert output is not None
     node.inputs["Color"].default_value = color
-    tree.links.new(node.outputs[0], active_output(tree).inputs["Surface"])
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
     return node
 
 
@@ -240,12 +239,12 @@ def _lit(stage: Stage) -> Numbers:
 
 def _spread(rim: float, halves: int) -> Numbers:
     """Unit vectors spread evenly over all directions, or up to `rim` degrees from +Z."""
-    number = np.arange(LOOKED_AT) + 0.5
+    number = np.arange(LOOKED_AT, dtype=np.float64) + 0.5
     least = -1.0 if halves == 2 else math.cos(math.radians(min(rim, WIDEST)))
     up = 1.0 - (1.0 - least) * number / LOOKED_AT
     turn = number * math.pi * (3.0 - math.sqrt(5.0))
     across = np.sqrt(1.0 - up**2)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), up], axis=1)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), up], axis=1).astype(np.float64)
 
 
 def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tuple[Numbers, float]:
@@ -254,7 +253,7 @@ def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tupl
 
     Raises
     ------
-    LampError
+    ProbeRequestError
         If the others do not change alike.
     """
     strongest = found[np.argmax((found / np.maximum(found.max(axis=(0, 2)), 1e-30)[:, None]).sum(axis=(1, 2)))]
@@ -267,5 +266,5 @@ def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tupl
     expected = found[:, there : there + 1] * falloff
     most = np.maximum(np.maximum(found, expected).max(axis=(0, 2)), 1e-30)[:, None]
     if float((np.abs(found - expected) / most)[:, steps > SURE].max()) > ALIKE:
-        raise LampError("Their light changes with the distance in another way in each direction.")
+        raise ProbeRequestError("Their light changes with the distance in another way in each direction.")
     return falloff, float(steps[there])

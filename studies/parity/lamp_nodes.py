@@ -18,7 +18,9 @@ _POLAR, _ROUND = np.linspace(0.0, 180.0, 37), np.linspace(0.0, 360.0, 13)
 def profile() -> str:
     """An IESNA LM-63 file."""
     polar, turn = np.meshgrid(np.radians(_POLAR), np.radians(_ROUND))
-    candela = 800.0 * np.cos(polar).clip(0.0) ** (2.0 + np.cos(2.0 * turn)) + 300.0 * np.exp(-(((polar - 0.6) / 0.2) ** 2))
+    candela = 800.0 * np.cos(polar).clip(0.0) ** (2.0 + np.cos(2.0 * turn)) + 300.0 * np.exp(
+        -(((polar - 0.6) / 0.2) ** 2)
+    )
     lines = ["IESNA:LM-63-2002", "[TEST] made up", "TILT=NONE"]
     lines += [f"1 1000 1 {len(_POLAR)} {len(_ROUND)} 1 2 0 0 0", "1 1 100"]
     lines += [" ".join(f"{value:g}" for value in row) for row in (_POLAR, _ROUND, *np.round(candela, 2))]

@@ -83,22 +83,24 @@ SHINY: dict[str, Lights] = {
     ],
 }
 _POINT = {"energy": 100, "shadow_soft_size": 0.2, **TILTED}
+_SUN = {"energy": 3, "angle": 0.1, "rotation": (0.4, 0.3, 0.2)}
 _SPOT = {"energy": 300, "shadow_soft_size": 0.05, "spot_size": 0.9, "spot_blend": 0.2, **TILTED}
+_SHARP_POINT = {**_POINT, "shadow_soft_size": 0.0}
+_SHARP = {**_SPOT, "shadow_soft_size": 0.0}
 NODES: dict[str, Lights] = {
     "blackbody, point": [("POINT", {**_POINT, "nodes": lamp_nodes.blackbody})],
-    "blackbody, sun": [("SUN", {"energy": 3, "angle": 0.1, "rotation": (0.4, 0.3, 0.2), "nodes": lamp_nodes.blackbody})],
+    "blackbody, sun": [("SUN", {**_SUN, "nodes": lamp_nodes.blackbody})],
     "blackbody, area": [("AREA", {**_ROUND, "nodes": lamp_nodes.blackbody})],
     **{
         f"{output} falloff, {kind}": [(kind.upper(), {**values, "nodes": lamp_nodes.falloff(output, smooth)})]
         for output, smooth in (("Quadratic", 1.0), ("Linear", 0.0), ("Constant", 0.5))
         for kind, values in (("point", _POINT), ("area", {**_WIDE, "spread": 2.0}))
     },
-    "Linear falloff, spot, radius 0": [("SPOT", {**_SPOT, "shadow_soft_size": 0, "nodes": lamp_nodes.falloff("Linear", 0)})],
+    "Linear falloff, sharp spot": [("SPOT", {**_SHARP, "nodes": lamp_nodes.falloff("Linear", 0.0)})],
     "ray length, point": [("POINT", {**_POINT, "nodes": lamp_nodes.ray_length})],
     **{
-        f"IES, {kind}, radius {radius}": [(kind.upper(), {**values, "shadow_soft_size": radius, "nodes": lamp_nodes.ies})]
-        for kind, values in (("point", _POINT), ("spot", _SPOT))
-        for radius in (0.0, 0.05)
+        f"IES, {name}": [(name.split()[-1].upper(), {**values, "nodes": lamp_nodes.ies})]
+        for name, values in (("point", _POINT), ("sharp point", _SHARP_POINT), ("spot", _SPOT), ("sharp spot", _SHARP))
     },
     "IES, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.ies})],
     "IES, scaled point": [("POINT", {**_POINT, "scale": (0.5, 1.5, 1), "nodes": lamp_nodes.ies})],

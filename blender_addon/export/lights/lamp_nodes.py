@@ -7,18 +7,27 @@ from collections.abc import Iterator
 
 import bpy
 
+from ...bake.lamp_layout import CONSTANT, DIRECTION, NORMAL, PLACE, Lookup
 from ..nodes.dependence import GENERATED_BY_DEFAULT
-from .lamp_pattern import CONSTANT, DIRECTION, NORMAL, PLACE, Lookup
 
 # what outputs of nodes tell a lamp; "depth" changes from bounce to bounce, "camera" with the view
 _ASKS = {
     "ShaderNodeTexCoord": {
-        **{"Generated": "position", "Normal": "normal", "UV": "uv", "Object": "position"},
-        **{"Camera": "camera", "Window": "camera", "Reflection": "direction"},
+        "Generated": "position",
+        "Normal": "normal",
+        "UV": "uv",
+        "Object": "position",
+        "Camera": "camera",
+        "Window": "camera",
+        "Reflection": "direction",
     },
     "ShaderNodeNewGeometry": {
-        **{"Position": "position", "Normal": "normal", "Tangent": "normal", "True Normal": "normal"},
-        **{"Incoming": "direction", "Parametric": "uv"},
+        "Position": "position",
+        "Normal": "normal",
+        "Tangent": "normal",
+        "True Normal": "normal",
+        "Incoming": "direction",
+        "Parametric": "uv",
     },
     "ShaderNodeUVMap": {"UV": "uv"},
     "ShaderNodeTangent": {"Tangent": "normal"},
@@ -26,16 +35,24 @@ _ASKS = {
     "ShaderNodeLayerWeight": {"Fresnel": "facing", "Facing": "facing"},
     "ShaderNodeLightFalloff": {"Quadratic": "distance", "Linear": "distance", "Constant": "distance"},
     "ShaderNodeLightPath": {
-        **{"Ray Length": "distance", "Ray Depth": "depth", "Diffuse Depth": "depth", "Glossy Depth": "depth"},
-        **{"Transparent Depth": "depth", "Transmission Depth": "depth", "Portal Depth": "depth"},
+        "Ray Length": "distance",
+        "Ray Depth": "depth",
+        "Diffuse Depth": "depth",
+        "Glossy Depth": "depth",
+        "Transparent Depth": "depth",
+        "Transmission Depth": "depth",
+        "Portal Depth": "depth",
     },
     "ShaderNodeCameraData": {"View Vector": "camera", "View Z Depth": "camera", "View Distance": "camera"},
 }
 # what textures ask for where nothing is linked to Vector
 _BY_DEFAULT = {
     **dict.fromkeys(GENERATED_BY_DEFAULT, "position"),
-    **{"ShaderNodeTexImage": "uv", "ShaderNodeTexIES": "direction", "ShaderNodeTexEnvironment": "position"},
-    **{"ShaderNodeTexSky": "position", "ShaderNodeTexPointDensity": "position"},
+    "ShaderNodeTexImage": "uv",
+    "ShaderNodeTexIES": "direction",
+    "ShaderNodeTexEnvironment": "position",
+    "ShaderNodeTexSky": "position",
+    "ShaderNodeTexPointDensity": "position",
 }
 # ask for what no table holds: bumps compare neighbours, scripts may ask for anything
 _UNKNOWN = ("ShaderNodeBump", "ShaderNodeScript", "ShaderNodeAmbientOcclusion", "ShaderNodeBevel", "ShaderNodeRaycast")
@@ -58,14 +75,14 @@ def lookup_of(tree: bpy.types.NodeTree, kind: str, *, has_radius: bool, is_spher
     """
     asked = set(_asked(tree))
     for label in sorted(each.removeprefix("node:") for each in asked if each.startswith("node:")):
-        raise LampNodesError(f"the node {label}")
+        raise LampNodesError(f"the node '{label}'")
     if "camera" in asked:
         raise LampNodesError("the camera's view")
     flat, ball = kind == "AREA", kind in ("POINT", "SPOT") and has_radius and is_sphere
     by = set[str]()
     for each in asked & {"normal", "uv", "position", "direction", "facing"}:
         if kind == "SUN":
-            raise LampNodesError("a place or a direction on a sun")
+            raise LampNodesError("places or directions on a sun")
         if each == "position" and not flat and has_radius:
             raise LampNodesError("places on a lamp with a radius")
         if each == "normal" and not flat:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the nodes of lamps make of their light: asked of Cycles while the scene is read, put into it when it has told."""
+"""What lamps' nodes make of their light: asked of Cycles while the scene is read, put into it when that is done."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 
 from ...bake.baker import BakeError, Baker
+from ...bake.lamp_layout import CONSTANT, NORMAL, Lookup
 from ...bake.requests import name_of
 from ..findings import Findings
 from ..images.color_space import to_rec709
-from .lamp_pattern import CONSTANT, NORMAL, Lookup, Pattern
-from .light_model import Light
+from .light_model import Light, Pattern
 
 
 class LampTables:

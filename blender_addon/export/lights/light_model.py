@@ -12,9 +12,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .lamp_pattern import Lookup, Pattern, falloff_at
+from ...bake.lamp_layout import FAR, NEAR, Lookup, distances
 
 Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Factors by direction from the lamp, by the normal of its sphere or by place on it: `by`, and `pixels`, linear
+    Rec.709 (side, halves * side, 3), float32. `rim` is the half angle of a disc in degrees."""
+
+    by: str
+    pixels: NDArray[np.float32]
+    rim: float = 90.0
 
 
 @dataclass(frozen=True)
@@ -104,3 +114,9 @@ def irradiance_at(light: Light, point: Vector) -> float:
     if light.radius > 0.0:
         return float(sphere_radiance(light).mean()) * math.pi * light.radius**2 / max(square, light.radius**2)
     return float(point_intensity(light).mean()) / square
+
+
+def falloff_at(falloff: NDArray[np.float32], distance: float) -> NDArray[np.float64]:
+    """The three factors at a distance in metres, of a falloff (1, STEPS, 3)."""
+    at = np.log(np.clip(distance, NEAR, FAR))
+    return np.array([np.interp(at, np.log(distances()), falloff[0, :, channel]) for channel in range(3)])

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bake.lamp_layout import Lookup
 from ...versions import cycles_settings, light_color, light_is_normalized, light_strength, node_tree_of
 from ..audit.object_table import LIGHT_CYCLES
 from ..audit.rules import name_settings
@@ -15,7 +16,6 @@ from ..images.color_space import to_rec709
 from ..nodes.graph_findings import note_missing_pictures
 from ..nodes.shader_graph import emission_of
 from .lamp_nodes import LampNodesError, lookup_of
-from .lamp_pattern import Lookup
 from .light_model import Light
 
 # cubic metres; a light thinner than any scene needs has no area that light could come from
@@ -85,10 +85,7 @@ def _lookup(evaluated: bpy.types.Object, tree: bpy.types.NodeTree, findings: Fin
     try:
         found = lookup_of(tree, data.type, has_radius=has_radius, is_sphere=is_sphere)
     except LampNodesError as problem:
-        findings.error(
-            f"Light '{name}' has nodes that ask for {problem}, which no table holds: simplify them or turn Use Nodes "
-            "off."
-        )
+        findings.error(f"Light '{name}' has nodes that ask for {problem}, which no table holds: simplify them.")
         return None
     note_missing_pictures(f"Light '{name}'", tree, findings)
     if found.deep:

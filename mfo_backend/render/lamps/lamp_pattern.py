@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of what a lamp's nodes multiply its light with: IES, gobos, falloffs. Choose the variant before importing this.
+"""Tables of what a lamp's nodes multiply its light with: IES, gobos, falloffs.
 
-The add-on measures them in Cycles and says how they are laid out (`blender_addon/export/lights/lamp_pattern.py`).
+Choose the variant before importing this. The add-on measures them in Cycles and says how they are
+laid out (`blender_addon/bake/lamp_layout.py`).
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false

@@ -25,8 +25,8 @@ from .lamp_pattern import LampPattern
 
 
 class PointLamp(Lamp):
-    """Further properties: `radius` (metres, above 0) and `soft_falloff` (true). Only the place of `to_world` counts, and
-    for a pattern its rotation and scale."""
+    """Further properties: `radius` (metres, above 0) and `soft_falloff` (true). Only the place of `to_world` counts,
+    and for a pattern its rotation and scale."""
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)

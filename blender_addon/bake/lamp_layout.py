@@ -25,24 +25,14 @@ CONSTANT, DIRECTION, NORMAL, PLACE = "constant", "direction", "normal", "place"
 
 @dataclass(frozen=True)
 class Lookup:
-    """By what the values of a lamp's nodes are looked up, whether they change with the distance (`falls`) and from bounce
-    to bounce (`deep`), whether textures make them `fine`, and whether they are those of a place in the world."""
+    """By what the values of a lamp's nodes are looked up, whether they change with the distance (`falls`) and from
+    bounce to bounce (`deep`), whether textures make them `fine`, and whether they are those of a place in the world."""
 
     by: str
     falls: bool
     deep: bool
     fine: bool
     placed: bool
-
-
-@dataclass(frozen=True)
-class Pattern:
-    """Factors by direction from the lamp, by the normal of its sphere or by place on it: `by`, and `pixels`, linear
-    Rec.709 (side, halves * side, 3), float32. `rim` is the half angle of a disc in degrees."""
-
-    by: str
-    pixels: NDArray[np.float32]
-    rim: float = 90.0
 
 
 def distances() -> NDArray[np.float64]:
@@ -74,9 +64,3 @@ def places(side: int) -> NDArray[np.float64]:
     axis = (np.arange(side) + 0.5 - side / 2) / (side / 2 - MARGIN)
     x, y = np.meshgrid(*(np.clip(each, INSIDE - 1.0, 1.0 - INSIDE) for each in (axis, -axis)))
     return np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-
-
-def falloff_at(falloff: NDArray[np.float32], distance: float) -> NDArray[np.float64]:
-    """The three factors at a distance in metres, of a falloff (1, STEPS, 3)."""
-    at = np.log(np.clip(distance, NEAR, FAR))
-    return np.array([np.interp(at, np.log(distances()), falloff[0, :, channel]) for channel in range(3)])
