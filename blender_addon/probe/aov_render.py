@@ -18,7 +18,7 @@ from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..export.camera.camera_model import Region
-from ..export.camera.render_region import picture_size, region_settings
+from ..export.camera.render_region import region_settings, square_size
 from ..versions import save_as_multilayer
 from .plain_exr import read_plain_exr
 
@@ -31,7 +31,8 @@ LEAST_TRANSPARENT = 16  # surfaces that a ray may pass: those before the target,
 
 @dataclass(frozen=True)
 class Frame:
-    """A part of the picture in subpixels: `scale` of them along each side of a pixel, columns `left` to `right`."""
+    """A part of the picture of square pixels in subpixels: `scale` of them along each side of a pixel, columns `left`
+    to `right`."""
 
     scale: int
     left: int
@@ -64,7 +65,7 @@ def frame_of(
 
     The picture may show a `region` of it alone. None where all of it is beside the picture or behind the camera.
     """
-    size = picture_size(scene.render)
+    size = square_size(scene.render)
     bounds = _bounds(scene, obj, size, region or Region(0, 0, *size))
     if bounds is None:
         return None
@@ -78,13 +79,10 @@ def frame_of(
 
 def world_to_frame(scene: bpy.types.Scene, frame: Frame) -> NDArray[np.float64]:
     """The (3, 4) camera matrix: world (x, y, z, 1) to w times column, row (from the frame's corner) and 1."""
-    render, camera = scene.render, scene.camera
+    camera = scene.camera
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = camera.evaluated_get(depsgraph)
-    projection = evaluated.calc_matrix_camera(
-        depsgraph, x=render.resolution_x, y=render.resolution_y,
-        scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y,
-    )  # fmt: skip
+    projection = evaluated.calc_matrix_camera(depsgraph, x=frame.full[0], y=frame.full[1], scale_x=1.0, scale_y=1.0)
     world = evaluated.matrix_world.normalized()  # Cycles ignores the scale of a camera
     clip = np.array(projection @ world.inverted(), dtype=np.float64)
     width, height = frame.full
@@ -157,16 +155,14 @@ def _rendered(
 
 def _look_at(scene: bpy.types.Scene, subpixel: tuple[int, int], frame: Frame, put: Any) -> None:
     """Shift the camera, so that a subpixel's column and row lie in the middle of each pixel, and look there alone."""
-    camera, render, scale = scene.camera.data, scene.render, frame.scale
+    camera, scale = scene.camera.data, frame.scale
     put(scene.cycles, "pixel_filter_type", "GAUSSIAN")  # a box has no width to set
     put(scene.cycles, "filter_width", 1.0 / scale)
-    width, height = (size // scale * aspect for size, aspect in zip(
-        frame.full, (render.pixel_aspect_x, render.pixel_aspect_y), strict=True
-    ))  # fmt: skip
+    width, height = (size // scale for size in frame.full)
     side = {"AUTO": max(width, height), "HORIZONTAL": width, "VERTICAL": height}[camera.sensor_fit]
     right, down = ((index + 0.5) / scale - 0.5 for index in subpixel)
-    put(camera, "shift_x", camera.shift_x + right * render.pixel_aspect_x / side)
-    put(camera, "shift_y", camera.shift_y - down * render.pixel_aspect_y / side)
+    put(camera, "shift_x", camera.shift_x + right / side)
+    put(camera, "shift_y", camera.shift_y - down / side)
 
 
 @contextmanager
@@ -187,6 +183,9 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
         put(render, "resolution_percentage", 100)
         put(render, "resolution_x", width)
         put(render, "resolution_y", height)
+        # Blender 5.0 cannot write multilayer EXR with others
+        put(render, "pixel_aspect_x", 1.0)
+        put(render, "pixel_aspect_y", 1.0)
         region = Region(frame.left, frame.top, frame.right, frame.bottom)
         for name, value in region_settings(region, frame.full).items():
             put(render, name, value)

@@ -9,7 +9,7 @@ import numpy as np
 from ...versions import cycles_settings
 from ..findings import Findings, Fix
 from .camera_model import Camera, PixelFilter
-from .render_region import Size, picture_size, pictured_region, render_region
+from .render_region import Size, picture_size, pictured_region, render_region, square_size
 
 
 def read_camera(
@@ -24,8 +24,7 @@ def read_camera(
     name = scene.camera.name
     note_picture_settings(scene, findings, picture)
     width, height = picture_size(render)
-    aspect = render.pixel_aspect_x / render.pixel_aspect_y
-    square_width, square_height = (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
+    square_width, square_height = square_size(render)
     if (square_width, square_height) != (width, height):
         findings.note(
             f"Pixel aspect {render.pixel_aspect_x:g}:{render.pixel_aspect_y:g}: the reference is stretched from "

@@ -22,6 +22,13 @@ def picture_size(render: bpy.types.RenderSettings) -> Size:
     return render.resolution_x * percent // 100, render.resolution_y * percent // 100
 
 
+def square_size(render: bpy.types.RenderSettings) -> Size:
+    """Return width and height of the frame in square pixels, more of them where pixels are not square."""
+    width, height = picture_size(render)
+    aspect = render.pixel_aspect_x / render.pixel_aspect_y
+    return (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
+
+
 def render_region(render: bpy.types.RenderSettings) -> Region | None:
     """The Render Region in pixels of the frame, None where it is off; one without pixels is possible.
 

@@ -11,7 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from blender_addon.export.camera.camera_model import Region  # noqa: E402
-from blender_addon.probe.aov_render import frame_of, render_outputs  # noqa: E402
+from blender_addon.probe.aov_render import frame_of, render_outputs, world_to_frame  # noqa: E402
 
 
 @pytest.fixture
@@ -52,6 +52,18 @@ def test_many_outputs_are_rendered_at_a_smaller_scale(scene: Any, outputs: int, 
     assert frame_of(scene, bpy.context.object, 8, outputs).scale == scale
 
 
+def show_position(item: Any) -> None:
+    """Give an object a material that writes positions to the output "place"."""
+    material = bpy.data.materials.new("Square")
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    output = tree.nodes.new("ShaderNodeOutputAOV")
+    output.aov_name = "place"
+    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], output.inputs["Color"])
+    item.data.materials.append(material)
+
+
 @pytest.mark.parametrize("lens", ["ORTHO", "PERSP"])
 @pytest.mark.parametrize("fit", ["AUTO", "VERTICAL", "HORIZONTAL"])
 def test_subpixels_by_a_shifted_camera_are_those_of_a_fine_picture(scene: Any, lens: str, fit: str) -> None:
@@ -62,14 +74,7 @@ def test_subpixels_by_a_shifted_camera_are_those_of_a_fine_picture(scene: Any, l
     scene.camera.data.shift_x = 0.05
     item = bpy.context.object
     item.rotation_euler = (0.4, 0.3, 0.2)
-    material = bpy.data.materials.new("Square")
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    output = tree.nodes.new("ShaderNodeOutputAOV")
-    output.aov_name = "place"
-    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], output.inputs["Color"])
-    item.data.materials.append(material)
+    show_position(item)
     bpy.context.view_layer.update()
     frame = frame_of(scene, item, 4, 1)
     before = scene.camera.data.shift_x, scene.cycles.filter_width
@@ -86,3 +91,35 @@ def test_subpixels_by_a_shifted_camera_are_those_of_a_fine_picture(scene: Any, l
     assert inner.sum() > 500
     assert np.abs((shifted - fine)[inner].mean(axis=0)).max() < 0.1 * np.median(steps)
     assert np.linalg.norm((shifted - fine)[inner], axis=1).mean() < 0.5 * np.median(steps)
+
+
+@pytest.mark.parametrize(("narrow", "aspect"), [((24, 32), (2.0, 1.0)), ((48, 16), (1.0, 2.0)), ((32, 32), (1.5, 1.0))])
+@pytest.mark.parametrize("fit", ["AUTO", "VERTICAL", "HORIZONTAL"])
+def test_pixels_that_are_not_square_are_looked_at_as_square_ones(
+    scene: Any, narrow: tuple[int, int], aspect: tuple[float, float], fit: str
+) -> None:
+    """As the fit has them; Blender 5.0 writes no multilayer EXR with others."""
+    render, camera = scene.render, scene.camera.data
+    camera.type, camera.sensor_fit, camera.shift_x = "PERSP", fit, 0.05
+    scene.camera.location = (2.0, 1.0, 6.0)
+    item = bpy.context.object
+    item.rotation_euler = (0.4, 0.3, 0.2)
+    show_position(item)
+    found, matrices = [], []
+    for size, (wide, high) in (((48, 32), (1.0, 1.0)), (narrow, aspect)):
+        render.resolution_x, render.resolution_y = size
+        render.pixel_aspect_x, render.pixel_aspect_y = wide, high
+        bpy.context.view_layer.update()
+        frame = frame_of(scene, item, 2, 1)
+        assert frame.full == (96, 64)
+        matrices.append(world_to_frame(scene, frame))
+        by_pixels = render_outputs(scene, bpy.context.view_layer, [("place", True)], frame, 4, by_pixels=True)
+        found.append(by_pixels.values["place"])
+        assert (render.resolution_x, render.resolution_y, render.pixel_aspect_x, render.pixel_aspect_y) == (
+            *size,
+            wide,
+            high,
+        )
+    np.testing.assert_allclose(matrices[1], matrices[0], rtol=1e-6, atol=1e-6)
+    assert np.abs(found[0]).max() > 1.0
+    np.testing.assert_allclose(found[1], found[0], atol=1e-6)
