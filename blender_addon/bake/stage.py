@@ -80,7 +80,8 @@ def copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, 
 
     Its name becomes that of the original, which is to get it back.
     """
-    if mesh is not None and hasattr(original.data, "texspace_location"):
+    # of a metaball Cycles takes that of the faces, whatever its data say
+    if mesh is not None and hasattr(original.data, "texspace_location") and original.type != "META":
         mesh.use_auto_texspace = False
         mesh.texspace_location = original.data.texspace_location
         mesh.texspace_size = original.data.texspace_size
