@@ -46,7 +46,10 @@ class ShadowTerminator:
             self._first = shape_table(lifted, faces, mi.UInt32)
             self._cutoff = shape_table(lifted, [shape_number(s, GEOMETRY_OFFSET) for s in lifted], mi.Float)
         # Cycles asks the normal that a displacement by bump has bent how far light grazes
-        self._displaced = [(s, s.bsdf()) for s in lifted if "shading_normal" in getattr(s.bsdf(), "directions", ())]
+        self._displaced, self._bumped = (
+            [(s, s.bsdf()) for s in some if "shading_normal" in getattr(s.bsdf(), "directions", ())]
+            for some in (lifted, bent)
+        )
         if self.bends:
             self._frequency = shape_table(
                 bent, [1.0 / (1.0 - 0.5 * shape_number(s, SHADING_OFFSET)) for s in bent], mi.Float
@@ -75,9 +78,13 @@ class ShadowTerminator:
             return 1.0
         shape, known = _index(si, self._frequency)
         frequency = dr.gather(mi.Float, self._frequency, shape, active & known)
-        cosine = dr.minimum(dr.abs(wo.z), 1.0)
+        signed = dr.mulsign(wo.z, si.wi.z)
+        for each, material in self._bumped:
+            along = dr.dot(material.shading_normal(si, active), si.to_world(wo))
+            signed = dr.select(si.shape == mi.ShapePtr(each), along, signed)
+        cosine = dr.clip(signed, 0.0, 1.0)
         bent = dr.maximum(dr.cos(dr.safe_acos(cosine) * frequency), 0.0) / dr.maximum(cosine, 1e-6)
-        reflected = active & known & (wo.z * si.wi.z > 0.0) & (frequency > 1.0)
+        reflected = active & known & (signed > 0.0) & (frequency > 1.0)
         return dr.select(reflected, bent, 1.0)
 
     def _lift(self, si: mi.SurfaceInteraction3f, towards: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
