@@ -206,7 +206,7 @@ class _Walk:
         self.target_pieces: list[list[TriangleMesh]] = [[] for _ in targets]
         self.targets_left_out = [0] * len(targets)  # triangles
         self.places: list[tuple[str, TriangleMesh]] = []
-        self.custom_normals = set[str]()
+        self.leaning_normals = set[str]()  # names of objects with custom normals, or with smooth faces beside flat ones
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
@@ -275,8 +275,8 @@ class _Walk:
             return
         note_visibility(item, self.findings)
         hidden = camera_misses(instance, self.depsgraph.view_layer)
-        if item.data.has_custom_normals:
-            self.custom_normals.add(item.name)
+        if item.data.has_custom_normals or item.data.normals_domain == "CORNER":
+            self.leaning_normals.add(item.name)
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
@@ -336,8 +336,8 @@ class _Walk:
             )
 
     def note_bent_normals(self, fitted: Sequence[tuple[FittedSlot, Shape]]) -> None:
-        """Report `fitted` objects, and others with custom normals, on which these turn away from the camera."""
-        meshes = dict(reversed([place for place in self.places if place[0] in self.custom_normals]))
+        """Report `fitted` objects, and others whose normals lean by more than rounding, if they turn from the camera."""
+        meshes = dict(reversed([place for place in self.places if place[0] in self.leaning_normals]))
         meshes |= {each.object.name: shape.mesh for each, shape in fitted}
         for name, mesh in meshes.items():
             share = share_of_bent_normals(mesh, self.data.camera)
