@@ -206,7 +206,7 @@ class _Walk:
         self.target_pieces: list[list[TriangleMesh]] = [[] for _ in targets]
         self.targets_left_out = [0] * len(targets)  # triangles
         self.places: list[tuple[str, TriangleMesh]] = []
-        self.leaning_normals = set[str]()  # names of objects with custom normals, or with smooth faces beside flat ones
+        self.leaning_normals = set[str]()  # objects with custom normals, or with smooth faces beside flat ones
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
@@ -336,7 +336,7 @@ class _Walk:
             )
 
     def note_bent_normals(self, fitted: Sequence[tuple[FittedSlot, Shape]]) -> None:
-        """Report `fitted` objects, and others whose normals lean by more than rounding, if they turn from the camera."""
+        """Report `fitted` objects, and others whose normals lean, if they turn away from the camera."""
         meshes = dict(reversed([place for place in self.places if place[0] in self.leaning_normals]))
         meshes |= {each.object.name: shape.mesh for each, shape in fitted}
         for name, mesh in meshes.items():
