@@ -60,7 +60,8 @@ A floor under each light, {size}x{size} pixels, box filter, in Cycles
 {version} with {samples} samples per pixel and in our renderer with as many. Both come in two halves, so that the noise
 can be taken out; columns as in [cycles_parity.md](cycles_parity.md), in percent of the picture's mean. The shiny floor
 is metal of roughness 0.1, whose light is nearly all met by rays that the material sends out. "Before": a dim light with
-a size of about a metre hangs between a small bright one and the floor, and does not block it.
+a size of about a metre hangs between a small bright one and the floor, and does not block it. "nodes": lights with
+nodes over the matt floor, which Cycles measures for the export.
 
 | floor | light | level | mean | rms | noise |
 |---|---|---|---|---|---|
