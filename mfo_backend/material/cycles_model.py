@@ -35,6 +35,8 @@ class CyclesModel:
         The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "glass" tints what it reflects
         and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
         lobe on the other side times the base colour.
+    skin
+        How light enters below the surface and how far it goes there, the node's "Random Walk (Skin)".
     """
 
     multiple_scattering: bool = True
@@ -43,10 +45,14 @@ class CyclesModel:
     film_fourier: bool = True
     bumps_shade: bool = True
     shader: str = "principled"
+    skin: bool = False
 
 
 def cycles_model(
-    version: Sequence[int] = (5, 0), distribution: str = "MULTI_GGX", shader: str = "principled"
+    version: Sequence[int] = (5, 0),
+    distribution: str = "MULTI_GGX",
+    shader: str = "principled",
+    subsurface_method: str = "RANDOM_WALK",
 ) -> CyclesModel:
     """The switches of Blender `version` (major, minor, ...), 4.2 or newer.
 
@@ -69,4 +75,5 @@ def cycles_model(
         film_fourier=major_minor >= (5, 0),
         bumps_shade=major_minor >= (4, 5),
         shader=shader,
+        skin=subsurface_method == "RANDOM_WALK_SKIN",
     )

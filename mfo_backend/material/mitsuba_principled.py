@@ -50,6 +50,7 @@ class MitsubaPrincipled:
     name: str = "mitsuba_principled"
     table: ParameterTable = MITSUBA_PRINCIPLED
     normals: ParameterTable = ParameterTable(())
+    walks: ParameterTable = ParameterTable(())
     # what a global start scans instead of solving for: the first is the lobe width, the others are optional
     scanned: tuple[str, ...] = ("roughness", "clearcoat_gloss")
     two_sided: bool = False  # the plugin needs the wrapper `twosided`

@@ -19,9 +19,11 @@ from .principled.layers import layer_stack
 from .principled.mix_values import MixValues, amount_of
 from .principled.needed_lobes import needed_lobes
 from .principled.principled_parameters import BLENDER_PRINCIPLED
+from .principled.random_walk import WALK
 
 # (values by name, wi, wo) -> BSDF times cosine; directions in the shading frame, a value of exactly 0.0 is a lobe left
 # out
+NO_WALK = ParameterTable(())
 Evaluate = Callable[[Mapping[str, Any], Any, Any], Any]
 
 
@@ -32,6 +34,8 @@ class RecordedModel(Protocol):
     ----------
     normals
         Directions that the functions take besides, where nodes give the surface normals.
+    walks
+        Numbers of walks below the surface that they take besides, if they take such lanes.
     scanned
         Values a global start scans: the main lobe's width first.
     two_sided
@@ -45,6 +49,7 @@ class RecordedModel(Protocol):
     name: str
     table: ParameterTable
     normals: ParameterTable
+    walks: ParameterTable
     scanned: tuple[str, ...]
     two_sided: bool
     limited_width: bool
@@ -75,6 +80,7 @@ class BlenderPrincipledModel:
     name: str = "blender_principled"
     table: ParameterTable = BLENDER_PRINCIPLED
     normals: ParameterTable = BUMPED_NORMALS
+    walks: ParameterTable = NO_WALK
     scanned: tuple[str, ...] = ("roughness", "coat_roughness")
     two_sided: bool = True
     limited_width: bool = True
@@ -100,15 +106,21 @@ class BlenderPrincipledModel:
         return loaded_buffers()
 
 
-class GlowingModel(BlenderPrincipledModel):
-    """Blender's Principled BSDF with its own light, which is what it sends to the view without a `wo`: (0, 0, 0).
+class InnerLightModel(BlenderPrincipledModel):
+    """Blender's Principled BSDF with light from inside, which it sends to the view without a `wo`: (0, 0, 0).
 
-    The emission is 1 unless it is free: a recording has its radiance.
+    That is its own where it `glows`, 1 unless it is free, for a recording has its radiance. Where light `walks` below
+    the surface, a lane whose walk has a length is of that.
     """
+
+    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, glows: bool, walks: bool) -> None:
+        super().__init__(cycles)
+        self._glows = glows
+        self.walks = WALK if walks else NO_WALK
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`."""
-        unit = {"emission_color": (1.0, 1.0, 1.0), "emission_strength": 1.0}
+        unit = {"emission_color": (1.0, 1.0, 1.0), "emission_strength": 1.0} if self._glows else {}
         return super().values(given, free) | {name: value for name, value in unit.items() if name not in free}
 
     def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
@@ -117,7 +129,13 @@ class GlowingModel(BlenderPrincipledModel):
 
         def seen(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
             layers = layer_stack(parameters, wi, lobes, self._cycles)
-            return dr.select(dr.dot(wo, wo) > 0, evaluate(layers, layers.to_frame(wo)), layers.emission)
+            inside = layers.emission if self._glows else 0 * layers.emission
+            if self.walks and layers.below is not None:
+                collisions, length, log_density = (parameters[name] for name in WALK.names)
+                carried = layers.below.medium.carried(collisions, length, log_density)
+                inside = dr.select(length > 0, layers.below.weight * carried, inside)
+                layers = replace(layers, subsurface=None)
+            return dr.select(dr.dot(wo, wo) > 0, evaluate(layers, layers.to_frame(wo)), inside)
 
         return seen
 
@@ -187,10 +205,12 @@ def _number(weight: Any) -> float | None:
     return None if hasattr(weight, "eval_1") else float(weight[0])
 
 
-def recorded_model(name: str, bsdf: Any, mix: MixValues | None = None, *, glows: bool = False) -> RecordedModel:
+def recorded_model(
+    name: str, bsdf: Any, mix: MixValues | None = None, *, glows: bool = False, walks: bool = False
+) -> RecordedModel:
     """The recorded version of model `name`, with the switches of the scene's `bsdf`, of which `mix` is free besides.
 
-    With `glows` it has its own light, too.
+    With `glows` it has its own light, too, and with `walks` that from below its surface.
 
     Raises
     ------
@@ -202,6 +222,6 @@ def recorded_model(name: str, bsdf: Any, mix: MixValues | None = None, *, glows:
     if mix is not None:
         return MixedModel(bsdf, mix)
     if name == "blender_principled":
-        kind = GlowingModel if glows else BlenderPrincipledModel
-        return kind(getattr(bsdf, "model", BLENDER_5_0))
+        cycles = getattr(bsdf, "model", BLENDER_5_0)
+        return InnerLightModel(cycles, glows=glows, walks=walks) if glows or walks else BlenderPrincipledModel(cycles)
     raise UnrecordableError(f"Material model {name!r} has no recorded-path version.")

@@ -32,10 +32,11 @@ def main() -> None:
     from studies.graphs.bumps import BUMPS
     from studies.graphs.head import head_scene
     from studies.graphs.materials import GRAPHS
+    from studies.graphs.subsurface import SUBSURFACE
 
     target, node = head_scene(chosen.light, chosen.size)
     if chosen.graph != CONSTANT:
-        (GRAPHS | BUMPS)[chosen.graph](target.active_material.node_tree, node)
+        (GRAPHS | BUMPS | SUBSURFACE)[chosen.graph](target.active_material.node_tree, node)
     scene = bpy.context.scene
     scene.cycles.samples = chosen.samples
     settings = scene.render.image_settings

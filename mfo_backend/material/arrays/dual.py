@@ -169,6 +169,7 @@ rsqrt = _by_slope(drjit.rsqrt, lambda x, inverse: -0.5 * inverse / x, "rsqrt")
 rcp = _by_slope(drjit.rcp, lambda _, inverse: -drjit.square(inverse), "rcp")
 exp = _by_slope(drjit.exp, lambda _, power: power, "exp")
 log = _by_slope(drjit.log, lambda x, _: drjit.rcp(x), "log")
+atan = _by_slope(drjit.atan, lambda x, _: drjit.rcp(1.0 + drjit.square(x)), "atan")
 cos = _by_slope(drjit.cos, lambda x, _: -drjit.sin(x), "cos")
 safe_acos = _by_slope(
     drjit.safe_acos, lambda x, _: -drjit.rsqrt(drjit.maximum(1.0 - drjit.square(x), drjit.epsilon(x))), "safe_acos"

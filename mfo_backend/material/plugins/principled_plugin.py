@@ -34,6 +34,7 @@ from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
 from ..principled.needed_lobes import needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
+from ..principled.random_walk import Below
 
 PLUGIN_NAME = "blender_principled"
 DIRECTIONS = ("shading_normal", "normal", "coat_normal", "tangent")
@@ -67,7 +68,8 @@ class BlenderPrincipled(mi.BSDF):
             raise SetupError(f"blender_principled works in RGB, not in variant {mi.variant()!r}: use llvm_ad_rgb.")
         version = tuple(int(part) for part in str(props.get("blender_version", "5.0")).split("."))
         shader = str(props.get("shader", "principled"))
-        self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader)
+        walks = str(props.get("subsurface_method", "RANDOM_WALK"))
+        self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader, walks)
         self.filtered = bool(props.get("filtered", False))
         self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
@@ -142,6 +144,15 @@ class BlenderPrincipled(mi.BSDF):
         if sampled:
             return mi.Color3f(sampled_emission(self.values_at(si, active) | own, si.wi, self.lobes))
         return mi.Color3f(self._layers(si, active, **own).layers.emission)
+
+    @property
+    def has_below(self) -> bool:
+        """Whether light walks below the surface."""
+        return self.lobes.dielectric and self.lobes.subsurface
+
+    def below(self, si: mi.SurfaceInteraction3f, active: Any) -> Below | None:
+        """What the view finds below a surface point; None of a material without."""
+        return self._layers(si, active).layers.below
 
     def picture_of(self, name: str) -> Any:
         """The texture of a parameter or a direction that has one."""

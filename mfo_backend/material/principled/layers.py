@@ -31,6 +31,7 @@ from ..lobes.thin_film import ThinFilm
 from .bumped_normals import BumpedNormals, about
 from .needed_lobes import Lobes
 from .principled_parameters import BLENDER_PRINCIPLED
+from .random_walk import Below
 
 # A Glossy BSDF narrows alpha by up to 1 - 0.99 where a Principled BSDF's `anisotropic` of 1 leaves sqrt(0.1)
 GLOSSY_ANISOTROPY = (1.0 - 0.01**2) / 0.9
@@ -40,7 +41,8 @@ GLOSSY_ANISOTROPY = (1.0 - 0.01**2) / 0.9
 class Layers:
     """Weights (RGB, compensation included) and shapes of the lobes; None where a lobe is left out.
 
-    `glass_colour` tints what glass lets through and `glass_reflected` what it reflects. `normals` are there where nodes
+    `glass_colour` tints what glass lets through and `glass_reflected` what it reflects. `subsurface` is the
+    Lambert lobe that stands for what is `below`, where nobody walks there. `normals` are there where nodes
     give them; then the frame is that of the microfacet lobes. `wi`, in the frame of the anisotropy, lies on the side of
     the normal. `cos_rotation`, `sin_rotation` turn a direction of the surface's own frame into it.
     """
@@ -72,6 +74,7 @@ class Layers:
     base: Any = None
     diffuse_roughness: Any = None
     subsurface: Any = None
+    below: Below | None = None
     translucent: Any = None
     normals: BumpedNormals | None = None
 
@@ -280,9 +283,9 @@ def _add_plastic(
     stack |= {"specular": dr.select(present, w * gain.scale, 0), "specular_fresnel": fresnel}
     w = w * saturate(1 - largest(hidden))
     colour = at_least(p["base_color"], 0)
-    if lobes.subsurface:  # random walks are replaced by a Lambert lobe of the same colour
+    if lobes.subsurface:
         amount = saturate(p["subsurface_weight"])
-        stack["subsurface"] = w * base * amount
+        stack |= {"below": Below.of(p, w * amount, n, model), "subsurface": w * base * amount}
         w = w * (1 - amount)
     stack |= {"diffuse": w * colour, "base": colour}
     if lobes.diffuse_roughness and model.diffuse_roughness:

@@ -10,8 +10,8 @@ from ...types.errors import BadInputError
 from ...types.parameter import Value
 from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 
-# Sockets without effect here: normals and tangents are the mesh's, subsurface is replaced by a diffuse lobe
-_IGNORED = {"Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall"}
+# Sockets without effect here: normals and tangents are the mesh's
+_IGNORED = {"Weight", "Thin Wall"}
 _EMISSION = {"Emission Color": [1.0, 1.0, 1.0], "Emission Strength": 0.0}
 # but for those that nodes give as the camera sees them. The first is no socket: it is what a displacement by bump makes
 # of the mesh's normals
@@ -31,6 +31,7 @@ def blender_principled_dict(
     free: Collection[str] = (),
     unreachable_refraction: bool = True,
     shader: str = "principled",
+    subsurface_method: str = "RANDOM_WALK",
 ) -> dict[str, Any]:
     """Properties for `mi.load_dict` from `{"Base Color": {"value": [r, g, b]}, ...}`, colours linear Rec.709.
 
@@ -51,6 +52,8 @@ def blender_principled_dict(
     }
     if shader != "principled":
         result["shader"] = shader
+    if subsurface_method != "RANDOM_WALK":
+        result["subsurface_method"] = subsurface_method
     if not unreachable_refraction:
         result["unreachable_refraction"] = False
     if free:
@@ -97,6 +100,7 @@ def closure_tree_dict(
             free=[PARAMETER_OF_SOCKET[socket] for socket in leaf.get("free", ())],
             unreachable_refraction=unreachable_refraction,
             shader=leaf["shader"],
+            subsurface_method=leaf.get("subsurface_method", "RANDOM_WALK"),
         )
         result[f"weight_{k}"] = _amount(leaf["weight"])
         result |= _ways(f"ways_{k}", leaf) | _varies(f"varies_{k}", leaf)

@@ -135,6 +135,7 @@ def _put_material(
         free=free,
         unreachable_refraction=unreachable_refraction,
         shader=material.get("shader", "principled"),
+        subsurface_method=material.get("subsurface_method", "RANDOM_WALK"),
     )
     if is_mixed(material):
         properties = closure_tree_dict(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
 from ...material.plugins.seen_surface import SeenSurface
+from ...material.principled.random_walk import WALK
 from ...types.errors import BadInputError
 from ...types.light_paths import LightPaths
 from ..camera.highlight_cells import Highlights, highlight_cells
@@ -33,6 +34,7 @@ from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .proposal import DefensiveProposal
 from .recorded_background import add_radiance, recorded_background
 from .recorded_paths import RecordedPaths
+from .walked_lanes import WalkSettings, walked_lanes
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class RecordSettings:
     directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need no other
     kernels than a recording with it. With `glows` the target's own light is no part of the constant picture but a lane
     without direction for each camera ray. Where the emission is free, a colour of 1 has the radiance `unit_emission`.
+    Light below the surface is recorded for the extinctions that the material has times those of `walks`, if there are
+    any: a walk is a lane without direction, too, and every lane has the numbers of `random_walk.WALK`.
     """
 
     grid: int | NDArray[np.int64] = 2
@@ -74,6 +78,7 @@ class RecordSettings:
     direct_samples: int = 0
     glows: bool = False
     unit_emission: float | None = None
+    walks: tuple[float, ...] = ()
     sensor: Any = None  # a camera that the scene lacks
 
 
@@ -147,6 +152,9 @@ def record_paths(
             if settings.surface is not None:
                 values["subpixel"] = settings.surface.row_of(si.p)
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
+        below = shape.bsdf().below(si, mi.Bool(True)) if settings.walks else None
+        if settings.walks:
+            held += (dr.zeros(mi.Float, dr.width(index)),) * len(WALK)
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
         coat = _coat_normal(shape, settings, si)
         si = _turned(shape, settings, si)
@@ -164,6 +172,12 @@ def record_paths(
         lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
         if sampled:
             lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
+        if below is not None:
+            begun = TechniqueLanes(si.wi, si.wi, filter_weight, position, held)
+            walks = WalkSettings(
+                settings.samples, settings.seed, settings.walks, settings.light_paths, max(settings.depth, 2)
+            )
+            lanes.append(walked_lanes(scene, begun, si, below, pixels, walks))
 
         covered, coverage = coverage_of(pixels, position, filter_weight)
         constant = recorded_background(
@@ -172,7 +186,8 @@ def record_paths(
         )  # fmt: skip
         if glow is not None:
             add_radiance(constant, rays.pixel[np.array(position)], glow)
-        merged = merged_lanes(lanes, settings.samples, settings.held, rays, covered, coverage, constant)
+        named = (*settings.held, *(WALK.names if settings.walks else ()))
+        merged = merged_lanes(lanes, settings.samples, named, rays, covered, coverage, constant)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
         return merged

@@ -80,7 +80,7 @@ class RecordedJacobian:
         self._width = 1 + free.length * derivatives
         values = {name: value for name, value in fixed.items() if name not in free.names}
         self._absent = [name for name, value in values.items() if value == 0.0]
-        tables = (model.table, model.normals)
+        tables = (model.table, model.normals, model.walks)
         given = () if varying is None else (*varying.names, *(model.normals.names if varying.turns else ()))
         held = [name for name, value in values.items() if value is None and name not in given]
         self._held = [table[name] for table in tables for name in table.names if name in held]

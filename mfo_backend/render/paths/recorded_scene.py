@@ -50,6 +50,8 @@ MOST_RAYS = 12_000_000  # of one recording, those that miss the target included
 BYTES_PER_RAY_EXACT, BYTES_PER_RAY_SAMPLED = (150, 220), (340, 480)
 BYTES_PER_SAMPLE = 200  # of each further sample of the light
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
+# Extinctions that walks below the surface are recorded for, as multiples of the material's
+NEAR_WALKS, FAR_WALKS = (1.0,), (0.4, 1.0, 2.5)
 DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
 
 
@@ -96,11 +98,15 @@ class RecordedScene:
         self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
         layered = renderer.shape.is_emitter() and getattr(renderer.shape.emitter(), "layered", False)
         self._glows = layered and not self._mixed and renderer.model == "blender_principled"
-        self.model = recorded_model(renderer.model, renderer.shape.bsdf(), renderer.mix, glows=self._glows)
+        bsdf = renderer.shape.bsdf()
+        walks = not self._mixed and getattr(bsdf, "has_below", False)
+        self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
+        self._walks = bool(self.model.walks)
+        self._fixed |= dict.fromkeys(self.model.walks.names)
         self.graph = graph or renderer.graph
         varying = partial(VaryingValues, table=renderer.table, sizes=self.model.table)
         self._varying, self._evaluated = (each and varying(each) for each in (renderer.graph, self.graph))
@@ -108,6 +114,11 @@ class RecordedScene:
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
         if self._mixed and not renderer.shape.bsdf().is_opaque:
             raise UnrecordableError("The material is mixed with one that lets light through.")
+
+    @property
+    def _kept(self) -> tuple[str, ...]:
+        """Values that a recording asks the material for, at each hit."""
+        return tuple(name for name in self._held if name not in self.model.walks.names)
 
     @property
     def varies(self) -> bool:
@@ -126,7 +137,7 @@ class RecordedScene:
 
     def _probe(self) -> SceneNeeds:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
-        scene, sampled = self.renderer.scene, not self.lights_exact
+        scene, sampled = self.renderer.scene, self._walks or not self.lights_exact
         limit = int(getattr(self._integrator, "max_depth", DIRECT))
         depth = DEEPEST if limit < 0 else min(limit, DEEPEST)
         if depth <= DIRECT:
@@ -178,8 +189,9 @@ class RecordedScene:
             hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
             stride=stride,
             two_sided=self.model.two_sided,
-            held=self._held,
+            held=self._kept,
             bumped=self._bumped,
+            walks=(NEAR_WALKS if near else FAR_WALKS) if self._walks else (),
             surface=None if self._varying is None else self._varying.surface(vector),
             mixed=self._mixed,
             light_paths=self.renderer.light_paths,
@@ -218,8 +230,9 @@ class RecordedScene:
             proposal=self._proposal(vector, near=True),
             hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
             two_sided=self.model.two_sided,
-            held=self._held,
+            held=self._kept,
             bumped=self._bumped,
+            walks=NEAR_WALKS if self._walks else (),
             light_paths=self.renderer.light_paths,
             samples=2 if self.needs.sampled else 1,
             glows=self._glows,

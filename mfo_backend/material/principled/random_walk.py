@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Light below the surface as Cycles' random walks have it: the medium of Subsurface, and what a walk in it carries.
+
+Light enters a homogeneous medium, is scattered, and leaves where it meets the surface again, to all sides alike. A walk
+of n collisions and a length d in all carries (alpha sigma_t)^n exp(-sigma_t d) in each channel, over the density with
+which it was drawn; so one that was drawn for other values tells the light of these.
+
+Sources: M. Chiang, P. Kutz, B. Burley, "Practical and Controllable Subsurface Scattering for Production Path Tracing"
+(2016); the inversion of the albedo for anisotropic phase functions is that of Cycles
+(kernel/integrator/subsurface_random_walk.h, Blender 4.2 to 5.2), radii those of kernel/closure/bssrdf.h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...types.parameter import Parameter, ParameterTable
+from ..arrays import dual as dr
+from ..arrays.clamp import at_least, saturate
+from ..cycles_model import CyclesModel
+
+# What a recorded walk holds: its collisions, its length in scene units, and the logarithm of its density without that
+# of its directions; length 0 is no walk
+WALK = ParameterTable(
+    Parameter(name, 1, lower, 1e6, 0.0)
+    for name, lower in (("walk_collisions", 0.0), ("walk_length", 0.0), ("walk_log_density", -1e6))
+)
+MOST_COLLISIONS = 256  # of a walk, as in Cycles; a longer one is lost
+SHORTENED = 0.25 / 3.14159265  # mean free path of a radius, which says how far light spreads, outside of skin
+LEAST_ALBEDO = 0.2  # of a collision; below it a walk carries less instead
+LEAST_PATH = 1e-8  # scene units
+LEAST_INDEX, MOST_INDEX = 1.01, 3.8
+MOST_ANISOTROPY = 0.9
+_FIT = (
+    (1.8260523782, -1.28451056436, -1.79904629312, 9.19393289202, -22.8215585862, 32.0234874259, -23.6264803333,
+     7.21067002658),
+    (0.0, 31.1491581433, -201.847017512, 841.576016723, -2018.09288505, 2731.71560286, -1935.41424244, 559.009054474),
+    (1.09686102424, -0.394704063468, 1.05258115941, -8.83963712726, 28.8643230661, -46.8802913581, 38.5402837518,
+     -12.7181042538),
+    (0.496310210422, 0.360146581622, -2.15139309747, 17.8896899217, -55.2984010333, 82.065982243, -58.5106008578,
+     15.8478295021),
+    (0.0, 76.7316253952, -594.356773233, 2448.8834203, -5576.68528998, 7116.60171912, -4763.54467887, 1303.5318055),
+    (2.40602999408, -2.51814844609, 9.18494908356, -79.2191708682, 259.082868209, -403.613804597, 302.85712436,
+     -87.4370473567),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Medium:
+    """What is below a surface, RGB but for the anisotropy.
+
+    Attributes
+    ----------
+    albedo
+        Of a collision, alpha.
+    extinction
+        One over the mean free path, in scene units.
+    share
+        What every walk carries besides.
+    anisotropy
+        The mean cosine of the phase function of Henyey and Greenstein.
+    """
+
+    albedo: Any
+    extinction: Any
+    share: Any
+    anisotropy: Any
+
+    @staticmethod
+    def of(parameters: Mapping[str, Any], model: CyclesModel) -> Medium:
+        """That of parameter values by name."""
+        colour = dr.minimum(at_least(parameters["base_color"], 1e-4), 1)
+        g = dr.minimum(at_least(parameters["subsurface_anisotropy"], 0), MOST_ANISOTROPY)
+        radius = at_least(parameters["subsurface_radius"] * parameters["subsurface_scale"], LEAST_PATH)
+        if model.skin:
+            index = dr.minimum(at_least(parameters["subsurface_ior"], LEAST_INDEX), MOST_INDEX)
+            path = radius * dr.sqrt(3 * (1 - _albedo_in_skin(colour, index)))
+        else:
+            path = radius * SHORTENED
+        albedo = dr.minimum(at_least(_scattered(colour, g), 1e-6), 0.999999)
+        share = dr.minimum(albedo / LEAST_ALBEDO, 1)
+        return Medium(at_least(albedo, LEAST_ALBEDO), dr.rcp(path * (1 - g)), share, g)
+
+    def carried(self, collisions: Any, length: Any, log_density: Any) -> Any:
+        """What a walk carries, RGB."""
+        scattered = dr.log(self.albedo * self.extinction) * collisions
+        return self.share * dr.exp(scattered - self.extinction * length - log_density)
+
+
+@dataclass(frozen=True)
+class Below:
+    """What a view finds below a surface: how much of it goes there, RGB, the medium, and how it is bent on its way.
+
+    That is by microfacets of this alpha and index; half of the views into `skin` enter to all sides alike.
+    """
+
+    weight: Any
+    medium: Medium
+    alpha: Any
+    ior: Any
+    skin: bool
+
+    @staticmethod
+    def of(parameters: Mapping[str, Any], weight: Any, ior: Any, model: CyclesModel) -> Below:
+        """That of parameter values by name, below an interface of index `ior`."""
+        roughness = saturate(parameters["roughness"])
+        medium = Medium.of(parameters, model)
+        if model.skin:
+            return Below(weight, medium, 0 * roughness + 1, parameters["subsurface_ior"], True)
+        return Below(weight, medium, dr.square(roughness), ior, False)
+
+    def gathered(self, index: Any) -> Below:
+        """That of some points."""
+        medium, (weight, alpha, ior) = self.medium, (_at(v, index) for v in (self.weight, self.alpha, self.ior))
+        names = ("albedo", "extinction", "share", "anisotropy")
+        return Below(weight, Medium(*(_at(getattr(medium, name), index) for name in names)), alpha, ior, self.skin)
+
+
+def _at(value: Any, index: Any) -> Any:
+    """Entries of an array; one number is everywhere the same."""
+    return dr.gather(type(value), value, index) if dr.width(value) > 1 else value
+
+
+def _scattered(colour: Any, g: Any) -> Any:
+    """The albedo of a collision with which a flat surface reflects `colour`."""
+    a, b, c, d, e, f = (_polynomial(row, g) for row in _FIT)
+    b, e = 4.98511194385 + 0.127355959438 * dr.exp(b), 4.23190299701 + 0.00310603949088 * dr.exp(e)
+    blend = dr.sqrt(dr.sqrt(colour))
+    dark = a * dr.exp(c * dr.log(dr.atan(b * colour)))
+    return (1 - blend) * dark + blend * (d * dr.exp(f * dr.log(dr.atan(e * colour))))
+
+
+def _polynomial(row: tuple[float, ...], g: Any) -> Any:
+    value: Any = 0 * g + row[-1]
+    for coefficient in row[-2::-1]:
+        value = value * g + coefficient
+    return value
+
+
+def _albedo_in_skin(colour: Any, index: Any) -> Any:
+    """The reduced albedo of the dipole that reflects `colour` (H. Jensen, J. Buhler, "A Rapid Hierarchical Rendering
+    Technique for Translucent Materials", 2002), by bisection and a step of Newton, which has the slopes."""
+    inverse = dr.rcp(dr.detach(index))  # the index is held
+    fresnel = inverse * (-1.440 * inverse + 0.710) + 0.668 + 0.0636 * dr.detach(index)
+    boundary = (4 / 3) * (1 + fresnel) / (1 - fresnel)
+    wanted = dr.minimum(colour, 0.995)
+    sought = dr.detach(wanted)
+    low, high = 0 * sought, 0 * sought + 1
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        below = _dipole(middle, boundary)[0] < sought
+        low, high = dr.select(below, middle, low), dr.select(below, high, middle)
+    middle = 0.5 * (low + high)
+    value, slope = _dipole(middle, boundary)
+    return saturate((wanted - value) / slope + middle)
+
+
+def _dipole(albedo: Any, boundary: Any) -> tuple[Any, Any]:
+    """What a dipole of a reduced albedo reflects, and the slope of that."""
+    root = dr.sqrt(3 * (1 - albedo))
+    near, far = dr.exp(-root), dr.exp(-boundary * root)
+    value = 0.5 * albedo * (1 + far) * near
+    by_root = -0.5 * albedo * near * (1 + far + boundary * far)
+    return value, 0.5 * (1 + far) * near + by_root * (-1.5 / dr.maximum(root, 1e-4))

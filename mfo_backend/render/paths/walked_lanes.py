@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lanes of light that leaves the target where its camera rays meet it, and entered elsewhere."""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+
+from ...material.principled.random_walk import Below
+from ...types.light_paths import LightPaths
+from ..camera.primary_rays import fresh_sampler
+from ..transport.exit_light import exit_light
+from ..transport.path_random import PathRandom
+from ..transport.subsurface_walks import walked
+from .merged_lanes import TechniqueLanes
+
+# Survival of walks that serve materials far from the one they were made for, which may be brighter
+FAR_SURVIVAL = 0.97
+_APART = 0x2C1B3C6D
+
+
+@dataclass(frozen=True)
+class WalkSettings:
+    """How to record walks: in how many independent `samples` of every ray, and `spread` as in `walked`."""
+
+    samples: int
+    seed: int
+    spread: Sequence[float]
+    light_paths: LightPaths | None
+    depth: int
+
+
+def walked_lanes(
+    scene: mi.Scene,
+    hits: TechniqueLanes,
+    si: mi.SurfaceInteraction3f,
+    below: Below,
+    pixels: int,
+    settings: WalkSettings,
+) -> TechniqueLanes:
+    """One lane for each walk that has left again, of all samples.
+
+    `hits` are what lanes of one sample begin with: their `weight` is the share in a pixel, their last values of `held`
+    are left to the walks. `si` is the same surface with the frame that the medium is entered through.
+    """
+    count = dr.width(si.p)
+    lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
+    sample = lane // rays
+    number = lane - sample * rays
+    entered, medium = dr.gather(mi.SurfaceInteraction3f, si, number), below.gathered(number)
+    random = PathRandom.of(lane, dr.opaque(mi.UInt32, settings.seed ^ _APART))
+    reached = dr.max(medium.weight) > 0.0
+    least = FAR_SURVIVAL if len(settings.spread) > 1 else 0.0
+    walks = walked(scene, entered, medium, random, reached, spread=settings.spread, least_survival=least)
+    index = dr.compress(walks.out)
+    ray = dr.gather(mi.UInt32, number, index)
+    exits = dr.gather(mi.SurfaceInteraction3f, walks.si, index)
+    sampler = fresh_sampler(settings.seed ^ _APART, dr.width(index))
+    light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
+    weight = light * dr.gather(mi.Float, hits.weight, ray)
+    position = dr.gather(mi.UInt32, hits.position, ray) + dr.gather(mi.UInt32, sample, index) * pixels
+    kept = [dr.gather(type(value), value, ray) for value in hits.held[:-3]]
+    walk = [dr.gather(mi.Float, value, index) for value in (walks.collisions, walks.length, walks.log_density)]
+    nowhere = dr.zeros(mi.Vector3f, dr.width(index))
+    lanes = TechniqueLanes(dr.gather(mi.Vector3f, hits.wi, ray), nowhere, weight, position, (*kept, *walk))
+    dr.eval(lanes.wi, lanes.wo, lanes.weight, lanes.position, lanes.held)
+    return lanes

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random walks of light below a surface, from where a view enters to where it leaves again.
+
+A walk stays inside of its own shape, whatever else is there, as Cycles' does inside of its object
+(kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one of several extinctions, and its
+density is that of all of them (M. Wilkie et al., "Hero Wavelength Spectral Sampling", 2014), so that one walk serves
+all channels and values nearby. Choose the variant before importing this.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ...material.principled.random_walk import LEAST_INDEX, MOST_COLLISIONS, MOST_INDEX, Below
+from .path_random import PathRandom
+
+CERTAIN = 8  # collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise
+_PER_COLLISION = 4  # places of the random numbers
+
+
+@dataclass(frozen=True)
+class Walks:
+    """Where walks have left, `out` if they did: hits seen from outside, and what `random_walk.WALK` holds of each."""
+
+    si: Any
+    out: Any
+    collisions: Any
+    length: Any
+    log_density: Any
+
+
+def walked(
+    scene: mi.Scene,
+    si: mi.SurfaceInteraction3f,
+    below: Below,
+    random: PathRandom,
+    active: mi.Bool,
+    *,
+    spread: Sequence[float] = (1.0,),
+    least_survival: float = 0.0,
+) -> Walks:
+    """Walk from each hit where `active`, for an extinction of any channel times any of `spread`.
+
+    After a few collisions a walk goes on as probably as the brightest channel does, or with `least_survival`.
+    """
+    medium = below.medium
+    extinctions = [medium.extinction[k] * factor for k in range(3) for factor in spread]
+    survival = dr.maximum(dr.max(medium.albedo), least_survival)
+    d, enters = _entered(si, below, random)
+    active = active & enters
+    width = dr.width(si.p)
+    chosen, free = random.pair(0).x * len(extinctions), extinctions[0] + dr.zeros(mi.Float, width)
+    for k, extinction in enumerate(extinctions[1:], 1):
+        free = dr.select(chosen >= k, extinction, free)
+    shape, prim = mi.ShapePtr(si.shape), mi.UInt32(si.prim_index)
+    g, survival = (value + dr.zeros(mi.Float, width) for value in (medium.anisotropy, survival))
+    found, none = dr.zeros(mi.PreliminaryIntersection3f, width), dr.zeros(mi.UInt32, width)
+    state = (
+        mi.Point3f(si.p), d, none, dr.zeros(mi.Float, width), active & (none == 0), none != 0, found,
+        shape, prim, free, g, survival, mi.UInt32(random.a), mi.UInt32(random.b),
+    )  # fmt: skip
+
+    def step(p, d, collisions, length, active, out, found, shape, prim, free, g, survival, a, b):
+        numbers = PathRandom(a, b)
+        place = _PER_COLLISION * collisions
+        u = numbers.pair(place + 1)
+        t = -dr.log(1.0 - u.x) / free
+        met = _met_inside(scene, mi.Ray3f(p, d, t, 0.0, mi.Color0f()), shape, prim, collisions == 0, active)
+        leaves = active & met.is_valid()
+        found = dr.select(leaves, met, found)
+        out |= leaves
+        collides = active & ~leaves
+        length = length + dr.select(leaves, met.t, dr.select(collides, t, 0.0))
+        collisions = collisions + dr.select(collides, 1, 0)
+        goes_on = collides & (collisions < MOST_COLLISIONS)
+        goes_on &= (collisions <= CERTAIN) | (u.y < survival)
+        scattered = _scattered(d, g, numbers.pair(place + 2))
+        p = dr.select(goes_on, p + t * d, p)
+        d = dr.select(goes_on, scattered, d)
+        return p, d, collisions, length, goes_on, out, found, shape, prim, free, g, survival, a, b
+
+    p, d, collisions, length, _, out, found, *_ = dr.while_loop(
+        state, lambda *s: s[4], step, mode="evaluated", compress=True, label="random walks"
+    )
+    exits = found.compute_surface_interaction(mi.Ray3f(p, d, dr.inf, 0.0, mi.Color0f()), mi.RayFlags.All, out)
+    # as Cycles turns them, by the triangle's own side: a smooth normal may well look away from the walk
+    exits.sh_frame = mi.Frame3f(dr.mulsign(mi.Vector3f(exits.sh_frame.n), dr.dot(exits.n, d)))
+    exits.wi = exits.to_local(d)
+    count = mi.Float(collisions)
+    passed = dr.log(survival) * dr.maximum(count - CERTAIN, 0.0)
+    logs = [dr.log(extinction) * count - extinction * length for extinction in extinctions]
+    largest = logs[0]
+    for each in logs[1:]:
+        largest = dr.maximum(largest, each)
+    density = sum(dr.exp(each - largest) for each in logs) / len(logs)
+    return Walks(exits, out, count, length, largest + dr.log(density) + passed)
+
+
+def _entered(si: mi.SurfaceInteraction3f, below: Below, random: PathRandom) -> tuple[mi.Vector3f, mi.Bool]:
+    """The direction below the surface, and whether there is one."""
+    u, choice = random.pair(1 << 16), random.pair(1 << 17).x
+    wi, alpha, ior = si.wi, mi.Float(below.alpha), dr.clip(mi.Float(below.ior), LEAST_INDEX, MOST_INDEX)
+    h, _ = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, dr.maximum(alpha, 1e-6), True).sample(wi, u)
+    c = dr.dot(wi, h)
+    bent = h * (c / ior - dr.safe_sqrt(1.0 - (1.0 - c * c) / (ior * ior))) - wi / ior
+    if below.skin:
+        bent = dr.select(choice < 0.5, -mi.warp.square_to_cosine_hemisphere(u), bent)
+    d = si.to_world(bent)
+    outside = dr.select(dr.dot(si.n, si.to_world(wi)) < 0.0, -mi.Vector3f(si.n), mi.Vector3f(si.n))
+    return dr.normalize(d), (wi.z > 0.0) & (dr.dot(outside, d) < 0.0)
+
+
+def _scattered(d: mi.Vector3f, g: mi.Float, u: mi.Point2f) -> mi.Vector3f:
+    """A direction of the phase function of Henyey and Greenstein after `d`."""
+    ratio = (1.0 - g * g) / (1.0 + g - 2.0 * g * u.x)
+    bent = (1.0 + g * g - ratio * ratio) / dr.select(dr.abs(g) < 1e-3, 1.0, 2.0 * g)
+    cosine = dr.clip(dr.select(dr.abs(g) < 1e-3, 1.0 - 2.0 * u.x, bent), -1.0, 1.0)
+    sine = dr.safe_sqrt(1.0 - cosine * cosine)
+    s, c = dr.sincos(2.0 * dr.pi * u.y)
+    return dr.normalize(mi.Frame3f(d).to_world(mi.Vector3f(c * sine, s * sine, cosine)))
+
+
+def _met_inside(
+    scene: mi.Scene, ray: mi.Ray3f, shape: mi.ShapePtr, prim: mi.UInt32, first: mi.Bool, active: mi.Bool
+) -> mi.PreliminaryIntersection3f:
+    """The first hit of a shape on a ray from within; where a walk enters, `first`, not the triangle `prim`."""
+    found = scene.ray_intersect_preliminary(ray, active=active)
+
+    def is_other(found, active):
+        return active & found.is_valid() & ((found.shape != shape) | (first & (found.prim_index == prim)))
+
+    def onward(found, passed, passing):
+        start = passed + found.t * (1.0 + 1e-6) + 1e-7
+        rest = mi.Ray3f(ray.o + start * ray.d, ray.d, ray.maxt - start, 0.0, mi.Color0f())
+        further = scene.ray_intersect_preliminary(rest, active=passing)
+        found = dr.select(passing, further, found)
+        passed = dr.select(passing, start, passed)
+        return found, passed, is_other(found, passing)
+
+    found, passed, _ = dr.while_loop(
+        (found, dr.zeros(mi.Float, dr.width(ray.o)), is_other(found, active)), lambda f, p, passing: passing, onward,
+        label="other shapes",
+    )  # fmt: skip
+    found.t = found.t + passed
+    return found
