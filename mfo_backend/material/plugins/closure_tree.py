@@ -95,6 +95,7 @@ class ClosureTree(mi.BSDF):
         for leaf in self.leaves:
             if not isinstance(leaf.material, BlenderPrincipled):
                 raise RuntimeError("a leaf of closure_tree is no blender_principled")
+            leaf.material.nested = True
         both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
         components = [leaf.material.flags() for leaf in self.leaves]
         if self.clear:

@@ -8,7 +8,8 @@ change after loading. Lobes whose weight is zero, not textured and not free are 
 brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
 no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `filtered` (false) reads
 the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of Mitsuba 3.9 looks at: the integrator
-`cycles_path` puts Filter Glossy there. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
+`cycles_path` puts Filter Glossy there, and in `si.duv_dx.y` a 1 where it
+leaves what is below the surface to others; one that is `nested` in a `closure_tree` shows its stand-in all the same. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
 `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be textures of world directions on the camera's side, zero
 for the mesh's own.
 
@@ -19,7 +20,7 @@ shading frame, dp/du of the UV map.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -70,7 +71,7 @@ class BlenderPrincipled(mi.BSDF):
         shader = str(props.get("shader", "principled"))
         walks = str(props.get("subsurface_method", "RANDOM_WALK"))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader, walks)
-        self.filtered = bool(props.get("filtered", False))
+        self.filtered, self.nested = bool(props.get("filtered", False)), False
         self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
@@ -225,7 +226,11 @@ class BlenderPrincipled(mi.BSDF):
             frame, wi, normals = self.bumped_frame(si, active)
             values |= normals
         layers = layer_stack(values, wi, self.lobes, self.model)
-        return _Surface(layers.blurred(si.duv_dx.x) if self.filtered else layers, si, frame)
+        if self.filtered:
+            layers = layers.blurred(si.duv_dx.x)
+            if layers.subsurface is not None and not self.nested:
+                layers = replace(layers, subsurface=layers.subsurface * (1 - si.duv_dx.y))
+        return _Surface(layers, si, frame)
 
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)

@@ -24,12 +24,14 @@ from .merged_lanes import TechniqueLanes
 # Survival of walks that serve materials far from the one they were made for, which may be brighter
 FAR_SURVIVAL = 0.97
 _APART = 0x2C1B3C6D
+_CHOICE = 1 << 18  # a place of the random numbers that no walk has
 
 
 @dataclass(frozen=True)
 class WalkSettings:
-    """How to record walks: in how many independent `samples` of every ray, and `spread` as in `walked`."""
+    """How to record walks: about so many in a pixel, in so many independent `samples`, with a `spread` as in `walked`."""
 
+    in_a_pixel: int
     samples: int
     seed: int
     spread: Sequence[float]
@@ -52,10 +54,14 @@ def walked_lanes(
     """
     count = dr.width(si.p)
     lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
+    random = PathRandom.of(lane, dr.opaque(mi.UInt32, settings.seed ^ _APART))
+    # narrow highlights have far more rays than a smooth glow needs
+    chance = dr.minimum(dr.abs(dr.gather(mi.Float, hits.weight, lane % rays)) * float(settings.in_a_pixel), 1.0)
+    lane = dr.compress(random.pair(_CHOICE).x < chance)
+    chance, random = dr.gather(mi.Float, chance, lane), dr.gather(PathRandom, random, lane)
     sample = lane // rays
     number = lane - sample * rays
     entered, medium = dr.gather(mi.SurfaceInteraction3f, si, number), below.gathered(number)
-    random = PathRandom.of(lane, dr.opaque(mi.UInt32, settings.seed ^ _APART))
     reached = dr.max(medium.weight) > 0.0
     least = FAR_SURVIVAL if len(settings.spread) > 1 else 0.0
     walks = walked(scene, entered, medium, random, reached, spread=settings.spread, least_survival=least)
@@ -64,7 +70,7 @@ def walked_lanes(
     exits = dr.gather(mi.SurfaceInteraction3f, walks.si, index)
     sampler = fresh_sampler(settings.seed ^ _APART, dr.width(index))
     light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
-    weight = light * dr.gather(mi.Float, hits.weight, ray)
+    weight = light * dr.gather(mi.Float, hits.weight, ray) / dr.gather(mi.Float, chance, index)
     position = dr.gather(mi.UInt32, hits.position, ray) + dr.gather(mi.UInt32, sample, index) * pixels
     kept = [dr.gather(type(value), value, ray) for value in hits.held[:-3]]
     walk = [dr.gather(mi.Float, value, index) for value in (walks.collisions, walks.length, walks.log_density)]

@@ -59,7 +59,7 @@ class MitsubaRenderer:
         self._shape_id = material.target.shape_id
         self._scene = scene
         self._integrator = scene.integrator()
-        self._of_pictures = picture_integrator(scene)
+        self._of_pictures = picture_integrator(scene, light_paths)
         self._sensor = scene.sensors()[0]
         self._params = mi.traverse(scene)
         self._keys = _keys_of(list(self._params.keys()), material)

@@ -60,13 +60,15 @@ class CyclesPath(RBIntegrator):
         before: tuple[Any, Any] | None = None,
         met: Any = None,
         every_lamp: bool = False,
+        walked: bool = False,
         **_: Any,
     ) -> tuple[Any, Any, list[Any], Any]:
         """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it.
 
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out. In a scene whose
         lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
-        drawn; it has no derivatives.
+        drawn; it has no derivatives. With `walked` somebody else adds what comes from below the first hit
+        (`below_surface`).
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
@@ -109,7 +111,8 @@ class CyclesPath(RBIntegrator):
             valid |= (bounce == 0) & si.is_valid()
             last = mi.Bool(shadows.ends(si, passages))  # its own light still counts
             si = seen_side(si)
-            si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), 0)
+            without = dr.select(bounce == 0, float(walked and before is None), 0.0)
+            si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
             bsdf = si.bsdf(ray)
 
             # light that the last direction meets

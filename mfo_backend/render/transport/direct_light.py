@@ -13,12 +13,19 @@ from typing import Any
 import mitsuba as mi
 from mitsuba.ad.integrators.prb import PRBIntegrator  # pyright: ignore[reportMissingImports]
 
+from ...types.light_paths import LightPaths
 from ..lamps.met_lamps import lights_have_no_extent
+from .below_surface import WithBelow, materials_with_below
 
 
-def picture_integrator(scene: mi.Scene) -> Any:
-    """The scene's integrator, or one that makes the same pictures sooner; it has no derivatives."""
+def picture_integrator(scene: mi.Scene, light_paths: LightPaths | None) -> Any:
+    """The scene's integrator, one that makes the same pictures sooner, or one that sees below surfaces, too.
+
+    It has no derivatives. `light_paths` are those of `cycles_path`.
+    """
     integrator: Any = scene.integrator()
+    if light_paths is not None and materials_with_below(scene):
+        return WithBelow(integrator, light_paths)
     if not isinstance(integrator, PRBIntegrator) or integrator.max_depth != 2:
         return integrator
     return DirectLight(integrator) if lights_have_no_extent(scene) else integrator

@@ -25,11 +25,12 @@ def traced_radiance(
     hide: bool = False,
     before: tuple[mi.Float, mi.Color3f] | None = None,
     met: mi.PreliminaryIntersection3f | None = None,
+    walked: bool = False,
 ) -> mi.Color3f:
     """Radiance along `ray` over paths of up to `depth`, scene-linear; `hide` leaves lights that it meets out.
 
     `before` is the density and weight of a bounce the ray comes from. With what it has `met`, the emission of that is
-    left out.
+    left out; `walked` is that of `cycles_path`.
     """
     from .cycles_path import PLUGIN_NAME, light_path_properties, register  # can be imported when a variant is set
 
@@ -39,4 +40,4 @@ def traced_radiance(
     if camera_world is not None and before is None:
         properties["camera_world"] = camera_world
     integrator = mi.load_dict(properties | light_path_properties(light_paths or LightPaths()))
-    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, before=before, met=met)[0]
+    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, before=before, met=met, walked=walked)[0]
