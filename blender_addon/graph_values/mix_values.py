@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import EMISSION, KINDS, UNUSED_SOCKETS, inputs_of, is_fitted
+from ..export.nodes.leaf_kinds import EMISSION, KINDS, UNUSED_IN_MIXES, inputs_of, is_fitted
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
@@ -21,7 +21,7 @@ OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
 OPAQUE_SHADERS = ("principled", "glossy")
 NOT_FITTED = (
     *("Weight", "Alpha", "Transmission Weight", "Emission Color", "Emission Strength", "Subsurface Weight"),
-    *(*DIRECTIONS, *UNUSED_SOCKETS),
+    *(*DIRECTIONS, *UNUSED_IN_MIXES),
 )
 # of a Principled BSDF those that *All* takes: one picture tells little more of several, but for lobes that are there
 OF_PRINCIPLED = ("Base Color", "Metallic", "Roughness", "Specular IOR Level")

@@ -10,7 +10,7 @@ from ..types.errors import BadInputError
 
 DISTRIBUTIONS = ("MULTI_GGX", "GGX")
 # nodes whose lobes are those of the Principled BSDF but for their Fresnel terms and tints
-SHADERS = ("principled", "glossy", "glass", "refraction", "translucent")
+SHADERS = ("principled", "glossy", "glass", "refraction", "translucent", "subsurface")
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class CyclesModel:
     shader
         The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "glass" tints what it reflects
         and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
-        lobe on the other side times the base colour.
+        lobe on the other side times the base colour. Light enters below "subsurface" with an index of its own.
     skin
         How light enters below the surface and how far it goes there, the node's "Random Walk (Skin)".
     """

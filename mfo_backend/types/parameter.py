@@ -33,7 +33,7 @@ class Parameter:
 
     `size` is 1 for a scalar and 3 for a linear RGB colour. `lower` and `upper` bound every component during a fit.
     Where the renderer's own gradient is not defined up to there, it is that at `slope_upper`. `label` is what its node
-    calls it, where that is not the socket of its name.
+    calls it, where that is not the socket of its name. A search from nothing begins at `begin`, or between the bounds.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Parameter:
     default: Value
     slope_upper: float = math.inf
     label: str = ""
+    begin: Value | None = None
 
     @property
     def shown(self) -> str:
@@ -98,6 +99,12 @@ class ParameterTable(Sequence[Parameter]):
     def upper(self) -> NDArray[np.float64]:
         """Upper bounds, shape (length,)."""
         return np.concatenate([np.zeros(0), *(np.full(p.size, p.upper) for p in self._parameters)])
+
+    @property
+    def begin(self) -> NDArray[np.float64]:
+        """Where a search from nothing begins, shape (length,)."""
+        values = {p.name: 0.5 * (p.lower + p.upper) if p.begin is None else p.begin for p in self._parameters}
+        return self.pack(values)
 
     def slice_of(self, name: str) -> slice:
         """Entries of the vector that hold `name`."""

@@ -91,9 +91,11 @@ def emission_element(material: Material, scale: float, save: Callable[[Texture],
 def approximated(material: Material) -> list[str]:
     """Return a sentence for each thing that no model of the backend has, Blender's own included."""
     found = []
-    if material.value("Subsurface Weight", 0.0) != 0.0:
-        weight = "" if material.value("Diffuse Roughness", 0.0) else " Its weight has no effect at Diffuse Roughness 0."
-        found.append(f"Subsurface is fitted as diffuse: no light travels below the surface.{weight}")
+    below = [leaf for leaf in (material, *material.leaves) if leaf.value("Subsurface Weight", 0.0) != 0.0]
+    if below and material.is_mixed:
+        found.append("Subsurface is shown as diffuse in a mix of shaders: no light travels below the surface.")
+    elif below and material.subsurface_method == "BURLEY":
+        found.append("Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
     above = {name for leaf in (material, *material.leaves) if material.is_mixed for name in _above_emission(leaf)}

@@ -28,7 +28,7 @@ from ..material_model import Material, Socket, grey
 from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
-from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, UNUSED_SOCKETS, WITHOUT_SPECULAR, inputs_of, only_nearest
+from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, UNUSED_IN_MIXES, UNUSED_SOCKETS, WITHOUT_SPECULAR, inputs_of, only_nearest
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
     plain_value,
@@ -150,7 +150,7 @@ def _read_leaf(material: bpy.types.Material, target: TargetShader, findings: Fin
         if name in node.inputs:
             place = Place(node.inputs[name], target.groups)
             sockets[name] = _read_direction(name, place, material.name, findings)
-    return Material(material.name, "principled", sockets, distribution_of(node), shader=kind.shader)
+    return Material(material.name, "principled", sockets, distribution_of(node), _walks_of(node), shader=kind.shader)
 
 
 def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findings) -> Material:
@@ -173,7 +173,7 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
         findings.note(f"Material '{material.name}': '{name}' ({node.bl_label}) is held as black.")
         sockets = {key: Socket(value, True) for key, value in {**WITHOUT_SPECULAR, "Base Color": [0.0] * 3}.items()}
         return Material(name, "principled", sockets, weight=weight, node=tuple(leaf.path), is_nearest=True)
-    skipped = (*SKIPPED_SOCKETS, *UNUSED_SOCKETS, *DIRECTIONS)
+    skipped = (*SKIPPED_SOCKETS, *UNUSED_IN_MIXES, *DIRECTIONS)
     sockets = {name: Socket(value, True) for name, value in kind.held.items()}
     sockets |= read({name: socket for name, socket in inputs_of(node).items() if name not in skipped})
     sockets |= other_sockets(material.name, node, findings)
@@ -232,11 +232,15 @@ def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: F
             sockets[name] = _read_direction(name, place, material.name, findings)
         elif name not in SKIPPED_SOCKETS:
             sockets[name] = _read(name, place, material.name, name not in UNUSED_SOCKETS, findings)
-    method = getattr(target.node, "subsurface_method", "RANDOM_WALK")
-    found = Material(material.name, "principled", sockets, target.node.distribution, method)
+    found = Material(material.name, "principled", sockets, target.node.distribution, _walks_of(target.node))
     found.transparent_shadows = material.use_transparent_shadow
     _note_default_tangent(found, findings)
     return found
+
+
+def _walks_of(node: bpy.types.Node) -> str:
+    """How light goes below the surface of a shader node, by the Principled BSDF's words."""
+    return getattr(node, "subsurface_method", None) or getattr(node, "falloff", "RANDOM_WALK")
 
 
 def _read_direction(name: str, place: Place, material: str, findings: Findings) -> Socket:
@@ -325,8 +329,7 @@ def _read_principled(material: bpy.types.Material, node: bpy.types.Node, finding
                 findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
             continue
         sockets[socket.name] = _read(socket.name, Place(socket, ()), material.name, False, findings)
-    method = getattr(node, "subsurface_method", "RANDOM_WALK")
-    found = Material(material.name, "principled", sockets, node.distribution, method)
+    found = Material(material.name, "principled", sockets, node.distribution, _walks_of(node))
     found.transparent_shadows = material.use_transparent_shadow
     _note_default_tangent(found, findings)
     return found

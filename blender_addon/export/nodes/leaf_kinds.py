@@ -81,13 +81,26 @@ KINDS: dict[str, LeafKind] = {
     "ShaderNodeBsdfGlass": LeafKind({**_CLEAR, **_FILM}, _GLASS, "glass", distributions=_GGX),
     "ShaderNodeBsdfRefraction": LeafKind(_CLEAR, _GLASS, "refraction", distributions=("GGX",)),
     "ShaderNodeBsdfTranslucent": LeafKind(_MATTE, {"Metallic": 0.0, "Alpha": 1.0}, "translucent"),
-    "ShaderNodeSubsurfaceScattering": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
+    "ShaderNodeSubsurfaceScattering": LeafKind(
+        {
+            "Base Color": "Color",
+            "Roughness": "Roughness",
+            **{f"Subsurface {name}": name for name in ("Radius", "Scale", "IOR", "Anisotropy")},
+        },
+        {**WITHOUT_SPECULAR, "Subsurface Weight": 1.0},
+        "subsurface",
+        settings={"falloff": ("RANDOM_WALK", "RANDOM_WALK_SKIN")},
+    ),
     "ShaderNodeBsdfToon": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHairPrincipled": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
 }
-# of a Principled BSDF: sockets that no model has, whatever is linked to them
-UNUSED_SOCKETS = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy", "Thin Wall")
+# of a Principled BSDF: sockets that no model has, whatever is linked to them, and those that a mix has no use for
+UNUSED_SOCKETS = ("Thin Wall",)
+UNUSED_IN_MIXES = (
+    *UNUSED_SOCKETS,
+    *("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy"),
+)
 EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
 # values of `all` that join only where the node has some of them already
 _WHERE_PRESENT = {
@@ -99,14 +112,14 @@ _WHERE_PRESENT = {
 
 
 def is_fitted(node: bpy.types.Node) -> bool:
-    """Whether the values of a node can be fitted: its model is exact, or it scatters below its surface."""
+    """Whether the values of a node can be fitted: its model is exact."""
     return node.bl_idname in KINDS and why_not_fitted(node) is None
 
 
 def why_not_fitted(node: bpy.types.Node) -> str | None:
     """What keeps a shader node of a known kind from being fitted, as the end of a sentence; None if nothing does."""
     kind = KINDS[node.bl_idname]
-    if kind.nearest and node.bl_idname != "ShaderNodeSubsurfaceScattering":
+    if kind.nearest:
         return "has lobes that the fit does not have"
     wrong = _unknown_setting(node, kind)
     if wrong is None:

@@ -60,7 +60,7 @@ def scan(
             continue
         hold = {"metallic": METAL} if metal else {}
         for values in product(*(ROUGHNESS_NODES if name == scanned[0] else second for name in held)):
-            start, lower, upper = 0.5 * (table.lower + table.upper), table.lower, table.upper
+            start, lower, upper = table.begin, table.lower, table.upper
             for name, value in {**hold, **dict(zip(held, values, strict=True))}.items():
                 part = table.slice_of(name)
                 start[part] = lower[part] = upper[part] = value
@@ -91,7 +91,7 @@ def agreeing_ends(
     ends: list[Solution] = []
     widths = (OPPOSITE_WIDTH, metal_width)
     for metallic, width in zip(OPPOSITE, widths, strict=True) if "metallic" in table.names else ():
-        start = 0.5 * (table.lower + table.upper)
+        start = table.begin
         for name, value in {"metallic": metallic, scanned[0]: width}.items():
             if name in table.names:
                 start[table.slice_of(name)] = value

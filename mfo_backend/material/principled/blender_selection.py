@@ -11,13 +11,15 @@ from .principled_parameters import BLENDER_PRINCIPLED
 
 REDUCED = ("base_color", "metallic", "roughness", "specular_ior_level")  # the paper's scenario "Parameters"
 # Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR and tint from its weight;
-# transmission, film, anisotropy and diffuse roughness join when the material has them already.
+# transmission, film, anisotropy and diffuse roughness join when the material has them already, and so does the radius of
+# subsurface: its scale multiplies that, and a smaller weight looks like shorter ways (docs/notebook/subsurface.md).
 OPAQUE = (*REDUCED, "specular_tint", "coat_weight", "coat_roughness", "sheen_weight", "sheen_roughness", "sheen_tint")
 _WITH = {
     "transmission_weight": ("transmission_weight", "ior"),
     "anisotropic": ("anisotropic", "anisotropic_rotation"),
     "thin_film_thickness": ("thin_film_thickness", "thin_film_ior"),
     "diffuse_roughness": ("diffuse_roughness",),
+    "subsurface_weight": ("subsurface_radius",),
 }
 # Without an amount of the second the first has no effect
 AMOUNT_OF = {
@@ -29,9 +31,15 @@ AMOUNT_OF = {
     "thin_film_ior": "thin_film_thickness",
     "anisotropic_rotation": "anisotropic",
     "emission_color": "emission_strength",
+    "subsurface_radius": "subsurface_weight",
+    "subsurface_scale": "subsurface_weight",
 }
-# It multiplies the emission's colour, so that one of them is enough
-FIXED = ("emission_strength",)
+# Why what no fit changes is held
+FIXED = {
+    "emission_strength": "it multiplies 'emission_color', fit that",
+    "subsurface_ior": "it only bends what enters the skin",
+    "subsurface_anisotropy": "'subsurface_radius' has nearly the same effect, fit that",
+}
 
 
 def select_blender_parameters(
@@ -65,7 +73,7 @@ def select_blender_parameters(
     for name in table.names:
         if name in FIXED:
             raise BadInputError(
-                f"Parameter {name!r} cannot be fitted: it multiplies 'emission_color', fit that; choose among {names}."
+                f"Parameter {name!r} cannot be fitted: {FIXED[name]}; choose among {names}."
             )
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")

@@ -109,6 +109,8 @@ class Below:
         medium = Medium.of(parameters, model)
         if model.skin:
             return Below(weight, medium, 0 * roughness + 1, parameters["subsurface_ior"], True)
+        if model.shader == "subsurface":
+            return Below(weight, medium, roughness, parameters["subsurface_ior"], False)
         return Below(weight, medium, dr.square(roughness), ior, False)
 
     def gathered(self, index: Any) -> Below:

@@ -28,6 +28,10 @@ from ...types.errors import BadInputError
 from ...types.parameter import ParameterTable, Value
 from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
 
+# How far light may go below a surface, of a fit: so many times less or more than the least or largest radius of the
+# scene, which is how far walks that were made for it still tell (`recorded_scene.FAR_WALKS`)
+WALKS_NEAR = 5.0
+WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
 
@@ -103,8 +107,22 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
     table = ParameterTable(()) if chosen is None else _labelled(chosen, materials[target.bsdf_id])
+    table = _near_walks(table, _constants(sockets))
     start = table.clip(table.pack(_constants(sockets)))
     return target, table, start
+
+
+def _near_walks(table: ParameterTable, values: Mapping[str, Value]) -> ParameterTable:
+    """With bounds around how far light goes below the surface in the scene, for which it is recorded there."""
+    near = []
+    for p in table:
+        if p.name in WALK_SIZES:
+            present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
+            begin = tuple(float(v) for v in present) if p.size == 3 else float(present[0])
+            lower, upper = float(present.min()) / WALKS_NEAR, float(present.max()) * WALKS_NEAR
+            p = replace(p, lower=lower, upper=upper, begin=begin)
+        near.append(p)
+    return ParameterTable(near)
 
 
 def _labelled(table: ParameterTable, material: Mapping[str, Any]) -> ParameterTable:
