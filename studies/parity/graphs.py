@@ -110,7 +110,9 @@ def main() -> None:
     """Measure what is missing and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("rows", type=Path)
-    parser.add_argument("--graphs", nargs="+", choices=[CONSTANT, *GRAPHS, *BUMPS, *SUBSURFACE], default=[CONSTANT, *GRAPHS])
+    parser.add_argument(
+        "--graphs", nargs="+", choices=[CONSTANT, *GRAPHS, *BUMPS, *SUBSURFACE], default=[CONSTANT, *GRAPHS]
+    )
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--samples", type=int, default=128)

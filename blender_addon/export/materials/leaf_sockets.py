@@ -9,14 +9,20 @@ from numpy.typing import NDArray
 
 from ..findings import Findings
 from ..material_model import Socket
+from ..nodes.shader_graph import plain_value
 
-GLOSSY = "ShaderNodeBsdfAnisotropic"
+GLOSSY, BELOW = "ShaderNodeBsdfAnisotropic", "ShaderNodeSubsurfaceScattering"
 
 
 def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
     """What a node other than the Principled BSDF says in words of its own: held."""
     if node.bl_idname == GLOSSY:
         return _stretched(material, node, findings)
+    if node.bl_idname == BELOW:
+        for name in ("IOR", "Anisotropy"):
+            if node.inputs[name].is_linked:
+                findings.note(f"Material '{material}': what is linked to {name} of '{node.name}' is left out.")
+        return {f"Subsurface {name}": Socket(plain_value(node.inputs[name]), True) for name in ("IOR", "Anisotropy")}
     if getattr(node, "fresnel_type", "F82") == "PHYSICAL_CONDUCTOR":
         return _conductor(node)
     return {}

@@ -28,7 +28,16 @@ from ..material_model import Material, Socket, grey
 from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
-from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, UNUSED_IN_MIXES, UNUSED_SOCKETS, WITHOUT_SPECULAR, inputs_of, only_nearest
+from ..nodes.leaf_kinds import (
+    EMISSION,
+    KINDS,
+    TRANSPARENT,
+    UNUSED_IN_MIXES,
+    UNUSED_SOCKETS,
+    WITHOUT_SPECULAR,
+    inputs_of,
+    only_nearest,
+)
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
     plain_value,

@@ -85,7 +85,7 @@ KINDS: dict[str, LeafKind] = {
         {
             "Base Color": "Color",
             "Roughness": "Roughness",
-            **{f"Subsurface {name}": name for name in ("Radius", "Scale", "IOR", "Anisotropy")},
+            **{f"Subsurface {name}": name for name in ("Radius", "Scale")},
         },
         {**WITHOUT_SPECULAR, "Subsurface Weight": 1.0},
         "subsurface",
@@ -147,6 +147,8 @@ def default_names(values: Mapping[str, Any]) -> list[str]:
     """Of the values that a node may have fitted those that `all` stands for; `values` by the names of `inputs_of`."""
 
     def is_present(name: str) -> bool:
+        if name == "Subsurface Scale":  # it multiplies the radius
+            return False
         amount = _WHERE_PRESENT.get(name)
         return amount is None or bool(values.get(amount, 0.0))
 

@@ -205,6 +205,8 @@ class _Walk:
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
         self.target_pieces: list[list[TriangleMesh]] = [[] for _ in targets]
         self.targets_left_out = [0] * len(targets)  # triangles
+        self.target_bodies = [0] * len(targets)
+        self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
         self.leaning_normals = set[str]()  # objects with custom normals, or with smooth faces beside flat ones
         data.target_count = len(targets)
@@ -240,7 +242,8 @@ class _Walk:
                 terminator = Terminator(*shadow_terminator(each.object))
                 shadow = shadow_transmission(each.object, each.slot)
                 names = target_shape(number), target_bsdf(number)
-                self.data.shapes.insert(0, Shape(names[0], joined(pieces), names[1], terminator, shadow))
+                body = self.target_bodies[number]
+                self.data.shapes.insert(0, Shape(names[0], joined(pieces), names[1], terminator, shadow, body=body))
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
@@ -281,6 +284,7 @@ class _Walk:
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
         fitted = self._fitted(item, bsdfs) if own else {}
+        body = self._body(bsdfs)
         for slot, bsdf in bsdfs.items():
             piece = world_mesh(mesh, slots == slot, matrix)
             left_out = int((slots == slot).sum()) - len(piece.triangles)
@@ -299,17 +303,26 @@ class _Walk:
                 self.bakes.displaced.place(name, mesh, slots == slot, matrix)
             if slot in fitted:
                 self.target_pieces[fitted[slot]].append(piece)
+                self.target_bodies[fitted[slot]] = body
                 if hidden:
                     self.findings.error(f"Object '{item.name}' is hidden from camera rays: let the camera see it.")
                 continue
             terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(item, slot)
-            shape = Shape(name, piece, bsdf, terminator, shadow, hidden)
+            shape = Shape(name, piece, bsdf, terminator, shadow, hidden, body)
             if bsdf in self.baked:
                 self._note_generated(item, slot)
             if self.bakes is not None and bsdf in self.baked:
                 surface = Surface(instance, slot, mesh, slots == slot, matrix)
                 shape = self.bakes.ask_surface(self.data, shape, surface, self.findings)
             self.data.shapes.append(shape)
+
+    def _body(self, bsdfs: dict[int, str]) -> int:
+        """The number of an object of several shapes that light goes through below the surface, else 0."""
+        scatters = (self.data.materials[bsdf].value("Subsurface Weight", 0.0) != 0.0 for bsdf in bsdfs.values())
+        if len(bsdfs) < 2 or not any(scatters):
+            return 0
+        self.bodies += 1
+        return self.bodies
 
     def _note_generated(self, item: bpy.types.Object, slot: int) -> None:
         material = material_of_slot(item, slot)

@@ -41,7 +41,8 @@ class Shape:
     """One mesh with one material; `identifier` is its id in the scene file.
 
     `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha. Where
-    `camera_hidden` rays of the camera pass it as if it were not there.
+    `camera_hidden` rays of the camera pass it as if it were not there. Shapes of one `body`, above 0, are one object
+    below the surface.
     """
 
     identifier: str
@@ -50,6 +51,7 @@ class Shape:
     terminator: Terminator = Terminator()
     shadow_transmission: float | None = None
     camera_hidden: bool = False
+    body: int = 0
 
 
 @dataclass(frozen=True)

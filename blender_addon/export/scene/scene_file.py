@@ -154,12 +154,13 @@ def _shape_element(shape: Shape, scene: SceneData, files: SceneFiles) -> Element
 
 
 def _numbers(shape: Shape) -> list[Element]:
-    """What the backend reads of a shape: `smooth_facets`, `shadow_rays`, `camera_view` of mfo_backend's transport."""
+    """What the backend's transport reads: `smooth_facets`, `shadow_rays`, `camera_view`, `subsurface_walks`."""
     numbers = {
         "shadow_geometry_offset": shape.terminator.geometry_offset or None,
         "shadow_shading_offset": shape.terminator.shading_offset or None,
         "shadow_transmission": shape.shadow_transmission,
         "camera_hidden": 1.0 if shape.camera_hidden else None,
+        "body": float(shape.body) if shape.body else None,
     }
     return [
         add(plugin("texture", "uniform", name=name), scalar("value", value))

@@ -4,14 +4,14 @@
 Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a nested texture read at the surface point,
 further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0"), `shader` ("principled", or another node of
 `cycles_model.SHADERS`) and `free`: comma-separated names that will
-change after loading. Lobes whose weight is zero, not textured and not free are not traced; changing such a value later
-brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass: false leaves out directions
-no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world. `filtered` (false) reads
-the least alpha of the microfacet lobes from `si.duv_dx.x`, which no texture of Mitsuba 3.9 looks at: the integrator
-`cycles_path` puts Filter Glossy there, and in `si.duv_dx.y` a 1 where it
-leaves what is below the surface to others; one that is `nested` in a `closure_tree` shows its stand-in all the same. `mi.traverse` shows `<id>.base_color`, `<id>.roughness`, ...; textures as
-`<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be textures of world directions on the camera's side, zero
-for the mesh's own.
+change after loading, and `subsurface_method`. Lobes whose weight is zero, not textured and not free are not traced;
+changing such a value later brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass:
+false leaves out directions no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world.
+`filtered` (false) reads what the integrator `cycles_path` puts where no texture of Mitsuba 3.9 looks: the least alpha
+of the microfacet lobes, for Filter Glossy, from `si.duv_dx.x`, and a 1 from `si.duv_dx.y` where it leaves what is below
+the surface to others; one that is `nested` in a `closure_tree` shows its stand-in all the same. `mi.traverse` shows
+`<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be
+textures of world directions on the camera's side, zero for the mesh's own.
 
 A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter of radiance emission_color *
 emission_strength, which asks `emission_share` what alpha, sheen and coat leave of it. The tangent is that of Mitsuba's

@@ -11,8 +11,8 @@ from .principled_parameters import BLENDER_PRINCIPLED
 
 REDUCED = ("base_color", "metallic", "roughness", "specular_ior_level")  # the paper's scenario "Parameters"
 # Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR and tint from its weight;
-# transmission, film, anisotropy and diffuse roughness join when the material has them already, and so does the radius of
-# subsurface: its scale multiplies that, and a smaller weight looks like shorter ways (docs/notebook/subsurface.md).
+# transmission, film, anisotropy and diffuse roughness join when the material has them already, and so does the radius
+# of subsurface: its scale multiplies that, and a smaller weight looks like shorter ways (docs/notebook/subsurface.md).
 OPAQUE = (*REDUCED, "specular_tint", "coat_weight", "coat_roughness", "sheen_weight", "sheen_roughness", "sheen_tint")
 _WITH = {
     "transmission_weight": ("transmission_weight", "ior"),
@@ -72,9 +72,7 @@ def select_blender_parameters(
     table = BLENDER_PRINCIPLED.select(selection)
     for name in table.names:
         if name in FIXED:
-            raise BadInputError(
-                f"Parameter {name!r} cannot be fitted: {FIXED[name]}; choose among {names}."
-            )
+            raise BadInputError(f"Parameter {name!r} cannot be fitted: {FIXED[name]}; choose among {names}.")
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")
         if name in AMOUNT_OF and AMOUNT_OF[name] not in {*present, *linked, *table.names}:

@@ -11,7 +11,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ...types.light_paths import LightPaths
-from .record_paths import RecordSettings, record_paths
+from .record_paths import record_paths
+from .record_settings import RecordSettings
 
 
 def indirect_share(

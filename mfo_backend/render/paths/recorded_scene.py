@@ -32,7 +32,8 @@ from ..pictures.pass_counter import with_derivatives
 from .indirect_share import indirect_share
 from .packed_lanes import LaneReader, Lanes
 from .proposal import DefensiveProposal
-from .record_paths import RecordSettings, record_paths
+from .record_paths import record_paths
+from .record_settings import RecordSettings
 from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths

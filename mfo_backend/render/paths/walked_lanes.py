@@ -24,12 +24,13 @@ from .merged_lanes import TechniqueLanes
 # Survival of walks that serve materials far from the one they were made for, which may be brighter
 FAR_SURVIVAL = 0.97
 _APART = 0x2C1B3C6D
+_GOLDEN = 0x9E3779B9  # 2^32 over the golden ratio
 _CHOICE = 1 << 18  # a place of the random numbers that no walk has
 
 
 @dataclass(frozen=True)
 class WalkSettings:
-    """How to record walks: about so many in a pixel, in so many independent `samples`, with a `spread` as in `walked`."""
+    """How to record walks: about so many in a pixel, in each of the independent `samples`; `spread` is `walked`'s."""
 
     in_a_pixel: int
     samples: int
@@ -64,7 +65,10 @@ def walked_lanes(
     entered, medium = dr.gather(mi.SurfaceInteraction3f, si, number), below.gathered(number)
     reached = dr.max(medium.weight) > 0.0
     least = FAR_SURVIVAL if len(settings.spread) > 1 else 0.0
-    walks = walked(scene, entered, medium, random, reached, spread=settings.spread, least_survival=least)
+    walks = walked(
+        scene, entered, medium, random, reached, spread=settings.spread, least_survival=least,
+        choice=_even_choice(number, dr.gather(mi.UInt32, hits.position, number) + sample * pixels, settings.seed),
+    )  # fmt: skip
     index = dr.compress(walks.out)
     ray = dr.gather(mi.UInt32, number, index)
     exits = dr.gather(mi.SurfaceInteraction3f, walks.si, index)
@@ -78,3 +82,10 @@ def walked_lanes(
     lanes = TechniqueLanes(dr.gather(mi.Vector3f, hits.wi, ray), nowhere, weight, position, (*kept, *walk))
     dr.eval(lanes.wi, lanes.wo, lanes.weight, lanes.position, lanes.held)
     return lanes
+
+
+def _even_choice(ray: mi.UInt32, pixel: mi.UInt32, seed: int) -> mi.Float:
+    """Numbers in [0, 1), evenly over those rays of a pixel that follow each other, and random from pixel to pixel."""
+    turn = PathRandom.of(pixel, dr.opaque(mi.UInt32, seed ^ _APART)).pair(_CHOICE).y
+    number = turn + mi.Float((ray * _GOLDEN) >> 8) * 2.0**-24
+    return number - dr.floor(number)

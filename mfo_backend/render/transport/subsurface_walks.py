@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random walks of light below a surface, from where a view enters to where it leaves again.
 
-A walk stays inside of its own shape, whatever else is there, as Cycles' does inside of its object
-(kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one of several extinctions, and its
+A walk stays inside of its own shape, or of all shapes whose attribute `BODY` is its own's, whatever else is there, as
+Cycles' does inside of its object (kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one of several extinctions, and its
 density is that of all of them (M. Wilkie et al., "Hero Wavelength Spectral Sampling", 2014), so that one walk serves
 all channels and values nearby. Choose the variant before importing this.
 """
@@ -22,8 +22,10 @@ import mitsuba as mi
 
 from ...material.principled.random_walk import LEAST_INDEX, MOST_COLLISIONS, MOST_INDEX, Below
 from .path_random import PathRandom
+from .smooth_facets import shape_number, shape_table
 
 CERTAIN = 8  # collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise
+BODY = "body"
 _PER_COLLISION = 4  # places of the random numbers
 
 
@@ -47,10 +49,11 @@ def walked(
     *,
     spread: Sequence[float] = (1.0,),
     least_survival: float = 0.0,
+    choice: mi.Float | None = None,
 ) -> Walks:
     """Walk from each hit where `active`, for an extinction of any channel times any of `spread`.
 
-    After a few collisions a walk goes on as probably as the brightest channel does, or with `least_survival`.
+    Which one is chosen by a number in [0, 1), a random one or one of more even ones. After a few collisions a walk goes on as probably as the brightest channel does, or with `least_survival`.
     """
     medium = below.medium
     extinctions = [medium.extinction[k] * factor for k in range(3) for factor in spread]
@@ -58,10 +61,11 @@ def walked(
     d, enters = _entered(si, below, random)
     active = active & enters
     width = dr.width(si.p)
-    chosen, free = random.pair(0).x * len(extinctions), extinctions[0] + dr.zeros(mi.Float, width)
+    chosen = (random.pair(0).x if choice is None else choice) * len(extinctions)
+    free = extinctions[0] + dr.zeros(mi.Float, width)
     for k, extinction in enumerate(extinctions[1:], 1):
         free = dr.select(chosen >= k, extinction, free)
-    shape, prim = mi.ShapePtr(si.shape), mi.UInt32(si.prim_index)
+    shape, prim, bodies = mi.ShapePtr(si.shape), mi.UInt32(si.prim_index), _bodies(scene)
     g, survival = (value + dr.zeros(mi.Float, width) for value in (medium.anisotropy, survival))
     found, none = dr.zeros(mi.PreliminaryIntersection3f, width), dr.zeros(mi.UInt32, width)
     state = (
@@ -74,7 +78,8 @@ def walked(
         place = _PER_COLLISION * collisions
         u = numbers.pair(place + 1)
         t = -dr.log(1.0 - u.x) / free
-        met = _met_inside(scene, mi.Ray3f(p, d, t, 0.0, mi.Color0f()), shape, prim, collisions == 0, active)
+        ray = mi.Ray3f(p, d, t, 0.0, mi.Color0f())
+        met = _met_inside(scene, bodies, ray, shape, prim, collisions == 0, active)
         leaves = active & met.is_valid()
         found = dr.select(leaves, met, found)
         out |= leaves
@@ -129,14 +134,38 @@ def _scattered(d: mi.Vector3f, g: mi.Float, u: mi.Point2f) -> mi.Vector3f:
     return dr.normalize(mi.Frame3f(d).to_world(mi.Vector3f(c * sine, s * sine, cosine)))
 
 
+def _bodies(scene: mi.Scene) -> mi.UInt32 | None:
+    """The body of each shape by its number in this process, 0 of one by itself; None where all are."""
+    numbered = [(shape, int(shape_number(shape, BODY))) for shape in scene.shapes()]
+    numbered = [(shape, number) for shape, number in numbered if number]
+    return shape_table(*map(list, zip(*numbered, strict=True)), mi.UInt32) if numbered else None
+
+
+def _body_of(shape: mi.ShapePtr, bodies: mi.UInt32) -> mi.UInt32:
+    number = dr.reinterpret_array(mi.UInt32, shape)
+    known = number < dr.opaque(mi.UInt32, dr.width(bodies))
+    return dr.select(known, dr.gather(mi.UInt32, bodies, number, known), 0)
+
+
 def _met_inside(
-    scene: mi.Scene, ray: mi.Ray3f, shape: mi.ShapePtr, prim: mi.UInt32, first: mi.Bool, active: mi.Bool
+    scene: mi.Scene,
+    bodies: mi.UInt32 | None,
+    ray: mi.Ray3f,
+    shape: mi.ShapePtr,
+    prim: mi.UInt32,
+    first: mi.Bool,
+    active: mi.Bool,
 ) -> mi.PreliminaryIntersection3f:
-    """The first hit of a shape on a ray from within; where a walk enters, `first`, not the triangle `prim`."""
+    """The first hit of a body on a ray from within; where a walk enters, `first`, not the triangle `prim`."""
     found = scene.ray_intersect_preliminary(ray, active=active)
 
     def is_other(found, active):
-        return active & found.is_valid() & ((found.shape != shape) | (first & (found.prim_index == prim)))
+        entered = (found.shape == shape) & first & (found.prim_index == prim)
+        own = found.shape == shape
+        if bodies is not None:
+            body = _body_of(shape, bodies)
+            own |= (body > 0) & (_body_of(found.shape, bodies) == body)
+        return active & found.is_valid() & (entered | ~own)
 
     def onward(found, passed, passing):
         start = passed + found.t * (1.0 + 1e-6) + 1e-7

@@ -152,7 +152,7 @@ def halved(flat: np.ndarray) -> np.ndarray:
 
 
 def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:
-    """A number linked to every input of a Principled BSDF: one that also fed Subsurface Scale ended a fit."""
+    """A number linked to every input of a Principled BSDF: one that also fed what no model has ended a fit."""
     from blender_addon.export.nodes.target_shader import DIRECTIONS, target_shader
     from blender_addon.graph_values.table import graph_values
     from mfo_backend.render.models.graph_pictures import name_of
@@ -166,8 +166,8 @@ def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:
     target = target_shader(material)
     assert target is not None
     reached = {name for value in graph_values(target) for name in value.sockets}
-    assert {"Base Color", "Roughness", "Coat Weight"} <= reached
-    assert not {"Subsurface Scale", "Thin Wall", "Alpha"} & reached
+    assert {"Base Color", "Roughness", "Coat Weight", "Subsurface Scale"} <= reached
+    assert not {"Thin Wall", "Alpha"} & reached
     names = {name_of(name) for name in reached - set(DIRECTIONS)}
     assert len(names) == len(reached - set(DIRECTIONS))
 
@@ -176,9 +176,9 @@ def test_a_value_that_reaches_nothing_a_model_has_is_not_offered() -> None:
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.table import graph_values
 
-    material = new_material("Scale")
+    material = new_material("Weight")
     tree, node = material.node_tree, principled(material)
-    tree.links.new(tree.nodes.new("ShaderNodeMath").outputs[0], node.inputs["Subsurface Scale"])
+    tree.links.new(tree.nodes.new("ShaderNodeMath").outputs[0], node.inputs["Weight"])
     target = target_shader(material)
     assert target is not None
     assert graph_values(target) == []

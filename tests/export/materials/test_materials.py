@@ -66,12 +66,12 @@ def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
     glow = {"Emission_Color": (1.0, 0.5, 0.2), "Emission_Strength": 2.0}
     add_quad("Floor", 1.0, -1.0, new_material("Glow", **glow))
     add_quad("Wall", 1.0, -2.0, new_material("Coated", Coat_Weight=0.5, **glow))
-    target = add_quad("Target", 1.0, 0.0, new_material("Plain", Subsurface_Weight=0.3))
-    said = (
-        "Material 'Plain': Subsurface is fitted as diffuse: no light travels below the surface. "
-        "Its weight has no effect at Diffuse Roughness 0.",
-    )
-    assert export(target).notes == said
+    material = new_material("Plain", Subsurface_Weight=0.3)
+    target = add_quad("Target", 1.0, 0.0, material)
+    assert export(target).notes == ()
+    principled(material).subsurface_method = "BURLEY"
+    said = "Material 'Plain': Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface."
+    assert export(target, "burley").notes == (said,)
     notes = export(target, "other", fit={"model": "mitsuba_principled"}).notes
     assert [note for note in notes if "dimmed" in note] == [
         "Material 'Coated': the emission is not dimmed by Coat Weight in a fit with the model mitsuba_principled."

@@ -16,7 +16,8 @@ def recorded(folder, lights, rfilter="box", roughness=0.05, anisotropic=0.001):
     path = write_scene(folder, lights, size=24, rfilter=rfilter)
     renderer = load_renderer(path, "target", model="mitsuba_principled", parameters=list(MIRROR))
     from mfo_backend.render.camera.highlight_cells import Highlights
-    from mfo_backend.render.paths.record_paths import RecordSettings, record_paths
+    from mfo_backend.render.paths.record_paths import record_paths
+    from mfo_backend.render.paths.record_settings import RecordSettings
     from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     scene = RecordedScene(renderer, int(renderer.target_mask().sum()))

@@ -67,7 +67,8 @@ def test_tiles_are_means_of_their_pixels(tmp_path):
 
 def test_direct_light_alone_is_the_same_with_and_without_the_kernels_of_other_light(tmp_path):
     renderer, _ = recorded_scene(tmp_path, AREA + FLOOR, depth=5)
-    from mfo_backend.render.paths.record_paths import RecordSettings, record_paths  # needs the variant
+    from mfo_backend.render.paths.record_paths import record_paths  # needs the variant
+    from mfo_backend.render.paths.record_settings import RecordSettings
 
     settings = RecordSettings(grid=3, seed=4, depth=5, direct_samples=1)
     some, without = (record_paths(renderer.scene, renderer.shape, s) for s in (settings, replace(settings, depth=2)))
@@ -80,7 +81,8 @@ def test_direct_light_alone_is_the_same_with_and_without_the_kernels_of_other_li
 @pytest.mark.parametrize("alike", [True, False])
 def test_samples_of_the_light_are_alike_or_have_directions_of_their_own(tmp_path, alike):
     renderer, _ = recorded_scene(tmp_path, SKY)
-    from mfo_backend.render.paths.record_paths import RecordSettings, record_paths  # needs the variant
+    from mfo_backend.render.paths.record_paths import record_paths  # needs the variant
+    from mfo_backend.render.paths.record_settings import RecordSettings
 
     settings = RecordSettings(grid=2, seed=4, samples=2, alike=alike)
     paths = record_paths(renderer.scene, renderer.shape, settings)
