@@ -197,7 +197,8 @@ class RecordedScene:
             mixed=self._mixed,
             light_paths=self.renderer.light_paths,
             pixels=pixels,
-            highlights=highlights,
+            # beside the noise of walks a highlight on the plain grid is exact
+            highlights=None if self._walks else highlights,
             samples=samples,
             glows=self._glows,
             unit_emission=self.renderer.factors.get(EMISSION),

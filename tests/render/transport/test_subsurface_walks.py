@@ -62,7 +62,7 @@ def test_a_recording_is_the_picture(tmp_path: Path, lights: str, g: float) -> No
     wax = below(**{"Base Color": [0.8, 0.5, 0.2], "Subsurface Anisotropy": g, "Specular IOR Level": 0.5})
     renderer = load(tmp_path, lights, wax)
     found, pixels = recorded(renderer, renderer.start, renderer.start, near=True)
-    picture = renderer.image(renderer.start, seed=0, spp=256).reshape(-1, 3)[pixels]
+    picture = renderer.image(renderer.start, seed=0, spp=1024).reshape(-1, 3)[pixels]
     np.testing.assert_allclose(found.mean(axis=0), picture.mean(axis=0), rtol=0.02)
 
 
