@@ -131,9 +131,7 @@ class InnerLightModel(BlenderPrincipledModel):
             layers = layer_stack(parameters, wi, lobes, self._cycles)
             inside = layers.emission if self._glows else 0 * layers.emission
             if self.walks and layers.below is not None:
-                collisions, length, log_density = (parameters[name] for name in WALK.names)
-                carried = layers.below.medium.carried(collisions, length, log_density)
-                inside = dr.select(length > 0, layers.below.weight * carried, inside)
+                inside = dr.select(parameters["walk_length"] > 0, layers.below.shown(wi, parameters), inside)
                 layers = replace(layers, subsurface=None)
             return dr.select(dr.dot(wo, wo) > 0, evaluate(layers, layers.to_frame(wo)), inside)
 

@@ -20,12 +20,13 @@ from ...types.parameter import Parameter, ParameterTable
 from ..arrays import dual as dr
 from ..arrays.clamp import at_least, saturate
 from ..cycles_model import CyclesModel
+from ..lobes.microfacet import visible_pdf
 
-# What a recorded walk holds: its collisions, its length in scene units, and the logarithm of its density without that
-# of its directions; length 0 is no walk
+# What a recorded walk holds: its collisions, its length in scene units (0 is no walk), the normal of the microfacet that
+# it entered through, in the frame of the view, and the logarithm of its density but for that of later directions
 WALK = ParameterTable(
-    Parameter(name, 1, lower, 1e6, 0.0)
-    for name, lower in (("walk_collisions", 0.0), ("walk_length", 0.0), ("walk_log_density", -1e6))
+    Parameter(f"walk_{name}", 1, -1e6, 1e6, 0.0)
+    for name in ("collisions", "length", "normal_x", "normal_y", "log_density")
 )
 MOST_COLLISIONS = 256  # of a walk, as in Cycles; a longer one is lost
 SHORTENED = 0.25 / 3.14159265  # mean free path of a radius, which says how far light spreads, outside of skin
@@ -33,6 +34,9 @@ LEAST_ALBEDO = 0.2  # of a collision; below it a walk carries less instead
 LEAST_PATH = 1e-8  # scene units
 LEAST_INDEX, MOST_INDEX = 1.01, 3.8
 MOST_ANISOTROPY = 0.9
+# Of the interface, alpha. What enters is bent by a third of what a microfacet is, so a narrower lobe looks the same
+# below the surface, and its density would say much of next to nothing. No measurement
+LEAST_ALPHA = 0.1
 _FIT = (
     (1.8260523782, -1.28451056436, -1.79904629312, 9.19393289202, -22.8215585862, 32.0234874259, -23.6264803333,
      7.21067002658),
@@ -110,8 +114,17 @@ class Below:
         if model.skin:
             return Below(weight, medium, 0 * roughness + 1, parameters["subsurface_ior"], True)
         if model.shader == "subsurface":
-            return Below(weight, medium, roughness, parameters["subsurface_ior"], False)
-        return Below(weight, medium, dr.square(roughness), ior, False)
+            return Below(weight, medium, dr.maximum(roughness, LEAST_ALPHA), parameters["subsurface_ior"], False)
+        return Below(weight, medium, dr.maximum(dr.square(roughness), LEAST_ALPHA), ior, False)
+
+    def shown(self, view: Any, walk: Mapping[str, Any]) -> Any:
+        """What a `view` shows of a walk, RGB; by the names of `WALK`."""
+        collisions, length, x, y, log_density = (walk[name] for name in WALK.names)
+        shown = self.weight * self.medium.carried(collisions, length, log_density)
+        if self.skin:
+            return shown
+        normal = dr.kind_of(view)(x, y, dr.safe_sqrt(1 - x * x - y * y))
+        return shown * visible_pdf(view, normal, self.alpha, self.alpha)
 
     def gathered(self, index: Any) -> Below:
         """That of some points."""

@@ -29,7 +29,7 @@ from ...types.parameter import ParameterTable, Value
 from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
 
 # How far light may go below a surface, of a fit: so many times less or more than the least or largest radius of the
-# scene, which is how far walks that were made for it still tell (`recorded_scene.FAR_WALKS`)
+# scene, for walks that were made for that tell of it (`recorded_scene.FAR_WALKS`). No measurement
 WALKS_NEAR = 5.0
 WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)

@@ -51,8 +51,9 @@ MOST_RAYS = 12_000_000  # of one recording, those that miss the target included
 BYTES_PER_RAY_EXACT, BYTES_PER_RAY_SAMPLED = (150, 220), (340, 480)
 BYTES_PER_SAMPLE = 200  # of each further sample of the light
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
-# Extinctions that walks below the surface are recorded for, as multiples of the material's
-NEAR_WALKS, FAR_WALKS = (1.0,), (0.25, 0.5, 1.0, 2.0, 4.0)
+# Extinctions that walks below the surface are recorded for, as multiples of the material's, near a solution and for the
+# first search. Wider: more noise, 0.25 to 4 was tried (docs/notebook/subsurface.md)
+NEAR_WALKS, FAR_WALKS = (1.0,), (0.5, 1.0, 2.0)
 DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
 
 

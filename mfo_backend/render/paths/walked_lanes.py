@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from ...material.principled.random_walk import Below
+from ...material.principled.random_walk import LEAST_ALPHA, WALK, Below
 from ...types.light_paths import LightPaths
 from ..camera.primary_rays import fresh_sampler
 from ..transport.exit_light import exit_light
@@ -21,8 +21,12 @@ from ..transport.path_random import PathRandom
 from ..transport.subsurface_walks import walked
 from .merged_lanes import TechniqueLanes
 
-# Survival of walks that serve materials far from the one they were made for, which may be brighter
+# Survival of walks that serve materials far from the one they were made for, which may be brighter. No measurement
 FAR_SURVIVAL = 0.97
+# Alphas of the interfaces that walks enter through, whatever the material's: what is narrower or wider than the one a
+# walk was made for has several times its noise, so that a plain material lost against one with a coat on a rough base
+# (docs/notebook/subsurface.md)
+ENTRIES = (LEAST_ALPHA, 0.3, 1.0)
 _APART = 0x2C1B3C6D
 _GOLDEN = 0x9E3779B9  # 2^32 over the golden ratio
 _CHOICE = 1 << 18  # a place of the random numbers that no walk has
@@ -66,7 +70,7 @@ def walked_lanes(
     reached = dr.max(medium.weight) > 0.0
     least = FAR_SURVIVAL if len(settings.spread) > 1 else 0.0
     walks = walked(
-        scene, entered, medium, random, reached, spread=settings.spread, least_survival=least,
+        scene, entered, medium, random, reached, spread=settings.spread, least_survival=least, alphas=ENTRIES,
         choice=_even_choice(number, dr.gather(mi.UInt32, hits.position, number) + sample * pixels, settings.seed),
     )  # fmt: skip
     index = dr.compress(walks.out)
@@ -76,8 +80,8 @@ def walked_lanes(
     light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
     weight = light * dr.gather(mi.Float, hits.weight, ray) / dr.gather(mi.Float, chance, index)
     position = dr.gather(mi.UInt32, hits.position, ray) + dr.gather(mi.UInt32, sample, index) * pixels
-    kept = [dr.gather(type(value), value, ray) for value in hits.held[:-3]]
-    walk = [dr.gather(mi.Float, value, index) for value in (walks.collisions, walks.length, walks.log_density)]
+    kept = [dr.gather(type(value), value, ray) for value in hits.held[: -len(WALK)]]
+    walk = [dr.gather(mi.Float, value, index) for value in walks.held]
     nowhere = dr.zeros(mi.Vector3f, dr.width(index))
     lanes = TechniqueLanes(dr.gather(mi.Vector3f, hits.wi, ray), nowhere, weight, position, (*kept, *walk))
     dr.eval(lanes.wi, lanes.wo, lanes.weight, lanes.position, lanes.held)

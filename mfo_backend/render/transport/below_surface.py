@@ -15,6 +15,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ...material.principled.random_walk import WALK
 from ...types.light_paths import LightPaths
 from .camera_view import CameraView
 from .exit_light import exit_light
@@ -51,14 +52,14 @@ def light_from_below(
         entered.wi.z = dr.abs(entered.wi.z)
         random = PathRandom.of(lane, dr.gather(mi.UInt32, seed, lane))
         walks = walked(scene, entered, below, random, dr.max(below.weight) > 0.0)
-        carried = below.weight * below.medium.carried(walks.collisions, walks.length, walks.log_density)
+        shown = below.shown(entered.wi, dict(zip(WALK.names, walks.held, strict=True)))
         out = dr.compress(walks.out)
         if dr.width(out) == 0:
             continue
         others = mi.load_dict({"type": "independent", "sample_count": 1})
         others.seed(dr.gather(mi.UInt32, seed, 0), dr.width(out))
         light = exit_light(scene, dr.gather(mi.SurfaceInteraction3f, walks.si, out), others, light_paths, depth)
-        light *= dr.gather(mi.Color3f, mi.Color3f(carried) + dr.zeros(mi.Color3f, dr.width(lane)), out)
+        light *= dr.gather(mi.Color3f, shown, out)
         dr.scatter(total, light, dr.gather(mi.UInt32, lane, out), mode=dr.ReduceMode.Permute)
     dr.eval(total)
     return total

@@ -2,9 +2,9 @@
 """Random walks of light below a surface, from where a view enters to where it leaves again.
 
 A walk stays inside of its own shape, or of all shapes whose attribute `BODY` is its own's, whatever else is there, as
-Cycles' does inside of its object (kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one of several extinctions, and its
-density is that of all of them (M. Wilkie et al., "Hero Wavelength Spectral Sampling", 2014), so that one walk serves
-all channels and values nearby. Choose the variant before importing this.
+Cycles' does inside of its object (kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one
+of several extinctions, and its density is that of all of them (A. Wilkie et al., "Hero Wavelength Spectral Sampling",
+2014), so that one walk serves all channels and values nearby. Choose the variant before importing this.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -20,11 +20,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ...material.lobes.microfacet import sample_visible, visible_pdf
 from ...material.principled.random_walk import LEAST_INDEX, MOST_COLLISIONS, MOST_INDEX, Below
 from .path_random import PathRandom
 from .smooth_facets import shape_number, shape_table
 
-CERTAIN = 8  # collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise
+# Collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise. No measurement
+CERTAIN = 8
 BODY = "body"
 _PER_COLLISION = 4  # places of the random numbers
 
@@ -35,9 +37,7 @@ class Walks:
 
     si: Any
     out: Any
-    collisions: Any
-    length: Any
-    log_density: Any
+    held: tuple[Any, ...]
 
 
 def walked(
@@ -49,16 +49,19 @@ def walked(
     *,
     spread: Sequence[float] = (1.0,),
     least_survival: float = 0.0,
+    alphas: Sequence[float] = (),
     choice: mi.Float | None = None,
 ) -> Walks:
     """Walk from each hit where `active`, for an extinction of any channel times any of `spread`.
 
-    Which one is chosen by a number in [0, 1), a random one or one of more even ones. After a few collisions a walk goes on as probably as the brightest channel does, or with `least_survival`.
+    Which one is chosen by a number in [0, 1), a random one or one of more even ones. Views enter through an interface
+    as rough as the material's, or as one of these `alphas`. After a few collisions a walk goes on as probably as the
+    brightest channel does, or with `least_survival`.
     """
     medium = below.medium
     extinctions = [medium.extinction[k] * factor for k in range(3) for factor in spread]
     survival = dr.maximum(dr.max(medium.albedo), least_survival)
-    d, enters = _entered(si, below, random)
+    d, h, entry_density, enters = _entered(si, below, random, alphas)
     active = active & enters
     width = dr.width(si.p)
     chosen = (random.pair(0).x if choice is None else choice) * len(extinctions)
@@ -107,21 +110,31 @@ def walked(
     for each in logs[1:]:
         largest = dr.maximum(largest, each)
     density = sum(dr.exp(each - largest) for each in logs) / len(logs)
-    return Walks(exits, out, count, length, largest + dr.log(density) + passed)
+    log_density = largest + dr.log(density) + passed + dr.log(entry_density)
+    return Walks(exits, out, (count, length, h.x, h.y, log_density))
 
 
-def _entered(si: mi.SurfaceInteraction3f, below: Below, random: PathRandom) -> tuple[mi.Vector3f, mi.Bool]:
-    """The direction below the surface, and whether there is one."""
-    u, choice = random.pair(1 << 16), random.pair(1 << 17).x
-    wi, alpha, ior = si.wi, mi.Float(below.alpha), dr.clip(mi.Float(below.ior), LEAST_INDEX, MOST_INDEX)
-    h, _ = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, dr.maximum(alpha, 1e-6), True).sample(wi, u)
+def _entered(
+    si: mi.SurfaceInteraction3f, below: Below, random: PathRandom, alphas: Sequence[float]
+) -> tuple[mi.Vector3f, mi.Vector3f, mi.Float, mi.Bool]:
+    """The direction below the surface, the microfacet's normal and its density, and whether there is one."""
+    u, choice = random.pair(1 << 16), random.pair(1 << 17)
+    wi, ior = si.wi, dr.clip(mi.Float(below.ior), LEAST_INDEX, MOST_INDEX)
+    widths = [mi.Float(below.alpha)] if below.skin or not alphas else [dr.opaque(mi.Float, alpha) for alpha in alphas]
+    drawn = widths[0]
+    for k, alpha in enumerate(widths[1:], 1):
+        drawn = dr.select(choice.y * len(widths) >= k, alpha, drawn)
+    h = sample_visible(wi, drawn, drawn, u)
+    density = sum(visible_pdf(wi, h, alpha, alpha) for alpha in widths) / len(widths)
+    if below.skin:  # whose interface is always the same
+        density = mi.Float(1.0)
     c = dr.dot(wi, h)
     bent = h * (c / ior - dr.safe_sqrt(1.0 - (1.0 - c * c) / (ior * ior))) - wi / ior
     if below.skin:
-        bent = dr.select(choice < 0.5, -mi.warp.square_to_cosine_hemisphere(u), bent)
+        bent = dr.select(choice.x < 0.5, -mi.warp.square_to_cosine_hemisphere(u), bent)
     d = si.to_world(bent)
     outside = dr.select(dr.dot(si.n, si.to_world(wi)) < 0.0, -mi.Vector3f(si.n), mi.Vector3f(si.n))
-    return dr.normalize(d), (wi.z > 0.0) & (dr.dot(outside, d) < 0.0)
+    return dr.normalize(d), h, density, (wi.z > 0.0) & (dr.dot(outside, d) < 0.0)
 
 
 def _scattered(d: mi.Vector3f, g: mi.Float, u: mi.Point2f) -> mi.Vector3f:
