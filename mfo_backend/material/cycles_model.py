@@ -37,6 +37,9 @@ class CyclesModel:
         lobe on the other side times the base colour. Light enters below "subsurface" with an index of its own.
     skin
         How light enters below the surface and how far it goes there, the node's "Random Walk (Skin)".
+    radius_is_path
+        The radius is the mean free path below the surface, as of "Random Walk" from 5.2 on; "Random Walk (Legacy)", and
+        before, a radius goes for a shorter way.
     """
 
     multiple_scattering: bool = True
@@ -46,6 +49,7 @@ class CyclesModel:
     bumps_shade: bool = True
     shader: str = "principled"
     skin: bool = False
+    radius_is_path: bool = False
 
 
 def cycles_model(
@@ -76,4 +80,5 @@ def cycles_model(
         bumps_shade=major_minor >= (4, 5),
         shader=shader,
         skin=subsurface_method == "RANDOM_WALK_SKIN",
+        radius_is_path=subsurface_method == "RANDOM_WALK" and major_minor >= (5, 2),
     )

@@ -96,6 +96,8 @@ def approximated(material: Material) -> list[str]:
         found.append("Subsurface is shown as diffuse in a mix of shaders: no light travels below the surface.")
     elif below and material.subsurface_method == "BURLEY":
         found.append("Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.")
+    elif below and material.subsurface_method != "RANDOM_WALK" and material.value("Subsurface Anisotropy", 0.0) < 0.0:
+        found.append("a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
     above = {name for leaf in (material, *material.leaves) if material.is_mixed for name in _above_emission(leaf)}

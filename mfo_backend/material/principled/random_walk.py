@@ -7,7 +7,8 @@ which it was drawn; so one that was drawn for other values tells the light of th
 
 Sources: M. Chiang, P. Kutz, B. Burley, "Practical and Controllable Subsurface Scattering for Production Path Tracing"
 (2016); the inversion of the albedo for anisotropic phase functions is that of Cycles
-(kernel/integrator/subsurface_random_walk.h, Blender 4.2 to 5.2), radii those of kernel/closure/bssrdf.h.
+(kernel/integrator/subsurface_random_walk.h, Blender 4.2 to 5.2), radii those of kernel/closure/bssrdf.h. In 5.2 "Random
+Walk" is another model, and what it was has the name "Random Walk (Legacy)".
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from ..arrays.clamp import at_least, saturate
 from ..cycles_model import CyclesModel
 from ..lobes.microfacet import visible_pdf
 
-# What a recorded walk holds: its collisions, its length in scene units (0 is no walk), the normal of the microfacet that
-# it entered through, in the frame of the view, and the logarithm of its density but for that of later directions
+# What a recorded walk holds: its collisions, its length in scene units (0 is no walk), the normal of the microfacet
+# that it entered through, in the frame of the view, and the logarithm of its density but for that of later directions
 WALK = ParameterTable(
     Parameter(f"walk_{name}", 1, -1e6, 1e6, 0.0)
     for name in ("collisions", "length", "normal_x", "normal_y", "log_density")
@@ -33,7 +34,7 @@ SHORTENED = 0.25 / 3.14159265  # mean free path of a radius, which says how far 
 LEAST_ALBEDO = 0.2  # of a collision; below it a walk carries less instead
 LEAST_PATH = 1e-8  # scene units
 LEAST_INDEX, MOST_INDEX = 1.01, 3.8
-MOST_ANISOTROPY = 0.9
+MOST_ANISOTROPY, MOST_OF_PATHS = 0.9, 0.99  # the second where the radius is the mean free path
 # Of the interface, alpha. What enters is bent by a third of what a microfacet is, so a narrower lobe looks the same
 # below the surface, and its density would say much of next to nothing. No measurement
 LEAST_ALPHA = 0.1
@@ -76,16 +77,24 @@ class Medium:
     def of(parameters: Mapping[str, Any], model: CyclesModel) -> Medium:
         """That of parameter values by name."""
         colour = dr.minimum(at_least(parameters["base_color"], 1e-4), 1)
-        g = dr.minimum(at_least(parameters["subsurface_anisotropy"], 0), MOST_ANISOTROPY)
+        g = parameters["subsurface_anisotropy"]
         radius = at_least(parameters["subsurface_radius"] * parameters["subsurface_scale"], LEAST_PATH)
+        if model.radius_is_path:
+            g = dr.minimum(at_least(g, -MOST_OF_PATHS), MOST_OF_PATHS)
+            return Medium._of(_scattered_in_half_space(colour, g), radius, g)
+        g = dr.minimum(at_least(g, 0), MOST_ANISOTROPY)
         if model.skin:
             index = dr.minimum(at_least(parameters["subsurface_ior"], LEAST_INDEX), MOST_INDEX)
             path = radius * dr.sqrt(3 * (1 - _albedo_in_skin(colour, index)))
         else:
             path = radius * SHORTENED
-        albedo = dr.minimum(at_least(_scattered(colour, g), 1e-6), 0.999999)
+        return Medium._of(_scattered(colour, g), path * (1 - g), g)
+
+    @staticmethod
+    def _of(albedo: Any, path: Any, g: Any) -> Medium:
+        albedo = dr.minimum(at_least(albedo, 1e-6), 0.999999)
         share = dr.minimum(albedo / LEAST_ALBEDO, 1)
-        return Medium(at_least(albedo, LEAST_ALBEDO), dr.rcp(path * (1 - g)), share, g)
+        return Medium(at_least(albedo, LEAST_ALBEDO), dr.rcp(path), share, g)
 
     def carried(self, collisions: Any, length: Any, log_density: Any) -> Any:
         """What a walk carries, RGB."""
@@ -145,6 +154,13 @@ def _scattered(colour: Any, g: Any) -> Any:
     blend = dr.sqrt(dr.sqrt(colour))
     dark = a * dr.exp(c * dr.log(dr.atan(b * colour)))
     return (1 - blend) * dark + blend * (d * dr.exp(f * dr.log(dr.atan(e * colour))))
+
+
+def _scattered_in_half_space(colour: Any, g: Any) -> Any:
+    """The same by the similarity of van de Hulst (E. d'Eon, "A Hitchhiker's Guide to Multiple Scattering", eq. 53.7), as
+    Cycles 5.2 has it."""
+    s = 4.20863 * colour - dr.sqrt(9.59217 + 41.6808 * colour + 17.7126 * dr.square(colour)) + 4.09712
+    return (1 - dr.square(s)) / (1 - g * dr.square(s))
 
 
 def _polynomial(row: tuple[float, ...], g: Any) -> Any:
