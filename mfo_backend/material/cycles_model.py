@@ -40,6 +40,8 @@ class CyclesModel:
     radius_is_path
         The radius is the mean free path below the surface, as of "Random Walk" from 5.2 on; "Random Walk (Legacy)", and
         before, a radius goes for a shorter way.
+    walks_again
+        Light that has left from below walks below the next surface, too (from 5.0); before, that is a diffuse one.
     """
 
     multiple_scattering: bool = True
@@ -50,6 +52,7 @@ class CyclesModel:
     shader: str = "principled"
     skin: bool = False
     radius_is_path: bool = False
+    walks_again: bool = False
 
 
 def cycles_model(
@@ -81,4 +84,5 @@ def cycles_model(
         shader=shader,
         skin=subsurface_method == "RANDOM_WALK_SKIN",
         radius_is_path=subsurface_method == "RANDOM_WALK" and major_minor >= (5, 2),
+        walks_again=major_minor >= (5, 0),
     )

@@ -157,8 +157,8 @@ def _scattered(colour: Any, g: Any) -> Any:
 
 
 def _scattered_in_half_space(colour: Any, g: Any) -> Any:
-    """The same by the similarity of van de Hulst (E. d'Eon, "A Hitchhiker's Guide to Multiple Scattering", eq. 53.7), as
-    Cycles 5.2 has it."""
+    """The same by the similarity of van de Hulst, as Cycles 5.2 has it (E. d'Eon, "A Hitchhiker's Guide to Multiple
+    Scattering", eq. 53.7)."""
     s = 4.20863 * colour - dr.sqrt(9.59217 + 41.6808 * colour + 17.7126 * dr.square(colour)) + 4.09712
     return (1 - dr.square(s)) / (1 - g * dr.square(s))
 

@@ -16,7 +16,7 @@ from ...material.arrays.own_memory import own_memory
 from ...types.light_paths import LightPaths
 from ..camera.primary_rays import PrimaryRays, fresh_sampler
 from ..lamps.met_lamps import SceneLamps
-from ..transport.below_surface import light_from_below
+from ..transport.below_surface import seen_from_below
 from ..transport.traced_radiance import traced_radiance
 
 
@@ -56,7 +56,7 @@ def recorded_background(
     if dr.width(index) > 0:
         sampler, ray = fresh_sampler(seed, dr.width(index)), rays.ray(index)
         add(index, traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters, walked=True))
-        add(index, light_from_below(scene, ray, sampler, light_paths, depth))
+        add(index, seen_from_below(scene, ray, sampler, light_paths, depth))
     index = dr.compress(rest)
     if dr.width(index) > 0 and not hide_emitters:
         from ..transport.cycles_path import seen_world  # can be imported when a variant is set

@@ -149,7 +149,7 @@ class RecordedScene:
         share = indirect_share(
             scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths, stride=stride
         )
-        if share < NEGLIGIBLE_INDIRECT:
+        if share < NEGLIGIBLE_INDIRECT and not self._walks:  # the probe knows none of what goes through surfaces
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, DIRECT, (note,))
         return SceneNeeds(True, depth, (), share)

@@ -68,7 +68,7 @@ class CyclesPath(RBIntegrator):
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out. In a scene whose
         lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
         drawn; it has no derivatives. With `walked` somebody else adds what comes from below the first hit
-        (`below_surface`).
+        (`exit_light`).
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
@@ -111,7 +111,7 @@ class CyclesPath(RBIntegrator):
             valid |= (bounce == 0) & si.is_valid()
             last = mi.Bool(shadows.ends(si, passages))  # its own light still counts
             si = seen_side(si)
-            without = dr.select(bounce == 0, float(walked and before is None), 0.0)
+            without = dr.select(bounce == int(before is not None), float(walked), 0.0)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
             bsdf = si.bsdf(ray)
 

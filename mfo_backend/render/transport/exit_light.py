@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light that white matte surfaces send on: what walks below a surface meet where they leave it.
+"""Light from below surfaces: random walks, and the light that they meet where they leave.
 
 Choose the variant before importing this.
 """
@@ -10,24 +10,85 @@ Choose the variant before importing this.
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from ...material.principled.random_walk import WALK
 from ...types.light_paths import LightPaths
 from ..lamps.met_lamps import DELTA, SceneLamps
+from .path_random import PathRandom
 from .shadow_rays import ShadowRays
-from .smooth_facets import leaves_on, met_light
+from .smooth_facets import leaves_on, met_light, seen_side
+from .subsurface_walks import walked
 from .traced_radiance import traced_radiance
+
+# Walks of one path in all; a Lambert lobe stands for what a further one would bring. With one, Suzanne of wax is 1 %
+# too dark, with three 0.2 % (docs/notebook/subsurface.md)
+MOST_WALKS = 3
+
+
+def materials_with_below(scene: mi.Scene) -> list[Any]:
+    """The materials of a scene that let light walk below their surface."""
+    found = {id(bsdf): bsdf for bsdf in (shape.bsdf() for shape in scene.shapes()) if getattr(bsdf, "has_below", False)}
+    return list(found.values())
+
+
+def light_from_below(
+    scene: mi.Scene,
+    materials: list[Any],
+    si: mi.SurfaceInteraction3f,
+    active: mi.Bool,
+    sampler: mi.Sampler,
+    light_paths: LightPaths | None,
+    depth: int,
+    walks: int = 1,
+) -> mi.Color3f:
+    """Radiance towards `si.wi` that leaves from below surfaces of these `materials`, one walk for each hit.
+
+    It is the number `walks` of its path. Paths are of up to `depth`.
+    """
+    total = dr.zeros(mi.Color3f, dr.width(si.p))
+    seed = mi.UInt32(sampler.next_1d() * 2.0**24)
+    dr.eval(si, active, seed)
+    for material in materials:
+        lane = dr.compress(active & si.is_valid() & (si.bsdf() == mi.BSDFPtr(material)))
+        if dr.width(lane) == 0:
+            continue
+        entered = dr.gather(mi.SurfaceInteraction3f, si, lane)
+        below = material.below(entered, mi.Bool(True))
+        entered.sh_frame.n = dr.mulsign(entered.sh_frame.n, entered.wi.z)
+        entered.wi.z = dr.abs(entered.wi.z)
+        random = PathRandom.of(lane, dr.gather(mi.UInt32, seed, lane) + walks)
+        found = walked(scene, entered, below, random, dr.max(below.weight) > 0.0)
+        shown = below.shown(entered.wi, dict(zip(WALK.names, found.held, strict=True)))
+        out = dr.compress(found.out)
+        if dr.width(out) == 0:
+            continue
+        others = mi.load_dict({"type": "independent", "sample_count": 1})
+        others.seed(dr.gather(mi.UInt32, seed, 0) + walks, dr.width(out))
+        exits = dr.gather(mi.SurfaceInteraction3f, found.si, out)
+        light = dr.gather(mi.Color3f, shown, out) * exit_light(scene, exits, others, light_paths, depth, walks)
+        dr.scatter(total, light, dr.gather(mi.UInt32, lane, out), mode=dr.ReduceMode.Permute)
+    dr.eval(total)
+    return total
 
 
 def exit_light(
-    scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: mi.Sampler, light_paths: LightPaths | None, depth: int
+    scene: mi.Scene,
+    si: mi.SurfaceInteraction3f,
+    sampler: mi.Sampler,
+    light_paths: LightPaths | None,
+    depth: int,
+    walks: int = 1,
 ) -> mi.Color3f:
     """Radiance that Lambert's lobe of albedo 1 sends to all sides of `si.wi`, over paths of up to `depth`.
 
-    Every light of no extent counts; of the others one is drawn, and one direction of the cosine (Veach 1995).
+    Every light of no extent counts; of the others one is drawn, and one direction of the cosine (Veach 1995). So many
+    `walks` have led there.
     """
     lamps, shadows = SceneLamps(scene), ShadowRays(scene)
     emitters = list(scene.emitters())
@@ -70,6 +131,11 @@ def exit_light(
         seen += lamps.met(ray, far, valid, density=likely, chance=chance)
     if depth > 2:
         before = (likely, mi.Color3f(1.0))
-        seen += traced_radiance(scene, sampler, ray, light_paths, depth - 1, before=before, met=met)
+        again = [m for m in materials_with_below(scene) if m.model.walks_again] if walks < MOST_WALKS else []
+        further = {"before": before, "met": met, "walked": bool(again)}
+        seen += traced_radiance(scene, sampler, ray, light_paths, depth - 1, **further)
+        if again:
+            far = seen_side(far)
+            seen += light_from_below(scene, again, far, valid, sampler, light_paths, depth - 1, walks + 1)
     total += dr.select(valid, seen * shadows.terminator.bend(si, wo, valid), 0.0)
     return dr.select(dr.all(dr.isfinite(total)), total, 0.0)
