@@ -12,12 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.recorded_models import RecordedModel, recorded_model
+from ...material.recorded_models import recorded_model
 from ...types.errors import UnrecordableError
 from ...types.parameter import Value
 from ..camera.highlight_cells import Highlights
@@ -27,6 +26,7 @@ from ..lamps.met_lamps import lights_have_no_extent
 from ..machine.memory import require_memory
 from ..models.joined_graph import Graph
 from ..models.prepared_material import EMISSION
+from ..models.scene_values import values_in_scene
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from .indirect_share import indirect_share
@@ -53,6 +53,8 @@ BYTES_PER_SAMPLE = 200  # of each further sample of the light
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
 # Extinctions that walks below the surface are recorded for, as multiples of the material's, near a solution and for the
 # first search. Wider: more noise, 0.25 to 4 was tried (docs/notebook/subsurface.md)
+# What a walk costs, in lanes: a fit under a probe took 207 s where it counted as none (docs/notebook/subsurface.md)
+LANES_OF_A_WALK = 8
 NEAR_WALKS, FAR_WALKS = (1.0,), (0.5, 1.0, 2.0)
 DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
 
@@ -103,7 +105,7 @@ class RecordedScene:
         bsdf = renderer.shape.bsdf()
         walks = not self._mixed and getattr(bsdf, "has_below", False)
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
-        self._fixed = self.model.values(_values_of(renderer, self.model), renderer.table.names)
+        self._fixed = self.model.values(values_in_scene(renderer.shape.bsdf(), self.model), renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
@@ -248,7 +250,8 @@ class RecordedScene:
     def finest_grid(self, samples: int, lanes: float) -> int:
         """The finest grid with which a recording of so many samples of the light holds every tile in so many lanes, or
         in those that any recording may have."""
-        return int(math.sqrt(min(lanes, MOST_LANES) / (2 * samples * self._covered)))
+        of_a_ray = 2 + LANES_OF_A_WALK * self._walks
+        return max(int(math.sqrt(min(lanes, MOST_LANES) / (of_a_ray * samples * self._covered))), 1)
 
     def _highlights(self, vector: NDArray[np.float64]) -> Highlights:
         """How finely highlights of the material `vector` are recorded: an anisotropic lobe is narrow along one axis."""
@@ -379,33 +382,3 @@ def _rays(squares: NDArray[np.int64], stride: int) -> int:
     height, width = squares.shape
     order, _ = tile_order(width, height, stride)
     return int(squares.reshape(-1)[order].sum())
-
-
-def _values_of(renderer: MitsubaRenderer, model: RecordedModel) -> dict[str, Value | None]:
-    """The values of the target's material in the scene, None for those of a texture.
-
-    Raises
-    ------
-    UnrecordableError
-        If one of them is a texture and the material is a plugin that cannot be asked for its values at a point.
-    """
-    keys = mi.traverse(renderer.shape.bsdf())
-    values: dict[str, Value | None] = {}
-    asked = hasattr(renderer.shape.bsdf(), "values_at")
-    for key in keys.keys():  # noqa: SIM118  the traversed object has no iterator of keys
-        parts = key.split(".")
-        if parts[0].startswith("leaf_"):  # the model knows them
-            continue
-        name = next((part for part in parts if part in model.table.names), None)
-        if name is None:
-            continue
-        if parts[parts.index(name) + 1 :] not in ([], ["value"]):
-            if not asked:
-                raise UnrecordableError(f"Parameter {name!r} is a texture: recorded paths need one value.")
-            values[name] = None
-            continue
-        numbers = np.array(keys[key], np.float64).ravel()
-        size = model.table[name].size
-        values[name] = float(numbers.mean()) if size == 1 else tuple(float(v) for v in np.resize(numbers, 3))
-    dr.eval()
-    return values

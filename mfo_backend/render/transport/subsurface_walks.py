@@ -97,7 +97,7 @@ def walked(
         return p, d, collisions, length, goes_on, out, found, shape, prim, free, g, survival, a, b
 
     p, d, collisions, length, _, out, found, *_ = dr.while_loop(
-        state, lambda *s: s[4], step, mode="evaluated", compress=True, label="random walks"
+        state, lambda *s: s[4], step, mode="evaluated", compress=width > 1, label="random walks"
     )
     exits = found.compute_surface_interaction(mi.Ray3f(p, d, dr.inf, 0.0, mi.Color0f()), mi.RayFlags.All, out)
     # as Cycles turns them, by the triangle's own side: a smooth normal may well look away from the walk

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Subsurface of the target, as Cycles shows it: by recorded walks and by pictures."""
 
 from __future__ import annotations

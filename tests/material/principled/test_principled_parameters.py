@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -106,7 +107,10 @@ def test_versions_differ_as_documented() -> None:
     assert (old.coat_compensation, old.diffuse_roughness, old.film_fourier) == (False, False, False)
     assert (middle.coat_compensation, middle.diffuse_roughness, middle.film_fourier) == (True, True, False)
     assert (cycles_model((4, 4)).bumps_shade, middle.bumps_shade) == (False, True)
-    assert new == cycles_model((5, 0))
+    assert new == replace(cycles_model((5, 0)), radius_is_path=True)
+    assert cycles_model((5, 2), subsurface_method="RANDOM_WALK_LEGACY") == cycles_model((5, 0))
+    assert (middle.walks_again, cycles_model((5, 0)).walks_again) == (False, True)
+    assert cycles_model(subsurface_method="RANDOM_WALK_SKIN").skin
     assert not cycles_model((5, 0), "GGX").multiple_scattering
 
 
