@@ -94,6 +94,8 @@ def approximated(material: Material) -> list[str]:
     below = [leaf for leaf in (material, *material.leaves) if leaf.value("Subsurface Weight", 0.0) != 0.0]
     if below and material.is_mixed:
         found.append("Subsurface is shown as diffuse in a mix of shaders: no light travels below the surface.")
+    elif below and material.passes_light:
+        found.append("Subsurface is fitted as diffuse, for the material lets light through.")
     elif below and material.subsurface_method == "BURLEY":
         found.append("Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.")
     elif below and material.subsurface_method != "RANDOM_WALK" and material.value("Subsurface Anisotropy", 0.0) < 0.0:

@@ -157,6 +157,7 @@ SCENE = {
     "Material '{}': scene.xml has the average of the picture on {}, which Mitsuba's principled cannot take as a picture.": "Matériau '{}' : scene.xml a la moyenne de l'image sur {}, que le principled de Mitsuba ne prend pas comme image.",
     "Material '{}': shaders that add up to {} are approximated by brighter colours.": "Matériau '{}' : des shaders dont la somme est {} sont approchés par des couleurs plus claires.",
     "Material '{}': what is linked to Anisotropy of '{}' is left out.": "Matériau '{}' : ce qui est lié à Anisotropy de '{}' est omis.",
+    "Material '{}': what is linked to {} of '{}' is left out.": "Matériau '{}' : ce qui est lié à {} de '{}' est omis.",
     "Material '{}': what is linked to {} is left out.": "Matériau '{}' : ce qui est lié à {} est omis.",
     "Material '{}': {}": "Matériau '{}' : {}",
     "Material '{}': {} depend on the view; the fit has them as the camera sees them.": "Matériau '{}' : {} dépendent de la vue ; l'ajustement les a comme la caméra les voit.",

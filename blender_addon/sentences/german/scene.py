@@ -158,6 +158,7 @@ SCENE = {
     "Material '{}': scene.xml has the average of the picture on {}, which Mitsuba's principled cannot take as a picture.": "Material '{}': scene.xml hat das Mittel des Bildes an {}, was Mitsubas principled nicht als Bild annimmt.",
     "Material '{}': shaders that add up to {} are approximated by brighter colours.": "Material '{}': Shader, die zusammen {} ergeben, werden durch hellere Farben angenähert.",
     "Material '{}': what is linked to Anisotropy of '{}' is left out.": "Material '{}': was mit Anisotropy von '{}' verbunden ist, wird weggelassen.",
+    "Material '{}': what is linked to {} of '{}' is left out.": "Material '{}': was mit {} von '{}' verbunden ist, wird weggelassen.",
     "Material '{}': what is linked to {} is left out.": "Material '{}': was mit {} verbunden ist, wird weggelassen.",
     "Material '{}': {}": "Material '{}': {}",
     "Material '{}': {} depend on the view; the fit has them as the camera sees them.": "Material '{}': {} hängen vom Blick ab; die Anpassung hat sie, wie die Kamera sie sieht.",
