@@ -127,10 +127,8 @@ def record_paths(
             lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
         if below is not None:
             begun = TechniqueLanes(si.wi, si.wi, filter_weight, position, held)
-            in_a_pixel, depth = int(np.max(np.square(settings.grid))), max(settings.depth, 2)
-            walks = WalkSettings(
-                in_a_pixel, settings.samples, settings.seed, settings.walks, settings.light_paths, depth
-            )
+            depth = max(settings.depth, 2)
+            walks = WalkSettings(settings.samples, settings.seed, settings.walks, settings.light_paths, depth)
             lanes.append(walked_lanes(scene, begun, si, below, pixels, walks))
 
         covered, coverage = coverage_of(pixels, position, filter_weight)

@@ -26,13 +26,13 @@ class RecordSettings:
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin tells them. `bumped` says that
     nodes give it normals, and `mixed` that it is a `closure_tree`. With a `surface`, lanes keep their `subpixel` on it.
-    With `light_paths` light over other
-    surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the only ones looked at; where they
-    hold all that see the target, nothing is missed. With `highlights` more rays start where lights of no extent are
-    mirrored. Every camera ray meets the lights with extent in as many independent `samples`, or in samples of the same
-    directions if they are `alike`. The first `direct_samples` leave light over other surfaces out and need no other
-    kernels than a recording with it. With `glows` the target's own light is no part of the constant picture but a lane
-    without direction for each camera ray. Where the emission is free, a colour of 1 has the radiance `unit_emission`.
+    With `light_paths` light over other surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the
+    only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more rays start
+    where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many independent
+    `samples`, or in samples of the same directions if they are `alike`. The first `direct_samples` leave light over
+    other surfaces out and need no other kernels than a recording with it. With `glows` the target's own light is no
+    part of the constant picture but a lane without direction for each camera ray. Where the emission is free, a colour
+    of 1 has the radiance `unit_emission`.
     Light below the surface is recorded for the extinctions that the material has times those of `walks`, if there are
     any: a walk is a lane without direction, too, and every lane has the numbers of `random_walk.WALK`.
     """

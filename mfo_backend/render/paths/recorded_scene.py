@@ -51,10 +51,10 @@ MOST_RAYS = 12_000_000  # of one recording, those that miss the target included
 BYTES_PER_RAY_EXACT, BYTES_PER_RAY_SAMPLED = (150, 220), (340, 480)
 BYTES_PER_SAMPLE = 200  # of each further sample of the light
 PROBE_RAYS = 1 << 14  # about as many rays say whether light over other surfaces is a two-hundredth of the direct light
-# Extinctions that walks below the surface are recorded for, as multiples of the material's, near a solution and for the
-# first search. Wider: more noise, 0.25 to 4 was tried (docs/notebook/subsurface.md)
 # What a walk costs, in lanes: a fit under a probe took 207 s where it counted as none (docs/notebook/subsurface.md)
 LANES_OF_A_WALK = 8
+# Extinctions that walks below the surface are recorded for, as multiples of the material's, near a solution and for the
+# first search. Wider: more noise; with 0.25 to 4 a plain material was taken for a coated one, as with others then
 NEAR_WALKS, FAR_WALKS = (1.0,), (0.5, 1.0, 2.0)
 DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
 

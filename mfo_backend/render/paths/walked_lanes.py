@@ -29,14 +29,13 @@ FAR_SURVIVAL = 0.97
 ENTRIES = (LEAST_ALPHA, 0.3, 1.0)
 _APART = 0x2C1B3C6D
 _GOLDEN = 0x9E3779B9  # 2^32 over the golden ratio
-_CHOICE = 1 << 18  # a place of the random numbers that no walk has
+_TURN = 1 << 18  # a place of the random numbers that no walk has
 
 
 @dataclass(frozen=True)
 class WalkSettings:
-    """How to record walks: about so many in a pixel, in each of the independent `samples`; `spread` is `walked`'s."""
+    """How to record walks: one for each ray in each of the independent `samples`; `spread` is that of `walked`."""
 
-    in_a_pixel: int
     samples: int
     seed: int
     spread: Sequence[float]
@@ -60,10 +59,6 @@ def walked_lanes(
     count = dr.width(si.p)
     lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
     random = PathRandom.of(lane, dr.opaque(mi.UInt32, settings.seed ^ _APART))
-    # narrow highlights have far more rays than a smooth glow needs
-    chance = dr.minimum(dr.abs(dr.gather(mi.Float, hits.weight, lane % rays)) * float(settings.in_a_pixel), 1.0)
-    lane = dr.compress(random.pair(_CHOICE).x < chance)
-    chance, random = dr.gather(mi.Float, chance, lane), dr.gather(PathRandom, random, lane)
     sample = lane // rays
     number = lane - sample * rays
     entered, medium = dr.gather(mi.SurfaceInteraction3f, si, number), below.gathered(number)
@@ -76,9 +71,11 @@ def walked_lanes(
     index = dr.compress(walks.out)
     ray = dr.gather(mi.UInt32, number, index)
     exits = dr.gather(mi.SurfaceInteraction3f, walks.si, index)
-    sampler = fresh_sampler(settings.seed ^ _APART, dr.width(index))
-    light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
-    weight = light * dr.gather(mi.Float, hits.weight, ray) / dr.gather(mi.Float, chance, index)
+    light = dr.zeros(mi.Color3f, dr.width(index))
+    if dr.width(index) > 0:  # a surface that encloses nothing lets none out
+        sampler = fresh_sampler(settings.seed ^ _APART, dr.width(index))
+        light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
+    weight = light * dr.gather(mi.Float, hits.weight, ray)
     position = dr.gather(mi.UInt32, hits.position, ray) + dr.gather(mi.UInt32, sample, index) * pixels
     kept = [dr.gather(type(value), value, ray) for value in hits.held[: -len(WALK)]]
     walk = [dr.gather(mi.Float, value, index) for value in walks.held]
@@ -90,6 +87,6 @@ def walked_lanes(
 
 def _even_choice(ray: mi.UInt32, pixel: mi.UInt32, seed: int) -> mi.Float:
     """Numbers in [0, 1), evenly over those rays of a pixel that follow each other, and random from pixel to pixel."""
-    turn = PathRandom.of(pixel, dr.opaque(mi.UInt32, seed ^ _APART)).pair(_CHOICE).y
+    turn = PathRandom.of(pixel, dr.opaque(mi.UInt32, seed ^ _APART)).pair(_TURN).x
     number = turn + mi.Float((ray * _GOLDEN) >> 8) * 2.0**-24
     return number - dr.floor(number)

@@ -75,3 +75,12 @@ def test_a_radius_of_nodes(scene: Any, export: Any, render_cycles: Any) -> None:
     tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], ramp.inputs[0])
     tree.links.new(ramp.outputs["Y"], node.inputs["Subsurface Scale"])
     same_level(export, render_cycles, ball(material))
+
+
+def test_what_encloses_nothing_lets_no_light_out(scene: Any, export: Any, render_cycles: Any) -> None:
+    """A plane is black but for its reflection; no walk leaves it."""
+    lit(scene)
+    bpy.ops.mesh.primitive_plane_add(size=3.0)
+    target = bpy.context.object
+    target.data.materials.append(new_material("Wax", Specular_IOR_Level=1.0, **VALUES))
+    same_level(export, render_cycles, target)
