@@ -28,14 +28,14 @@ BLENDER_PRINCIPLED = ParameterTable(
         Parameter("sheen_roughness", 1, 0.05, 1.0, 0.5),
         Parameter("sheen_tint", 3, 0.0, 1.0, (1.0, 1.0, 1.0)),
         Parameter("subsurface_weight", 1, 0.0, 1.0, 0.0),
-        Parameter("subsurface_radius", 3, 0.01, 10.0, (1.0, 0.2, 0.1)),
-        Parameter("subsurface_scale", 1, 1e-4, 10.0, 0.05),  # scene units; the radii are in it
-        Parameter("subsurface_ior", 1, 1.01, 3.8, 1.4),
-        Parameter("subsurface_anisotropy", 1, -0.99, 0.99, 0.0),
         Parameter("thin_film_thickness", 1, 0.0, 1500.0, 0.0),  # nanometres
         Parameter("thin_film_ior", 1, 1.01, 2.5, 1.33),
         Parameter("emission_color", 3, 0.0, 1.0, (1.0, 1.0, 1.0)),
         Parameter("emission_strength", 1, 0.0, 100.0, 0.0),
+        Parameter("subsurface_radius", 3, 0.01, 10.0, (1.0, 0.2, 0.1)),
+        Parameter("subsurface_scale", 1, 1e-4, 10.0, 0.05),  # scene units; the radii are in it
+        Parameter("subsurface_ior", 1, 1.01, 3.8, 1.4),
+        Parameter("subsurface_anisotropy", 1, -0.99, 0.99, 0.0),
     ]
 )
 

@@ -176,9 +176,9 @@ def test_a_value_that_reaches_nothing_a_model_has_is_not_offered() -> None:
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.table import graph_values
 
-    material = new_material("Weight")
+    material = new_material("Cut out")
     tree, node = material.node_tree, principled(material)
-    tree.links.new(tree.nodes.new("ShaderNodeMath").outputs[0], node.inputs["Weight"])
+    tree.links.new(tree.nodes.new("ShaderNodeMath").outputs[0], node.inputs["Alpha"])
     target = target_shader(material)
     assert target is not None
     assert graph_values(target) == []

@@ -25,7 +25,8 @@ INSTALLED = {
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("MFO_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "")  # so that what a test leaves there is taken back
+    monkeypatch.delenv("DRJIT_LIBLLVM_PATH")
     return tmp_path / "cache"
 
 
