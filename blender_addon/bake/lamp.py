@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..probe.server import ProbeRequestError
 from ..versions import active_output, node_tree_of
 from .lamp_layout import CONSTANT, NORMAL, PLACE, directions, distances, places
-from .stage import Stage, bake, copy_properties, copy_what_nodes_ask_for, set_up
+from .stage import NAME, Stage, alone, bake
 
 Numbers = NDArray[np.float64]  # (points, 3)
 
@@ -132,13 +132,9 @@ def _lamp_stage(
     scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, asked: Mapping[str, Any]
 ) -> Iterator[tuple[bpy.types.Scene, bpy.types.Object]]:
     """A scene with a white copy of the instance's lamp, without a radius, a soft rim and shadows, and nothing else."""
-    original = instance.object.original
-    matrix, name = instance.matrix_world.copy(), original.name
-    stage = bpy.data.scenes.new("material_fit_lamp")
+    original, matrix = instance.object.original, instance.matrix_world.copy()
     data = original.data.copy()
-    lamp = bpy.data.objects.new("material_fit_lamp", data)
-    window = bpy.context.window
-    before, view_layer = window.scene, window.view_layer
+    lamp = bpy.data.objects.new(NAME, data)
     try:
         # far from zero the kernel's places are coarse
         lamp.matrix_world = matrix if asked["placed"] else matrix.to_3x3().to_4x4()
@@ -148,24 +144,15 @@ def _lamp_stage(
         data.color, data.energy, data.use_shadow = (1.0, 1.0, 1.0), 1.0, False
         if hasattr(data, "use_temperature"):  # Blender 4.5
             data.use_temperature = False
-        copy_what_nodes_ask_for(original, lamp, None)
-        stage.collection.objects.link(lamp)
-        stage.camera = scene.camera
-        copy_properties((scene.world, scene, view_layer), stage)
-        stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-        set_up(stage, scene)
-        stage.cycles.samples, stage.cycles.light_sampling_threshold = 1, 0.0
-        settings = stage.render.bake
-        settings.target = "VERTEX_COLORS"
-        settings.use_pass_direct, settings.use_pass_indirect, settings.use_pass_color = True, False, False
-        window.scene = stage
-        yield stage, lamp
+        with alone(scene, original, lamp) as stage:
+            stage.cycles.samples, stage.cycles.light_sampling_threshold = 1, 0.0
+            settings = stage.render.bake
+            settings.target = "VERTEX_COLORS"
+            settings.use_pass_direct, settings.use_pass_indirect, settings.use_pass_color = True, False, False
+            yield stage, lamp
     finally:
-        window.scene, window.view_layer = before, view_layer
         bpy.data.objects.remove(lamp)
-        original.name = name
         bpy.data.lights.remove(data)
-        bpy.data.scenes.remove(stage)
 
 
 def _shrink(data: Any) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
+
+NAME = "material_fit_bake"
 
 
 class Stage(NamedTuple):
@@ -23,28 +25,40 @@ def staged(
 ) -> Iterator[Stage]:
     """A scene with a copy of the instance's evaluated object, whose coordinates are those of the original."""
     original = instance.object.original
-    stage = bpy.data.scenes.new("material_fit_bake")
     layers = original.type == "MESH"
     matrix = instance.matrix_world.copy()
     mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
-    item = bpy.data.objects.new("material_fit_bake", mesh)
-    window = bpy.context.window
-    before, view_layer, name = window.scene, window.view_layer, original.name
+    item = bpy.data.objects.new(NAME, mesh)
     try:
         item.matrix_world = matrix
-        copy_what_nodes_ask_for(original, item, mesh)
+        with alone(scene, original, item) as stage:
+            yield Stage(stage, item)
+    finally:
+        bpy.data.objects.remove(item)
+        bpy.data.meshes.remove(mesh)
+
+
+@contextmanager
+def alone(scene: bpy.types.Scene, original: bpy.types.Object, item: bpy.types.Object) -> Iterator[bpy.types.Scene]:
+    """A scene with nothing but `item`, whose nodes find what those of the original do, for Cycles to bake in.
+
+    Its name is the original's meanwhile.
+    """
+    window, stage = bpy.context.window, bpy.data.scenes.new(NAME)
+    before, view_layer, name = window.scene, window.view_layer, original.name
+    try:
+        _copy_what_nodes_ask_for(original, item)
         stage.collection.objects.link(item)
         stage.camera = scene.camera
         copy_properties((scene.world, scene, view_layer), stage)
         stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-        set_up(stage, scene)
+        _set_up(stage, scene)
         window.scene = stage
-        yield Stage(stage, item)
+        yield stage
     finally:
         window.scene, window.view_layer = before, view_layer
-        bpy.data.objects.remove(item)
+        item.name = NAME
         original.name = name
-        bpy.data.meshes.remove(mesh)
         bpy.data.scenes.remove(stage)
 
 
@@ -75,13 +89,14 @@ def copy_properties(owners: Iterable[bpy.types.ID | bpy.types.ViewLayer | None],
                 into[key] = owner[key]
 
 
-def copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, mesh: bpy.types.Mesh | None) -> None:
-    """Give `item` generated coordinates (if it has a `mesh`), Object Info and attributes of the object.
+def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object) -> None:
+    """Give `item` generated coordinates, if it is a mesh, Object Info and attributes of the object.
 
     Its name becomes that of the original, which is to get it back.
     """
+    mesh: Any = item.data
     # of a metaball Cycles takes that of the faces, whatever its data say
-    if mesh is not None and hasattr(original.data, "texspace_location") and original.type != "META":
+    if item.type == "MESH" and hasattr(original.data, "texspace_location") and original.type != "META":
         mesh.use_auto_texspace = False
         mesh.texspace_location = original.data.texspace_location
         mesh.texspace_size = original.data.texspace_size
@@ -92,7 +107,7 @@ def copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object, 
     item.name = name
 
 
-def set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:
     """Let Cycles bake in `stage` as it renders `scene`."""
     stage.render.engine = "CYCLES"
     stage.cycles.device, stage.cycles.shading_system = "CPU", scene.cycles.shading_system

@@ -45,7 +45,9 @@ FILTERED = 0.6
 MOST_APART = 0.5
 LEAST_STEP = 1e-3  # of light: over which the slope of a display is taken. No measurement
 DRAWS = 4  # whose mean is the noise of few pixels; of one, FLIP scattered by 0.005
-CHANCE = 2.0  # standard deviations of chance that are taken from what neighbours share
+# Standard deviations that are chance: they are taken from what neighbours share, and a slope may be so much larger in
+# truth. No measurement
+CHANCE = 2.0
 
 Light = NDArray[np.floating]
 Mask = NDArray[np.bool_]

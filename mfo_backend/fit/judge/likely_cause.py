@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...render.camera.widened_mask import widened
 from ...types.verdict import Cause
+from .beyond_noise import CHANCE
 
 MOST_SHIFT = 5  # pixels that a picture is tried to be moved by, along each axis
 # Part of the squared difference that a moved picture takes away, from which on its place is the reason
@@ -25,7 +26,6 @@ AT_RIM, MORE_THAN_AREA = 0.6, 2.0
 # 0.05 to 0.29, of 27 others 0.47 and more but for a moved lamp (0.25) and a turned probe (0.04)
 # (docs/notebook/verdicts.md). Larger: a moved lamp is another scene. Smaller: another object is taken for a light.
 OUTLINE, NO_OUTLINE = 3, 0.35
-CHANCE = 2.0  # standard deviations by which a slope may be larger in truth
 DIFFERS, MOSTLY = 0.03, 0.5  # display values; part of the surroundings
 # Part of the target that differs from which on it is lit otherwise, where surroundings differ, too: a material makes up
 # for little of a light from elsewhere, and misses little of what is beside it. Turned lamps and probes 0.52 and more of

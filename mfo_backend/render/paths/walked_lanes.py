@@ -21,8 +21,6 @@ from ..transport.path_random import PathRandom
 from ..transport.subsurface_walks import walked
 from .merged_lanes import TechniqueLanes
 
-# Survival of walks that serve materials far from the one they were made for, which may be brighter. No measurement
-FAR_SURVIVAL = 0.97
 # Alphas of the interfaces that walks enter through, whatever the material's: what is narrower or wider than the one a
 # walk was made for has several times its noise, so that a plain material lost against one with a coat on a rough base
 # (docs/notebook/subsurface.md)
@@ -63,9 +61,8 @@ def walked_lanes(
     number = lane - sample * rays
     entered, medium = dr.gather(mi.SurfaceInteraction3f, si, number), below.gathered(number)
     reached = dr.max(medium.weight) > 0.0
-    least = FAR_SURVIVAL if len(settings.spread) > 1 else 0.0
     walks = walked(
-        scene, entered, medium, random, reached, spread=settings.spread, least_survival=least, alphas=ENTRIES,
+        scene, entered, medium, random, reached, spread=settings.spread, alphas=ENTRIES,
         choice=_even_choice(number, dr.gather(mi.UInt32, hits.position, number) + sample * pixels, settings.seed),
     )  # fmt: skip
     index = dr.compress(walks.out)

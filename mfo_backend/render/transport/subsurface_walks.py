@@ -48,7 +48,6 @@ def walked(
     active: mi.Bool,
     *,
     spread: Sequence[float] = (1.0,),
-    least_survival: float = 0.0,
     alphas: Sequence[float] = (),
     choice: mi.Float | None = None,
 ) -> Walks:
@@ -56,23 +55,22 @@ def walked(
 
     Which one is chosen by a number in [0, 1), a random one or one of more even ones. Views enter through an interface
     as rough as the material's, or as one of these `alphas`. After a few collisions a walk goes on as probably as the
-    brightest channel does, or with `least_survival`.
+    brightest channel does.
     """
     medium = below.medium
     extinctions = [medium.extinction[k] * factor for k in range(3) for factor in spread]
-    survival = dr.maximum(dr.max(medium.albedo), least_survival)
     d, h, entry_density, enters = _entered(si, below, random, alphas)
-    active = active & enters
     width = dr.width(si.p)
     chosen = (random.pair(0).x if choice is None else choice) * len(extinctions)
     free = extinctions[0] + dr.zeros(mi.Float, width)
     for k, extinction in enumerate(extinctions[1:], 1):
         free = dr.select(chosen >= k, extinction, free)
     shape, prim, bodies = mi.ShapePtr(si.shape), mi.UInt32(si.prim_index), _bodies(scene)
-    g, survival = (value + dr.zeros(mi.Float, width) for value in (medium.anisotropy, survival))
-    found, none = dr.zeros(mi.PreliminaryIntersection3f, width), dr.zeros(mi.UInt32, width)
+    g, survival = (value + dr.zeros(mi.Float, width) for value in (medium.anisotropy, dr.max(medium.albedo)))
+    length, out = dr.zeros(mi.Float, width), dr.full(mi.Bool, False, width)
     state = (
-        mi.Point3f(si.p), d, none, dr.zeros(mi.Float, width), active & (none == 0), none != 0, found,
+        mi.Point3f(si.p), d, dr.zeros(mi.UInt32, width), length, active & enters & ~out, out,
+        dr.zeros(mi.PreliminaryIntersection3f, width),
         shape, prim, free, g, survival, mi.UInt32(random.a), mi.UInt32(random.b),
     )  # fmt: skip
 
