@@ -29,7 +29,8 @@ from ...types.parameter import ParameterTable, Value
 from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
 
 # How far light may go below a surface, of a fit: so many times less or more than the least or largest radius of the
-# scene, for walks that were made for that tell of it (`recorded_scene.FAR_WALKS`). No measurement
+# scene, for walks that were made for that tell of it. From four times too small a red radius was found
+# (docs/notebook/subsurface.md). Larger: not tried
 WALKS_NEAR = 5.0
 WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
