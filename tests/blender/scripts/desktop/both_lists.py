@@ -156,7 +156,7 @@ def write(words, text, part=0.3):
 def choose_camera(name):
     """That of the second picture: the name is searched in the list that its field opens."""
     place = []
-    yield from find("pictures[0].camera", place)
+    yield from find("pictures[0].camera", place, 0.7)  # right of the picture itself
     yield from click(*place)
     yield 1.5  # until the list is open, on busy cores
     for letter in name:
