@@ -97,6 +97,11 @@ class Material:
         return bool(self.leaves) or self.weight.linked or self.weight.value != 1.0
 
     @property
+    def scattering(self) -> tuple[Material, ...]:
+        """Those of its leaves, itself first, that let light walk below the surface."""
+        return tuple(leaf for leaf in (self, *self.leaves) if leaf.value("Subsurface Weight", 0.0) != 0.0)
+
+    @property
     def passes_light(self) -> bool:
         """Whether light comes through it, or through one of its leaves."""
         if self.model == "null" or self.shader in ("glass", "refraction", "translucent"):

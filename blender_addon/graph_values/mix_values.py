@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import EMISSION, KINDS, UNUSED_IN_MIXES, inputs_of, is_fitted
+from ..export.nodes.leaf_kinds import EMISSION, KINDS, UNUSED_SOCKETS, inputs_of, is_fitted
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
@@ -18,10 +18,10 @@ from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word
 
 # what a leaf has to have so that light only returns from it, and none is its own
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
-OPAQUE_SHADERS = ("principled", "glossy")
+OPAQUE_SHADERS = ("principled", "glossy", "subsurface")
 NOT_FITTED = (
     *("Weight", "Alpha", "Transmission Weight", "Emission Color", "Emission Strength", "Subsurface Weight"),
-    *(*DIRECTIONS, *UNUSED_IN_MIXES),
+    *(*DIRECTIONS, *UNUSED_SOCKETS),
 )
 # of a Principled BSDF those that *All* takes: one picture tells little more of several, but for lobes that are there
 OF_PRINCIPLED = ("Base Color", "Metallic", "Roughness", "Specular IOR Level")
@@ -31,6 +31,7 @@ WITH = {
     "Anisotropic": ("Anisotropic", "Anisotropic Rotation"),
     "Thin Film Thickness": ("Thin Film Thickness", "Thin Film IOR"),
     "Diffuse Roughness": ("Diffuse Roughness",),
+    "Subsurface Weight": ("Subsurface Radius",),
 }
 
 
@@ -111,7 +112,7 @@ def mix_values(target: TargetShader) -> list[MixValue]:
             if name in NOT_FITTED or at.socket.is_linked or not hasattr(at.socket, "default_value"):
                 continue
             path = (*(group.name for group in at.groups), at.socket.node.name)
-            place = Place(path, INPUT, at.socket.identifier, size=3 if at.socket.type == "RGBA" else 1)
+            place = Place(path, INPUT, at.socket.identifier, size=3 if at.socket.type in ("RGBA", "VECTOR") else 1)
             found.append(_value(leaf.node, shader.own_name(name), place, name in default, leaf=number, socket=name))
     return named_apart(found)
 
@@ -206,4 +207,6 @@ def _is_absent(shader: TargetShader, name: str) -> bool:
     if amount is None or (amount == name == "Diffuse Roughness" and shader.node.bl_idname != PRINCIPLED):
         return False
     socket = shader.sockets.get(amount)
-    return socket is None or (not socket.is_linked and plain_value(socket) == 0.0)
+    if socket is None:  # a node whose lobe this is has no amount of it
+        return shader.node.bl_idname == PRINCIPLED
+    return not socket.is_linked and plain_value(socket) == 0.0

@@ -142,7 +142,8 @@ class MixedModel(BlenderPrincipledModel):
     """The leaves of a `closure_tree` that may change, opaque, with their weights; the fitted one is never left out.
 
     The values of the fitted leaf have the names of a plain material, free ones of others what a user calls them, and
-    what else leaf k has is "leaf_k.base_color" and so on. A leaf's "weight" is what it has without the factors.
+    what else leaf k has is "leaf_k.base_color" and so on. A leaf's "weight" is what it has without the factors. Light
+    may walk below one of them, as in `InnerLightModel`.
     """
 
     def __init__(self, tree: Any, mix: MixValues) -> None:
@@ -166,6 +167,7 @@ class MixedModel(BlenderPrincipledModel):
         self.widths = ("roughness", *rough)
         # a fit of factors alone has no width to scan
         self.scanned = (*BlenderPrincipledModel.scanned, *rough)
+        self.walks = WALK if tree.has_below and not tree.walks_are_held else NO_WALK
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`; what the other leaves hold is the plugin's to say."""
@@ -179,23 +181,28 @@ class MixedModel(BlenderPrincipledModel):
 
     def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
         """See `RecordedModel`."""
-        own = super().bind({n: v for n, v in fixed.items() if n in BLENDER_PRINCIPLED.names}, free)
-        others = {}
+        own = needed_lobes({n: v for n, v in fixed.items() if n in BLENDER_PRINCIPLED.names}, free)
+        leaves = [(self._tree.fitted, {}, "weight", own)]
         for k, names in self._names.items():
             known = {name: fixed[shown] for name, shown in names.items() if shown in fixed}
             lobes = needed_lobes(known, [name for name, shown in names.items() if shown in free])
-            others[k] = lobes, self._tree.held[k].material.model
+            leaves.append((self._tree.held[k], names, f"leaf_{k}.weight", lobes))
 
-        def evaluate(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
+        def seen(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
             factors = [parameters[name] for name in self._mix.factors]
-            value = own(parameters, wi, wo) * parameters["weight"] * amount_of(self._tree.fitted.ways, factors)
-            for k, (lobes, model) in others.items():
-                of_leaf = {name: parameters[shown] for name, shown in self._names[k].items()}
-                weight = parameters[f"leaf_{k}.weight"] * amount_of(self._tree.held[k].ways, factors)
-                value = value + blender_principled(of_leaf, wi, wo, lobes, model) * weight
-            return value
+            lit, inside = [], None
+            for leaf, names, weight, lobes in leaves:
+                of_leaf = {name: parameters[shown] for name, shown in names.items()} or parameters
+                layers = layer_stack(of_leaf, wi, lobes, leaf.material.model)
+                amount = parameters[weight] * amount_of(leaf.ways, factors)
+                if self.walks and leaf is self._tree.walking and layers.below is not None:
+                    inside = layers.below.shown(wi, parameters) * amount
+                    layers = replace(layers, subsurface=None)
+                lit.append(evaluate(layers, layers.to_frame(wo)) * amount)
+            value = sum(lit[1:], lit[0])
+            return value if inside is None else dr.select(dr.dot(wo, wo) > 0, value, inside)
 
-        return evaluate
+        return seen
 
 
 def _number(weight: Any) -> float | None:

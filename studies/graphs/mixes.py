@@ -67,7 +67,7 @@ def _mix(factor: Build | None, first: Build, second: Build) -> Build:
 
 _DIFFUSE, _GLOSSY = _shader("BsdfDiffuse"), _shader("BsdfAnisotropic")
 _PLASTIC, _METAL = _shader("BsdfPrincipled"), _shader("BsdfPrincipled", Metallic=1.0)
-_SHEEN = _shader("BsdfSheen")
+_SHEEN, _WAX = _shader("BsdfSheen"), _shader("SubsurfaceScattering", Scale=0.5)
 
 # what is fitted of each mix; values that are not are the same in truth and start
 MIXES: dict[str, tuple[Build, tuple[str, ...]]] = {
@@ -95,6 +95,13 @@ MIXES: dict[str, tuple[Build, tuple[str, ...]]] = {
         _mix(_noise, _colored(_PLASTIC, "TexVoronoi", "ValToRGB"), _METAL),
         ("Color Ramp/Stop 0", "Color Ramp.001/Stop 0", "Color Ramp.001/Stop 1", "Principled BSDF/Roughness",
          "Principled BSDF.001/Roughness"),
+    ),
+    "waxed": (
+        _mix(None, _WAX, _GLOSSY), ("Mix Shader/Factor", "Subsurface Scattering/Color", "Glossy BSDF/Roughness"),
+    ),
+    "veined": (
+        _mix(_noise, _PLASTIC, _WAX),
+        ("Principled BSDF/Base Color", "Principled BSDF/Roughness", "Subsurface Scattering/Color"),
     ),
     "faded": (
         _mix(None, _colored(_DIFFUSE, "TexMagic", "HueSaturation"), _colored(_GLOSSY, "TexNoise", "ValToRGB")),

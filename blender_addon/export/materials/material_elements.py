@@ -91,14 +91,14 @@ def emission_element(material: Material, scale: float, save: Callable[[Texture],
 def approximated(material: Material) -> list[str]:
     """Return a sentence for each thing that no model of the backend has, Blender's own included."""
     found = []
-    below = [leaf for leaf in (material, *material.leaves) if leaf.value("Subsurface Weight", 0.0) != 0.0]
-    if below and material.is_mixed:
-        found.append("Subsurface is shown as diffuse in a mix of shaders: no light travels below the surface.")
+    below = material.scattering
+    if len(below) > 1:
+        found.append("Subsurface of several shaders is shown as diffuse: no light travels below the surface.")
     elif below and material.passes_light:
         found.append("Subsurface is fitted as diffuse, for the material lets light through.")
-    elif below and material.subsurface_method == "BURLEY":
+    elif below and below[0].subsurface_method == "BURLEY":
         found.append("Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.")
-    elif below and material.subsurface_method != "RANDOM_WALK" and material.value("Subsurface Anisotropy", 0.0) < 0.0:
+    elif below and below[0].subsurface_method != "RANDOM_WALK" and below[0].value("Subsurface Anisotropy", 0.0) < 0.0:
         found.append("a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")

@@ -32,7 +32,6 @@ from ..nodes.leaf_kinds import (
     EMISSION,
     KINDS,
     TRANSPARENT,
-    UNUSED_IN_MIXES,
     UNUSED_SOCKETS,
     WITHOUT_SPECULAR,
     inputs_of,
@@ -152,7 +151,7 @@ def _read_leaf(material: bpy.types.Material, target: TargetShader, findings: Fin
     }
     sockets |= other_sockets(material.name, node, findings)
     if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
-        sockets["Diffuse Roughness"] = _no_roughness(sockets["Diffuse Roughness"], material.name, findings)
+        sockets["Diffuse Roughness"] = _no_roughness(node, material.name, findings)
     if only_nearest(node):
         findings.note(f"Material '{material.name}': {node.bl_label} is fitted as its nearest model.")
     for name in ("Normal", "Tangent"):
@@ -182,12 +181,12 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
         findings.note(f"Material '{material.name}': '{name}' ({node.bl_label}) is held as black.")
         sockets = {key: Socket(value, True) for key, value in {**WITHOUT_SPECULAR, "Base Color": [0.0] * 3}.items()}
         return Material(name, "principled", sockets, weight=weight, node=tuple(leaf.path), is_nearest=True)
-    skipped = (*SKIPPED_SOCKETS, *UNUSED_IN_MIXES, *DIRECTIONS)
+    skipped = (*SKIPPED_SOCKETS, *UNUSED_SOCKETS, *DIRECTIONS)
     sockets = {name: Socket(value, True) for name, value in kind.held.items()}
     sockets |= read({name: socket for name, socket in inputs_of(node).items() if name not in skipped})
     sockets |= other_sockets(material.name, node, findings)
     if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
-        sockets["Diffuse Roughness"] = Socket(0.0, True)
+        sockets["Diffuse Roughness"] = _no_roughness(node, material.name, findings)
     for direction in DIRECTIONS:
         if direction in node.inputs:
             place = Place(node.inputs[direction], leaf.groups)
@@ -195,7 +194,7 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
     if only_nearest(node):
         findings.note(f"Material '{material.name}': '{name}' ({node.bl_label}) is held as its nearest model.")
     return Material(
-        name, "principled", sockets, distribution_of(node), shader=kind.shader, weight=weight,
+        name, "principled", sockets, distribution_of(node), _walks_of(node), shader=kind.shader, weight=weight,
         node=tuple(leaf.path), labels=_labels(inputs_of(node)), is_nearest=only_nearest(node),
     )  # fmt: skip
 
@@ -228,8 +227,9 @@ def _read_weight(material: bpy.types.Material, leaf: ClosureLeaf, findings: Find
     return Socket(leaf.share, True, by_graph=True)
 
 
-def _no_roughness(rough: Socket, material: str, findings: Findings) -> Socket:
-    if rough.linked or rough.value > 0.0:
+def _no_roughness(node: bpy.types.Node, material: str, findings: Findings) -> Socket:
+    rough = node.inputs["Roughness"]
+    if rough.is_linked or plain_value(rough) > 0.0:
         findings.note(f"Material '{material}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.")
     return Socket(0.0, True)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import bpy
 
-from ...versions import DIFFUSE, PRINCIPLED
+from ...versions import DIFFUSE, PRINCIPLED, has_diffuse_roughness
 
 # what of a Principled BSDF keeps it opaque, and what takes away its specular reflection
 _OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}
@@ -95,12 +95,7 @@ KINDS: dict[str, LeafKind] = {
     "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHairPrincipled": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
 }
-# of a Principled BSDF: sockets that no model has, whatever is linked to them, and those that a mix has no use for
-UNUSED_SOCKETS = ("Thin Wall",)
-UNUSED_IN_MIXES = (
-    *UNUSED_SOCKETS,
-    *("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy"),
-)
+UNUSED_SOCKETS = ("Thin Wall",)  # of a Principled BSDF those that no model has, whatever is linked to them
 EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
 # values of `all` that join only where the node has some of them already
 _WHERE_PRESENT = {
@@ -139,6 +134,8 @@ def only_nearest(node: bpy.types.Node) -> bool:
 def inputs_of(node: bpy.types.Node) -> dict[str, bpy.types.NodeSocket]:
     """The sockets of a node of a known kind by what the Principled BSDF calls their values."""
     own = {socket.name: socket for socket in node.inputs}  # those that are switched off are not found by name
+    if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
+        own.pop("Roughness")
     names = KINDS[node.bl_idname].names
     return own if names is None else {ours: own[theirs] for ours, theirs in names.items() if theirs in own}
 

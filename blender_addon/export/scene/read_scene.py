@@ -319,7 +319,7 @@ class _Walk:
     def _body(self, bsdfs: dict[int, str]) -> int:
         """The number of an object of several shapes that light goes through below the surface, else 0."""
         known = (self.data.materials.get(bsdf) for bsdf in bsdfs.values())  # what is to be baked is not read yet
-        scatters = (each is None or each.value("Subsurface Weight", 0.0) != 0.0 for each in known)
+        scatters = (each is None or bool(each.scattering) for each in known)
         if len(bsdfs) < 2 or not any(scatters):
             return 0
         self.bodies += 1

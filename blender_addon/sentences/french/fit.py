@@ -216,7 +216,7 @@ FIT = {
     "make it local first (Make Local, --make-local).": "le rendre d'abord local (Rendre local, --make-local).",
     "This result did not match its reference.": "Ce résultat ne correspondait pas à sa référence.",
     "Thin Wall is left out.": "Thin Wall est omis.",
-    "Subsurface is shown as diffuse in a mix of shaders: no light travels below the surface.": "Subsurface est montré comme diffus dans un mélange de shaders : aucune lumière ne passe sous la surface.",
+    "Subsurface of several shaders is shown as diffuse: no light travels below the surface.": "Subsurface de plusieurs shaders est montré comme diffus : aucune lumière ne passe sous la surface.",
     "Subsurface is fitted as diffuse, for the material lets light through.": "Subsurface est ajusté comme diffus, car le matériau laisse passer la lumière.",
     "Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.": "Christensen-Burley est ajusté comme une marche aléatoire : choisir Random Walk pour Subsurface.",
     "a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.": "une Subsurface Anisotropy négative est ajustée comme zéro : choisir Random Walk pour Subsurface.",

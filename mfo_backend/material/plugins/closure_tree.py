@@ -4,7 +4,8 @@
 Choose the variant before importing this. Properties are `fitted`, a nested `blender_principled`, and its `weight`;
 further `leaf_0`, `weight_0`, `leaf_1`, ... of the same plugin, which are held, and `clear_0`, `clear_weight_0`, ... ,
 colours of what passes straight through. Weights and colours are numbers, colours or textures. The surface is the sum of
-all, as Mix and Add Shader of Blender have it.
+all, as Mix and Add Shader of Blender have it. Light walks below the surface of one leaf; where several let it, a
+Lambert lobe stands for that in each of them.
 
 `factor_0`, `factor_1`, ... are factors of Mix Shaders that may change; a leaf that hangs on them has `ways` (that of
 number k `ways_k`) which its weight is multiplied with: the sum over words such as "1.5 -0 +1", a share times 1 - factor
@@ -18,7 +19,7 @@ number k `ways_k`) which its weight is multiplied with: the sum over words such 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -26,6 +27,7 @@ import mitsuba as mi
 
 from ..arrays.clamp import mean
 from ..principled.mix_values import Way, amount_of, ways_in
+from ..principled.random_walk import Below
 from .principled_plugin import BlenderPrincipled
 
 PLUGIN_NAME = "closure_tree"
@@ -95,7 +97,10 @@ class ClosureTree(mi.BSDF):
         for leaf in self.leaves:
             if not isinstance(leaf.material, BlenderPrincipled):
                 raise RuntimeError("a leaf of closure_tree is no blender_principled")
-            leaf.material.nested = True
+        walking = [leaf for leaf in self.leaves if leaf.material.has_below]
+        self.walking = walking[0] if len(walking) == 1 else None
+        for leaf in self.leaves:
+            leaf.material.nested = leaf is not self.walking
         both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
         components = [leaf.material.flags() for leaf in self.leaves]
         if self.clear:
@@ -133,6 +138,24 @@ class ClosureTree(mi.BSDF):
         A held material lets light through if it is glass, cut out or translucent.
         """
         return not self.clear and not any(_passes(leaf.material) for leaf in self.held)
+
+    @property
+    def has_below(self) -> bool:
+        """Whether light walks below the surface."""
+        return self.walking is not None
+
+    @property
+    def walks_are_held(self) -> bool:
+        """Whether it does so below a leaf that nothing changes."""
+        return self.walking is not None and self.walking is not self.fitted and not self.walking.is_free
+
+    def below(self, si: mi.SurfaceInteraction3f, active: Any) -> Below | None:
+        """What the view finds below a surface point; None where no light walks there."""
+        leaf = self.walking
+        found = None if leaf is None else leaf.material.below(si, active)
+        return (
+            None if leaf is None or found is None else replace(found, weight=found.weight * leaf.weight_at(si, active))
+        )
 
     @property
     def model(self) -> Any:

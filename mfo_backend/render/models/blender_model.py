@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -108,16 +108,16 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
     table = ParameterTable(()) if chosen is None else _labelled(chosen, materials[target.bsdf_id])
-    table = _near_walks(table, _constants(sockets))
+    table = _near_walks(table, _constants(sockets), WALK_SIZES)
     start = table.clip(table.pack(_constants(sockets)))
     return target, table, start
 
 
-def _near_walks(table: ParameterTable, values: Mapping[str, Value]) -> ParameterTable:
-    """With bounds around how far light goes below the surface in the scene, for which it is recorded there."""
+def _near_walks(table: ParameterTable, values: Mapping[str, Value], sizes: Collection[str]) -> ParameterTable:
+    """With bounds of these `sizes` around those in the scene: light below the surface is recorded for them."""
     near = []
     for p in table:
-        if p.name in WALK_SIZES:
+        if p.name in sizes:
             present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
             begin = tuple(float(v) for v in present) if p.size == 3 else float(present[0])
             lower, upper = float(present.min()) / WALKS_NEAR, float(present.max()) * WALKS_NEAR
@@ -184,7 +184,8 @@ def _prepared(
         key_ends[EMISSION] = RADIANCE_KEY
         _open_emission(scene, target.shape_id, factors[EMISSION] * start[table.slice_of(EMISSION)])
     if mix is not None:
-        others = ParameterTable(mix.parameters)
+        sizes = [shown for names in mix.leaves.values() for name, shown in names.items() if name in WALK_SIZES]
+        others = _near_walks(ParameterTable(mix.parameters), mix.start, sizes)
         start = np.concatenate([start, others.clip(others.pack(mix.start))])
         table, key_ends = ParameterTable([*table, *others]), key_ends | mix.key_ends
     outer_target = Target(target.shape_id, target.bsdf_id, outer, outer)

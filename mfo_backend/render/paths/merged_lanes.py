@@ -23,14 +23,17 @@ from .recorded_paths import RecordedPaths
 
 @dataclass
 class TechniqueLanes:
-    """One technique's lanes before they are merged; positions of sample s follow s times the pixels."""
+    """One technique's lanes before they are merged; positions of sample s follow s times the pixels.
+
+    `others` is radiance of the held materials of a mix; what shows these alone has no `weight`.
+    """
 
     wi: mi.Vector3f
     wo: mi.Vector3f
-    weight: mi.Color3f
+    weight: mi.Color3f | None
     position: mi.UInt32
     held: tuple[Any, ...]
-    others: Any = None  # radiance of the held materials of a mix
+    others: Any = None
 
 
 def _radiance_of_held(
@@ -75,6 +78,7 @@ def merged_lanes(
         others = _radiance_of_held(lanes, samples, rays, constant.shape[:2])
         constant = constant + others.mean(axis=0)
         difference = 0.5 * (others[0] - others[1]) if samples == 2 else None
+    lanes = [part for part in lanes if part.weight is not None]
     position = np.concatenate([np.array(part.position) for part in lanes] or [np.zeros(0, np.uint32)])
     rank = np.empty(len(position), np.uint32)
     rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)

@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
-from ...material.principled.random_walk import WALK
+from ...material.principled.random_walk import WALK, Below
 from ...types.errors import BadInputError
 from ...types.light_paths import LightPaths
 from ..camera.highlight_cells import highlight_cells
@@ -106,9 +106,13 @@ def record_paths(
                 values["subpixel"] = settings.surface.row_of(si.p)
             held = tuple(values[name] + dr.zeros(type(values[name]), dr.width(index)) for name in settings.held)
         below = shape.bsdf().below(si, mi.Bool(True)) if settings.walks else None
-        if settings.walks:
+        walks_free = below is not None and not (settings.mixed and shape.bsdf().walks_are_held)
+        of_hits = held
+        if walks_free:
             held += (dr.zeros(mi.Float, dr.width(index)),) * len(WALK)
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
+        if own is not None and below is not None and not walks_free:
+            own.duv_dx = mi.Point2f(0.0, 1.0)  # walks take the place of the lobe that stands for them
         coat = _coat_normal(shape, settings, si)
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
@@ -126,10 +130,7 @@ def record_paths(
         if sampled:
             lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
         if below is not None:
-            begun = TechniqueLanes(si.wi, si.wi, filter_weight, position, held)
-            depth = max(settings.depth, 2)
-            walks = WalkSettings(settings.samples, settings.seed, settings.walks, settings.light_paths, depth)
-            lanes.append(walked_lanes(scene, begun, si, below, pixels, walks))
+            lanes.append(_walks(scene, hits, of_hits, below, settings, free=walks_free))
 
         covered, coverage = coverage_of(pixels, position, filter_weight)
         constant = recorded_background(
@@ -138,7 +139,7 @@ def record_paths(
         )  # fmt: skip
         if glow is not None:
             add_radiance(constant, rays.pixel[np.array(position)], glow)
-        named = (*settings.held, *(WALK.names if settings.walks else ()))
+        named = (*settings.held, *(WALK.names if walks_free else ()))
         merged = merged_lanes(lanes, settings.samples, named, rays, covered, coverage, constant)
         if merged.lanes == 0 and not allow_dark:
             raise BadInputError("No light reaches the target: add a light or a world background.")
@@ -301,6 +302,22 @@ def _sampled_lights(
     share *= terminator.bend(si, wo, valid)
     started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
     return [kept() for kept in started]
+
+
+def _walks(
+    scene: mi.Scene, hits: _Hits, held: tuple[Any, ...], below: Below, settings: RecordSettings, *, free: bool
+) -> TechniqueLanes:
+    """Walks below the surface from all hits, lanes where they are `free`: their light hangs on values that change.
+
+    `held` are values of the hits but for those of walks.
+    """
+    si, share = hits.si if free else hits.own, hits.share
+    if free and hits.plugin is not None and not hits.plugin.is_open:
+        share = share * hits.plugin.fitted.weight_at(hits.own)
+    begun = TechniqueLanes(si.wi, si.wi, share, hits.position, held)
+    depth = max(settings.depth, 2)
+    walks = WalkSettings(settings.samples, settings.seed, settings.walks, settings.light_paths, depth, held=not free)
+    return walked_lanes(scene, begun, si, below, hits.pixels, walks)
 
 
 def _over_others(

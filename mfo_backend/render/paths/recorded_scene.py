@@ -103,13 +103,13 @@ class RecordedScene:
         layered = renderer.shape.is_emitter() and getattr(renderer.shape.emitter(), "layered", False)
         self._glows = layered and not self._mixed and renderer.model == "blender_principled"
         bsdf = renderer.shape.bsdf()
-        walks = not self._mixed and getattr(bsdf, "has_below", False)
+        self._walks = renderer.model == "blender_principled" and getattr(bsdf, "has_below", False)
+        walks = self._walks and not (self._mixed and bsdf.walks_are_held)
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         self._fixed = self.model.values(values_in_scene(renderer.shape.bsdf(), self.model), renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
         if self._bumped:
             self._fixed |= dict.fromkeys(self.model.normals.names)
-        self._walks = bool(self.model.walks)
         self._fixed |= dict.fromkeys(self.model.walks.names)
         self.graph = graph or renderer.graph
         varying = partial(VaryingValues, table=renderer.table, sizes=self.model.table)

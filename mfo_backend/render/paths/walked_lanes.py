@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -32,13 +32,17 @@ _TURN = 1 << 18  # a place of the random numbers that no walk has
 
 @dataclass(frozen=True)
 class WalkSettings:
-    """How to record walks: one for each ray in each of the independent `samples`; `spread` is that of `walked`."""
+    """How to record walks: one for each ray in each of the independent `samples`; `spread` is that of `walked`.
+
+    With `held` no value of the material changes.
+    """
 
     samples: int
     seed: int
     spread: Sequence[float]
     light_paths: LightPaths | None
     depth: int
+    held: bool = False
 
 
 def walked_lanes(
@@ -51,8 +55,9 @@ def walked_lanes(
 ) -> TechniqueLanes:
     """One lane for each walk that has left again, of all samples.
 
-    `hits` are what lanes of one sample begin with: their `weight` is the share in a pixel, their last values of `held`
-    are left to the walks. `si` is the same surface with the frame that the medium is entered through.
+    `hits` are what lanes of one sample begin with: their `weight` is the share in a pixel, and their values of `held`
+    come before those of the walks. `si` is the same surface with the frame that the medium is entered through. Of a
+    material that is held there is what it shows, and no lanes.
     """
     count = dr.width(si.p)
     lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
@@ -74,11 +79,14 @@ def walked_lanes(
         light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
     weight = light * dr.gather(mi.Float, hits.weight, ray)
     position = dr.gather(mi.UInt32, hits.position, ray) + dr.gather(mi.UInt32, sample, index) * pixels
-    kept = [dr.gather(type(value), value, ray) for value in hits.held[: -len(WALK)]]
+    view = dr.gather(mi.Vector3f, hits.wi, ray)
+    kept = [dr.gather(type(value), value, ray) for value in hits.held]
     walk = [dr.gather(mi.Float, value, index) for value in walks.held]
-    nowhere = dr.zeros(mi.Vector3f, dr.width(index))
-    lanes = TechniqueLanes(dr.gather(mi.Vector3f, hits.wi, ray), nowhere, weight, position, (*kept, *walk))
-    dr.eval(lanes.wi, lanes.wo, lanes.weight, lanes.position, lanes.held)
+    lanes = TechniqueLanes(view, dr.zeros(mi.Vector3f, dr.width(index)), weight, position, (*kept, *walk))
+    if settings.held:
+        shown = below.gathered(ray).shown(view, dict(zip(WALK.names, walk, strict=True)))
+        lanes = replace(lanes, weight=None, others=weight * shown)
+    dr.eval(lanes.wi, lanes.wo, lanes.weight, lanes.position, lanes.held, lanes.others)
     return lanes
 
 

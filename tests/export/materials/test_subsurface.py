@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,3 +86,48 @@ def test_what_encloses_nothing_lets_no_light_out(scene: Any, export: Any, render
     target = bpy.context.object
     target.data.materials.append(new_material("Wax", Specular_IOR_Level=1.0, **VALUES))
     same_level(export, render_cycles, target)
+
+
+def mixed(material: Any, node: Any, factor: float = 0.5) -> None:
+    """The material's shader and another one, which takes `factor` of it."""
+    tree, output = material.node_tree, material.node_tree.get_output_node("CYCLES")
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    mix.inputs[0].default_value = factor
+    tree.links.new(principled(material).outputs[0], mix.inputs[1])
+    tree.links.new(node.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+
+
+def wax_under_gloss() -> Any:
+    material = new_material("Wax", Roughness=0.6, **VALUES)
+    gloss = material.node_tree.nodes.new("ShaderNodeBsdfAnisotropic")
+    gloss.inputs["Roughness"].default_value = 0.4
+    mixed(material, gloss, 0.3)
+    return material
+
+
+def paint_over_wax() -> Any:
+    material = new_material("Paint", Base_Color=(0.1, 0.3, 0.6), Roughness=0.4)
+    wax = material.node_tree.nodes.new("ShaderNodeSubsurfaceScattering")
+    wax.inputs["Color"].default_value, wax.inputs["Scale"].default_value = (0.8, 0.5, 0.3, 1.0), 0.8
+    mixed(material, wax, 0.7)
+    return material
+
+
+@pytest.mark.parametrize(
+    ("build", "parameters"),
+    [
+        (wax_under_gloss, ["Principled BSDF/IOR"]),
+        (wax_under_gloss, ["Principled BSDF/Base Color", "Glossy BSDF/Roughness"]),
+        (paint_over_wax, ["Principled BSDF/IOR"]),
+        (paint_over_wax, ["Principled BSDF/IOR", "Subsurface Scattering/Color"]),
+        (paint_over_wax, ["Principled BSDF/IOR", "Mix Shader/Factor"]),
+    ],
+    ids=["the fitted one", "the fitted one of several", "a held one", "a free one", "a held one with a free share"],
+)
+def test_one_shader_of_a_mix(
+    scene: Any, export: Any, render_cycles: Any, build: Callable[[], Any], parameters: list[str]
+) -> None:
+    """Whichever shader is fitted, and whether what light walks below may change."""
+    lit(scene)
+    same_level(partial(export, fit={"parameters": parameters}), render_cycles, ball(build()))
