@@ -101,15 +101,19 @@ def test_a_target_that_the_camera_does_not_see_may_be_missed(place: tuple[float,
             probe.ask("sockets", **asked, folder=str(probe.folder))
 
 
-def test_a_hidden_target_may_be_missed_and_nodes_that_are_too_many_are_said_by_their_own_words(temporary: Path) -> None:
+def test_a_hidden_target_may_be_missed(temporary: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=False)
     asked = add_noises(1)
     bpy.ops.mesh.primitive_plane_add(size=8.0, location=(2.5, -2.3, 1.8))  # between camera and cube
     bpy.context.object.rotation_euler = bpy.context.scene.camera.rotation_euler
     with Probe() as probe:
         assert probe.ask("sockets", **asked, folder=str(probe.folder), may_miss=True) == {"status": "ok", "seen": False}
-    bpy.data.objects.remove(bpy.context.object)
-    add_noises(300)  # Cycles shows nothing of it, and 150 it does
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="Blender 4.2 shows them")
+def test_nodes_that_are_too_many_are_said_by_their_own_words(temporary: Path) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=False)
+    asked = add_noises(300)  # Cycles shows nothing of it, and 150 it does
     with Probe() as probe, pytest.raises(ProbeError, match=r"^The nodes of 'Material' are too many for Cycles to"):
         probe.ask("sockets", **asked, folder=str(probe.folder), may_miss=True)
 

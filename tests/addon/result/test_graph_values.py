@@ -88,7 +88,7 @@ def test_a_colour_that_is_a_direction_is_no_value(graph: SimpleNamespace) -> Non
     tree.links.new(graph.noise.outputs[1], mix.inputs["Color1"])
     found = values_of(graph.material)
     own = {value.name for value in found.values() if value.label == "Mix (Legacy)" or value.place.path == (mix.name,)}
-    assert [name.rsplit("/", 1)[1] for name in own] == ["Factor"]
+    assert [name.rsplit("/", 1)[1] for name in own] == [mix.inputs[0].name]
     assert "Normal" in found["Noise Texture/Scale"].sockets  # it stays one, with all that it reaches
     tree.links.new(mix.outputs[0], graph.shader.inputs["Base Color"])
     (paint,) = (v for v in values_of(graph.material).values() if v.place.path == (mix.name,) and v.place.size == 3)

@@ -81,11 +81,14 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.place import write
     from blender_addon.graph_values.table import graph_values
+    from blender_addon.versions import has_diffuse_roughness
     from mfo_backend.render.models.graph_pictures import GraphPictures
     from mfo_backend.render.paths.recorded_scene import RecordedScene
     from mfo_backend.render.pictures.mitsuba_renderer import MitsubaRenderer
     from mfo_backend.render.pictures.renderer import load_renderer
 
+    if build is masked and not has_diffuse_roughness():
+        pytest.skip("a Diffuse BSDF of Blender 4.2 has no roughness to fit beside")
     lit_scene(scene)
     material = new_material("Target", **values)
     build(material.node_tree, principled(material))

@@ -103,6 +103,8 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str) -> None:
+    if name == "metallic" and not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
+        pytest.skip("Blender 4.2 has no Metallic BSDF")
     lit_scene(scene)
     found, truth = recorded_and_cycles(export, render_cycles, ball(material_of(CASES[name])))
     level, rms = found.mean() / truth.mean() - 1.0, np.sqrt(np.mean((found - truth) ** 2)) / truth.mean()

@@ -121,7 +121,7 @@ def paint_over_wax() -> Any:
         (wax_under_gloss, ["Principled BSDF/Base Color", "Glossy BSDF/Roughness"]),
         (paint_over_wax, ["Principled BSDF/IOR"]),
         (paint_over_wax, ["Principled BSDF/IOR", "Subsurface Scattering/Color"]),
-        (paint_over_wax, ["Principled BSDF/IOR", "Mix Shader/Factor"]),
+        (paint_over_wax, ["Principled BSDF/IOR", f"Mix Shader/{'Factor' if bpy.app.version >= (5, 0) else 'Fac'}"]),
     ],
     ids=["the fitted one", "the fitted one of several", "a held one", "a free one", "a held one with a free share"],
 )

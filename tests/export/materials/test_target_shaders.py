@@ -11,6 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from blender_addon.export.findings import ExportError  # noqa: E402
+from blender_addon.versions import has_diffuse_roughness  # noqa: E402
 
 from ..scenes import diffuse_material, new_material  # noqa: E402
 from .test_node_graphs import ball, lit_scene, noise_ramp, principled, recorded_and_cycles  # noqa: E402
@@ -71,6 +72,8 @@ def diffuse_in_groups() -> Any:
 
 @pytest.mark.parametrize("build", [rough_diffuse, painted_diffuse, glossy_in_groups, diffuse_in_groups])
 def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, build: Any) -> None:
+    if "diffuse" in build.__name__ and not has_diffuse_roughness():
+        pytest.skip("the rough Diffuse BSDF of Blender 4.2 is named, and shown as a smooth one")
     lit_scene(scene)
     found, truth = recorded_and_cycles(export, render_cycles, ball(build()))
     assert abs(found.mean() / truth.mean() - 1.0) < 0.003
@@ -85,7 +88,7 @@ def test_a_shader_without_a_value_to_fit_is_refused_by_its_names(scene: Any, exp
     tree.links.new(tree.nodes.new("ShaderNodeValue").outputs[0], node.inputs["Roughness"])
     with pytest.raises(ExportError) as caught:
         export(ball(material), fit={"parameters": "reduced"})  # which takes no value of the nodes
+    own = "Color (base_color) and Roughness (diffuse_roughness)" if has_diffuse_roughness() else "Color (base_color)"
     assert str(caught.value) == (
-        "A Diffuse BSDF has Color (base_color) and Roughness (diffuse_roughness) alone, and none of them is left to "
-        "fit: choose one that has no link."
+        f"A Diffuse BSDF has {own} alone, and none of them is left to fit: choose one that has no link."
     )
