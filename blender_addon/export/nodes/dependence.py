@@ -27,6 +27,10 @@ OF_PLACE = {
     "ShaderNodeObjectInfo": ("Location", "Random", "Object Index", "Color"),
     "ShaderNodeParticleInfo": ("Index", "Random", "Age", "Lifetime", "Location", "Size"),
 }
+# bend normals by slopes, which are others where an instance is stretched in another way; those of a bump, whose
+# distance is in metres, also where it is larger
+OF_SIZE = {"ShaderNodeBump": ("Normal",)}
+OF_STRETCH = {"ShaderNodeNormalMap": ("Normal",)}
 # a world's that turn with the camera
 OF_CAMERA_TURN = {
     "ShaderNodeCameraData": ("View Vector", "View Z Depth", "View Distance"),

@@ -32,16 +32,23 @@ from ..materials.baked_material import Baked
 from ..materials.read_material import read_context
 from ..meshes.mesh_arrays import CornerMesh, world_mesh
 from ..meshes.read_mesh import material_of_slot
+from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for
+from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
 from .scene_data import SceneData, Shape
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
+# of one object with bent normals, for instances of other proportions or sizes; what comes later has the first bake
+MOST_SCALES = 8
+SIZE_STEP = 0.02  # the smallest ratio of two sizes, above 1, that counts as another: slopes of bumps change as much
 LEAST_SIZE, MOST_SIZE = 256, 2048  # texels along each side
 TEXELS_A_PIXEL = 1.5  # along each side, where a surface is nearest to the camera
 USED = 0.6  # of a map's side by the faces in it, about
 POINTS = 2000  # of a surface that are looked at for its size in the picture
+
+Scale = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -97,8 +104,10 @@ class SceneBakes:
         self._world: tuple[int, bpy.types.World] | None = None
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
+        self._count = 0  # of ids
         self._number: int | BakeError | None = None  # of the request for them, or why there is none
-        self._ids: dict[tuple[str, int, int], str] = {}  # those ids, by object, its data and slot
+        # those ids, by what bent normals hang on of a place, by object, its data and slot
+        self._ids: dict[tuple[str, int, int], dict[Scale, str]] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -117,13 +126,23 @@ class SceneBakes:
             self._failed.append(_of_world(world, problem))
 
     def ask_surface(self, data: SceneData, shape: Shape, surface: Surface, findings: Findings) -> Shape:
-        """Have a surface baked; returns `shape` with a BSDF that `finish` describes. Instances share one."""
-        item = surface.instance.object
-        key = (item.name_full, item.data.as_pointer(), surface.slot)
-        if key not in self._ids:
-            material = surface.material
+        """Have a surface baked; returns `shape` with a BSDF that `finish` describes.
+
+        Instances share one, those whose size or proportions bend normals in another way apart.
+        """
+        item, material = surface.instance.object, surface.material
+        known = self._ids.setdefault((item.name_full, item.data.as_pointer(), surface.slot), {})
+        scale = _scale(surface)
+        if scale not in known and len(known) == MOST_SCALES:
+            findings.note(
+                f"Material '{material.name}' bends normals of '{item.name}' by the size of each instance; beyond "
+                f"{MOST_SCALES} sizes all have those of the first."
+            )
+            scale = next(iter(known))
+        if scale not in known:
             note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
-            identifier = f"baked_{len(self._ids) + 1:04d}"
+            self._count += 1
+            identifier = f"baked_{self._count:04d}"
             try:
                 if len(self._surfaces) >= MOST_SURFACES:
                     raise BakeError(f"It would be one of more than {MOST_SURFACES}.")
@@ -134,8 +153,8 @@ class SceneBakes:
                 self._surfaces[identifier] = _Asked(material, item.name, request)
             except BakeError as problem:
                 _give_up(data, identifier, material, item.name, problem, findings)
-            self._ids[key] = identifier
-        identifier = self._ids[key]
+            known[scale] = identifier
+        identifier = known[scale]
         if identifier in self._surfaces:
             shown = _Shown(shape.identifier, surface.mesh, surface.faces, surface.matrix)
             self._surfaces[identifier].shown.append(shown)
@@ -232,6 +251,22 @@ class SceneBakes:
 
 def _is_uniform(radiance: NDArray[np.float32]) -> bool:
     return bool(np.ptp(radiance.reshape(-1, 3), axis=0).max() <= ALIKE * float(radiance.mean()))
+
+
+def _scale(surface: Surface) -> Scale:
+    """What the bent normals of a surface hang on of its place: proportions, size, and whether it is mirrored."""
+    tree = node_tree_of(surface.material)
+    by_size = bool(asked_for(tree, OF_SIZE)) or bends_normals(surface.material)
+    if not by_size and not asked_for(tree, OF_STRETCH):
+        return ()
+    linear = surface.matrix[:3, :3]
+    volume = float(np.linalg.det(linear))
+    if volume == 0.0:
+        return ()
+    size = abs(volume) ** (1.0 / 3.0)
+    proportions = np.round((linear / size).T @ (linear / size) / SIZE_STEP)[np.triu_indices(3)] + 0.0
+    step = round(math.log(size) / math.log1p(SIZE_STEP)) if by_size else 0
+    return (*map(float, proportions), float(step), math.copysign(1.0, volume))
 
 
 def _texels(camera: Camera, mesh: TriangleMesh) -> int:

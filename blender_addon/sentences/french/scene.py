@@ -169,6 +169,7 @@ SCENE = {
     "Material '{}': {} is shown as black.": "Matériau '{}' : {} est montré noir.",
     "Material '{}': {} is taken for white.": "Matériau '{}' : {} est pris pour blanc.",
     "Material '{}': {} may differ between the {} instances of '{}'; all have the bake of the first.": "Matériau '{}' : {} peut différer entre les {} instances de '{}' ; toutes ont le précalcul de la première.",
+    "Material '{}' bends normals of '{}' by the size of each instance; beyond {} sizes all have those of the first.": "Le matériau '{}' courbe les normales de '{}' selon la taille de chaque instance ; au-delà de {} tailles, toutes ont celles de la première.",
     "Material '{}' asks for Backfacing: in the fit both sides are as its front is.": "Le matériau '{}' demande Face arrière (Backfacing) : dans l'ajustement, les deux faces sont comme sa face avant.",
     "Material '{}': {} sees its own object alone in the fit.": "Matériau '{}' : {} ne voit dans l'ajustement que son propre objet.",
     "Node '{}' of material '{}' is muted: press M over it in the Shader Editor.": "Le nœud '{}' du matériau '{}' est muet : appuyer sur M au-dessus de lui dans l'éditeur de shaders.",

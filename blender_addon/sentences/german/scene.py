@@ -170,6 +170,7 @@ SCENE = {
     "Material '{}': {} is shown as black.": "Material '{}': {} wird schwarz gezeigt.",
     "Material '{}': {} is taken for white.": "Material '{}': {} gilt als weiß.",
     "Material '{}': {} may differ between the {} instances of '{}'; all have the bake of the first.": "Material '{}': {} kann sich zwischen den {} Instanzen von '{}' unterscheiden; alle haben das Gebackene der ersten.",
+    "Material '{}' bends normals of '{}' by the size of each instance; beyond {} sizes all have those of the first.": "Material '{}' biegt die Normalen von '{}' je nach Größe jeder Instanz; ab {} Größen haben alle die der ersten.",
     "Material '{}' asks for Backfacing: in the fit both sides are as its front is.": "Material '{}' fragt nach Rückseite (Backfacing): In der Anpassung sind beide Seiten wie die Vorderseite.",
     "Material '{}': {} sees its own object alone in the fit.": "Material '{}': {} sieht in der Anpassung nur das eigene Objekt.",
     "Node '{}' of material '{}' is muted: press M over it in the Shader Editor.": "Node '{}' von Material '{}' ist stumm: im Shader-Editor M darüber drücken.",
