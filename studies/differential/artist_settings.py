@@ -224,7 +224,7 @@ def _bumped_box(rig: Rig, _: Draw) -> None:
     tree.links.new(bump.outputs["Normal"], principled(rig.box).inputs["Normal"])
 
 
-def _displaced(draw: Draw, item: Any, method: str) -> None:
+def displaced(draw: Draw, item: Any, method: str) -> None:
     """Waves on Displacement of an object's material, over enough faces to move."""
     tree = item.data.materials[0].node_tree
     waves, moved = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeDisplacement")
@@ -240,11 +240,11 @@ def _displaced(draw: Draw, item: Any, method: str) -> None:
 
 
 def _displaced_target(rig: Rig, draw: Draw) -> None:
-    _displaced(draw, rig.target, str(draw.choice(["BUMP", "DISPLACEMENT", "BOTH"])))
+    displaced(draw, rig.target, str(draw.choice(["BUMP", "DISPLACEMENT", "BOTH"])))
 
 
 def _displaced_box(rig: Rig, draw: Draw) -> None:
-    _displaced(draw, rig.box, "DISPLACEMENT")
+    displaced(draw, rig.box, "DISPLACEMENT")
 
 
 def _normal_map(rig: Rig, draw: Draw) -> None:

@@ -7,7 +7,7 @@ Each setting draws its values from numbers of its own, so that a scene is the sa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,10 @@ import bpy
 import numpy as np
 
 from .artist_settings import ARTIST_SETTINGS
+from .light_settings import LIGHT_SETTINGS
+from .material_settings import MATERIAL_SETTINGS
 from .rig import Draw, Rig, Setting, background, principled, put_socket
+from .shape_settings import SHAPE_SETTINGS
 
 
 def build(names: Iterable[str], seed: int, folder: Path, *, size: int, samples: int) -> Rig:
@@ -29,10 +32,14 @@ def build(names: Iterable[str], seed: int, folder: Path, *, size: int, samples: 
     return rig
 
 
-def drawn(seed: int, *, exported: bool = False) -> list[str]:
-    """The names of the settings of a seed's scene: about five, or only those that no sentence names."""
-    chance = np.random.default_rng([seed, 1 << 20]).random(len(SETTINGS))
-    some = [s.name for s, c in zip(SETTINGS, chance, strict=True) if c < 5.0 / len(SETTINGS)]
+def drawn(seed: int, *, exported: bool = False, groups: Sequence[str] = ()) -> list[str]:
+    """The names of the settings of a seed's scene, about five, of some `groups` or of all.
+
+    With `exported` those that a sentence names are left out of them.
+    """
+    settings = [setting for group in groups or GROUPS for setting in GROUPS[group]]
+    chance = np.random.default_rng([seed, 1 << 20]).random(len(settings))
+    some = [s.name for s, c in zip(settings, chance, strict=True) if c < 5.0 / len(settings)]
     return [name for name in some if not (exported and WORDS[name])]
 
 
@@ -311,7 +318,11 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("glowing box", lambda r, d: put_socket(r.box, "Emission Strength", 1.5)),
     Setting("bump correction", _uncorrected, ("Bump Map Correction",)),
 )  # fmt: skip
-SETTINGS += ARTIST_SETTINGS
+GROUPS = {
+    "plain": SETTINGS, "artist": ARTIST_SETTINGS,
+    "material": MATERIAL_SETTINGS, "light": LIGHT_SETTINGS, "shape": SHAPE_SETTINGS,
+}  # fmt: skip
+SETTINGS = tuple(setting for group in GROUPS.values() for setting in group)
 # of what the plain scene has at times, and of what two settings make together
 PLAIN_WORDS = ("smooth over few faces", "casts no shadows")
 WORDS = {setting.name: setting.words for setting in SETTINGS}

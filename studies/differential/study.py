@@ -2,6 +2,7 @@
 """Random scenes rendered by Cycles and, from their export, by our renderer; failures are minimised to their causes.
 
     python -m studies.differential [--scenes 100] [--seed 0] [--size 48] [--samples 64] [--exported]
+        [--groups material light shape]
 
 A scene fails if the pictures differ (`compare`), the export was not refused, and no note names a setting without which
 they agree. Prints each failure with the settings it takes, and how many scenes in a row had none. Needs `bpy`.
@@ -23,7 +24,7 @@ import numpy as np
 
 from ..parity.cycles_parity import render_job
 from .compare import Difference, Picture, compare
-from .random_scene import PLAIN_WORDS, WORDS, Rig, build, drawn
+from .random_scene import GROUPS, PLAIN_WORDS, WORDS, Rig, build, drawn
 
 AGAIN = 4  # times as many samples, with other seeds, before a difference is believed
 
@@ -83,13 +84,16 @@ def minimised(outcome: Outcome, seed: int, folder: Path, *, size: int, samples: 
     return outcome
 
 
-def study(scenes: int, seed: int, *, size: int, samples: int, exported: bool = False) -> list[Outcome]:
+def study(
+    scenes: int, seed: int, *, size: int, samples: int, exported: bool = False, groups: Sequence[str] = ()
+) -> list[Outcome]:
     """Try that many scenes and return the silent failures, minimised."""
     failures, refused, named = [], 0, 0
     for number in range(seed, seed + scenes):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            outcome = try_scene(drawn(number, exported=exported), number, folder, size=size, samples=samples)
+            names = drawn(number, exported=exported, groups=groups)
+            outcome = try_scene(names, number, folder, size=size, samples=samples)
             refused += bool(outcome.refusal)
             named += outcome.difference is not None and outcome.difference.is_failure and not outcome.is_silent
             if outcome.is_silent:
@@ -138,6 +142,8 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=48, help="pixels along each side")
     parser.add_argument("--samples", type=int, default=64, help="a pixel, of each of two halves")
     parser.add_argument("--exported", action="store_true", help="only settings that no sentence names")
+    parser.add_argument("--groups", nargs="*", default=(), choices=tuple(GROUPS), help="of settings; without it, all")
     chosen = parser.parse_args()
-    failures = study(chosen.scenes, chosen.seed, size=chosen.size, samples=chosen.samples, exported=chosen.exported)
+    counts = {"size": chosen.size, "samples": chosen.samples}
+    failures = study(chosen.scenes, chosen.seed, **counts, exported=chosen.exported, groups=chosen.groups)
     sys.exit(1 if failures else 0)
