@@ -22,7 +22,7 @@ SCENE = Owner(
 SCENE_CYCLES = Owner(
     exported="blur_glossy caustics_reflective caustics_refractive diffuse_bounces film_exposure filter_width "
     "glossy_bounces max_bounces pixel_filter_type sample_clamp_direct sample_clamp_indirect transmission_bounces "
-    "dicing_rate max_subdivisions feature_set transparent_max_bounces",
+    "dicing_rate max_subdivisions feature_set transparent_max_bounces use_light_tree",
     # samplers, denoisers, guiding and roulette change the noise and no mean; fast GI's numbers need fast GI
     no_effect="adaptive_min_samples adaptive_threshold ao_bounces ao_bounces_render auto_scrambling_distance bake_type "
     "camera_cull_margin debug_bvh_layout debug_bvh_time_steps debug_bvh_type debug_texture_cache_preserve_unused "
@@ -39,7 +39,7 @@ SCENE_CYCLES = Owner(
     "samples sampling_pattern scrambling_distance seed shading_system surface_guiding_probability texture_limit "
     "texture_resolution tile_size time_limit use_adaptive_sampling use_animated_seed "
     "use_auto_tile use_denoising use_deterministic_guiding use_guiding use_guiding_direct_light "
-    "use_guiding_mis_weights use_layer_samples use_light_tree use_preview_adaptive_sampling use_preview_denoising "
+    "use_guiding_mis_weights use_layer_samples use_preview_adaptive_sampling use_preview_denoising "
     "use_sample_subset use_surface_guiding use_volume_guiding volume_biased volume_bounces volume_guiding_probability "
     "volume_max_steps volume_preview_step_rate volume_step_rate debug_use_hair_bvh "
     "denoising_start_sample",

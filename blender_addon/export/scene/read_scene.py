@@ -183,7 +183,8 @@ def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings
     # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
     depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
     exposure = cycles.film_exposure
-    return RenderSettings(pixel_filter, depth, scene.render.film_transparent, exposure, DEFAULT_SPP, light_paths)
+    film = scene.render.film_transparent
+    return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, cycles.use_light_tree)
 
 
 class _Walk:

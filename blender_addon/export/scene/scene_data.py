@@ -58,7 +58,8 @@ class Shape:
 class RenderSettings:
     """What the picture needs beside the scene. `exposure` is Cycles' film exposure, already in every light.
 
-    `light_paths` is that object of request.json: what Cycles does to indirect light.
+    `light_paths` is that object of request.json: what Cycles does to indirect light. With a `light_tree` Cycles
+    chooses among lights by what they give without their nodes.
     """
 
     pixel_filter: PixelFilter
@@ -67,6 +68,7 @@ class RenderSettings:
     exposure: float
     spp: int
     light_paths: dict[str, float | int] = field(default_factory=dict)
+    light_tree: bool = False
 
 
 @dataclass

@@ -94,6 +94,34 @@ def test_clamping_is_said_where_it_is_low_for_the_lights(scene: Any, export: Any
     assert said.startswith("Clamping of indirect light (0.01) is low for the lights of this scene: ")
 
 
+def test_clamping_is_said_sooner_of_lamps_whose_nodes_the_light_tree_does_not_know(scene: Any, export: Any) -> None:
+    """A Light Falloff that changes nothing; the tree has no choice where there is one light."""
+    wall = corner(scene)
+    other = next(item for item in scene.objects if item.type == "LIGHT")
+    lamp = bpy.data.lights.new("Lamp", "POINT")
+    lamp.energy = 3000.0
+    scene.collection.objects.link(bpy.data.objects.new("Lamp", lamp))
+
+    def is_said(clamp: float) -> bool:
+        scene.cycles.sample_clamp_indirect = clamp
+        return any("is low for the lights" in note for note in export(wall).notes)
+
+    least = next(clamp for clamp in 2.0 ** np.arange(-8, 8) if not is_said(clamp))
+    lamp.use_nodes = True
+    tree = lamp.node_tree
+    emission = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    fall = tree.nodes.new("ShaderNodeLightFalloff")
+    fall.inputs["Strength"].default_value = 1.0
+    tree.links.new(fall.outputs["Quadratic"], emission.inputs["Strength"])
+    assert is_said(least)
+    assert not is_said(16.0 * least)
+    scene.cycles.use_light_tree = False
+    assert not is_said(least)
+    scene.cycles.use_light_tree = True
+    bpy.data.objects.remove(other)
+    assert not is_said(least)
+
+
 @pytest.mark.parametrize(
     ("glossy", "total", "is_said"), [(0, 4, True), (1, 4, True), (2, 4, False), (1, 1, False), (0, 0, False)]
 )
