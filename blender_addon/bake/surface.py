@@ -100,6 +100,7 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
             local = baked.local_normal(normal)
             if np.abs(local[..., :2]).max() > FLAT:
                 found["normal"] = baked.file(local)
+                found["displaced"] = normal is None
     return leaves
 
 

@@ -109,6 +109,8 @@ def _material(material: Material, files: SceneFiles, *, seen: bool) -> dict[str,
     shader = {"null": "transparent", "emission": "emission"}.get(material.model, material.shader)
     if shader != "principled":
         described["shader"] = shader
+    if material.displaced:
+        described["displaced"] = True
     if material.is_mixed:
         described["weight"] = _socket(material.weight, files, seen)
     extra: dict[str, Any] = {"free": dict(material.free), "factors": list(material.factors)}

@@ -137,6 +137,7 @@ class Baked:
             distribution if distribution in ("GGX", "MULTI_GGX") else "MULTI_GGX",
             leaf.get("subsurface_method") or "RANDOM_WALK",
             normal=normal,
+            displaced=normal is not None and bool(leaf["displaced"]),
         )
 
     def _emission(self) -> dict[str, Socket]:

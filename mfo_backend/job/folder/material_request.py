@@ -14,7 +14,7 @@ from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_js
 
 MOST_LEAVES = 64  # of a mix
 OTHER_LEAVES = ("transparent", "emission")
-_MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", *MIX_KEYS)
+_MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", "displaced")
 _FILES = ("texture", "graph", "elsewhere")  # of a socket
 
 
@@ -40,7 +40,8 @@ class Material:
 
     Colours are linear Rec.709. A mix has the `weight` of its fitted material and the other `leaves` with theirs, among
     them what is "transparent" (Base Color passes straight through) and "emission" (Emission Color and Strength). Values
-    inside nodes change sockets or weight of one that `varies`.
+    inside nodes change sockets or weight of one that `varies`. The `normalmap` over one that is `displaced` has normals
+    that take the place of the mesh's smooth ones.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Material:
     factors: tuple[MixFactor, ...] = ()
     ways: tuple[MixWay, ...] = ()
     varies: bool = False
+    displaced: bool = False
 
     @property
     def graph_names(self) -> list[str]:
@@ -90,7 +92,7 @@ def material_from_json(where: str, data: Any) -> Material:
 
 
 def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
-    material = CheckedObject(data, where, _MATERIAL_KEYS)
+    material = CheckedObject(data, where, (*_MATERIAL_KEYS, *MIX_KEYS))
     leaves = material.raw("leaves", [])
     if not isinstance(leaves, (list, tuple)) or len(leaves) > MOST_LEAVES:
         raise material.wrong("leaves", f"a list of at most {MOST_LEAVES} materials")
@@ -109,6 +111,7 @@ def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
         factors=() if is_leaf else factors_from_json(material),
         ways=ways_from_json(material),
         varies=material.boolean("varies", False),
+        displaced=material.boolean("displaced", False),
         leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", (*SHADERS, *OTHER_LEAVES)) for k, leaf in enumerate(leaves)),
     )
 
@@ -131,7 +134,7 @@ def without_nothing(material: dict[str, Any]) -> None:
                 del socket[key]
         if not socket["turned"]:
             del socket["turned"]
-    for key in MIX_KEYS:
+    for key in ("displaced", *MIX_KEYS):
         if not material[key]:
             del material[key]
     for leaf in material["leaves"]:

@@ -70,12 +70,15 @@ def prepare_several_blender_principled(
             table = opened[bsdf_id][1] if bsdf_id in opened else None
             start = {} if table is None else table.unpack(opened[bsdf_id][2])
             _put_material(scene, bsdf, materials[bsdf_id], start, textures, unreachable_refraction=not uniform)
-    _put_normal_maps(scene)
+    _put_normal_maps(scene, materials)
     return [_prepared(scene, *found, materials[bsdf_id]) for bsdf_id, found in opened.items()]
 
 
-def _put_normal_maps(scene: Element) -> None:
-    """Give Blender's shaders below a `normalmap` its normals, which they treat as Cycles does."""
+def _put_normal_maps(scene: Element, materials: Materials) -> None:
+    """Give Blender's shaders below a `normalmap` its normals, which they treat as Cycles does.
+
+    Those of a displacement by bump are the surface's: no bump lies on it, and shadow rays start by them.
+    """
     by_id = {bsdf.get("id"): bsdf for bsdf in scene.findall("bsdf")}
     for bsdf in by_id.values():
         nested, normals = bsdf.find("ref"), bsdf.find("texture")
@@ -88,7 +91,8 @@ def _put_normal_maps(scene: Element) -> None:
         for child in list(bsdf):
             bsdf.remove(child)
         bsdf.extend(copy.deepcopy(child) for child in below)
-        direction = ElementTree.SubElement(bsdf, "texture", type="mapped_normal", name="normal")
+        name = "shading_normal" if materials.get(below.get("id", ""), {}).get("displaced") else "normal"
+        direction = ElementTree.SubElement(bsdf, "texture", type="mapped_normal", name=name)
         normals.attrib["name"] = "map"
         direction.append(normals)
 
