@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a random scene's shapes and camera: instances by nodes, hair, deformation, odd pixels and lenses."""
+"""Settings of a random scene's shapes and camera: instances by nodes, hair, deformation, lenses."""
 
 from __future__ import annotations
 
@@ -94,11 +94,6 @@ def _linked_copy(rig: Rig, draw: Draw) -> None:
     rig.scene.collection.objects.link(other)
 
 
-def _pixels(rig: Rig, draw: Draw) -> None:
-    rig.scene.render.pixel_aspect_x = float(draw.choice([1.0, 1.5]))
-    rig.scene.render.pixel_aspect_y = float(draw.choice([1.0, 1.3, 2.0]))
-
-
 def _filter(rig: Rig, draw: Draw) -> None:
     rig.scene.cycles.pixel_filter_type = str(draw.choice(["GAUSSIAN", "BLACKMAN_HARRIS"]))
     rig.scene.cycles.filter_width = float(draw.uniform(0.5, 3.0))
@@ -142,7 +137,7 @@ def _round_terminator(rig: Rig, draw: Draw) -> None:
 def _all() -> Iterator[Setting]:
     exported = {
         "scattered by nodes": _scattered, "armature": _armature, "twisted": _twisted, "sharp edges": _sharp_edges,
-        "linked copy": _linked_copy, "pixels": _pixels, "filter width": _filter, "shift and scale": _shift,
+        "linked copy": _linked_copy, "filter width": _filter, "shift and scale": _shift,
         "far clip": _far_clip, "scaled camera": _odd_camera, "percentage": _percentage,
         "blurred gloss": _blurred_gloss, "box terminator": _round_terminator,
     }  # fmt: skip
