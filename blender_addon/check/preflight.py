@@ -117,26 +117,17 @@ def redraw() -> None:
 
 def look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
     """What can change without the depsgraph saying so, cheap enough for every draw."""
-    settings, render, view = scene.mfo, scene.render, scene.view_settings
-    target = view_layer.objects.active
+    settings, target = scene.mfo, view_layer.objects.active
     return (
-        scene.name,
+        (scene.name, look_at_scene(scene)),
         target and (target.name, target.active_material_index, getattr(target.active_material, "name", "")),
-        scene.camera and scene.camera.name,
-        (render.resolution_x, render.resolution_y, render.resolution_percentage, render.engine),
-        (render.use_border, render.use_crop_to_border, render.border_min_x, render.border_max_x),
-        (render.border_min_y, render.border_max_y, render.pixel_aspect_x, render.pixel_aspect_y),
-        (render.image_settings.color_management, render.image_settings.file_format),
-        (render.use_multiview, view.view_transform, view.look, view.use_curve_mapping),
+        [
+            (one.use, one.slot, getattr(one.object, "name", ""), getattr(one.material, "name", ""))
+            for one in settings.targets
+        ],
         (settings.reference_source, settings.reference_path, getattr(settings.reference_image, "name", "")),
-        (
-            scene.display_settings.display_device,
-            settings.reference_view,
-            settings.animated,
-            settings.parameter_set,
-            settings.model,
-            frozenset(settings.sockets),
-        ),
+        (settings.reference_view, settings.animated, settings.parameter_set, settings.model),
+        frozenset(settings.sockets),
         [(bound.name, bound.lower, bound.upper) for bound in settings.bounds],
         [
             (one.use, one.path, one.frame, getattr(one.camera, "name", ""), getattr(one.scene, "name", ""))
@@ -146,4 +137,18 @@ def look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:
             (one.part.crop, getattr(one.part.mask, "name", ""), one.part.use_alpha)
             for one in (settings.first_picture, *settings.pictures)
         ],
+    )
+
+
+def look_at_scene(scene: bpy.types.Scene) -> Any:
+    """The same of what an export reads, without what is chosen for the next fit."""
+    render, view = scene.render, scene.view_settings
+    return (
+        scene.camera and scene.camera.name,
+        (render.resolution_x, render.resolution_y, render.resolution_percentage, render.engine),
+        (render.use_border, render.use_crop_to_border, render.border_min_x, render.border_max_x),
+        (render.border_min_y, render.border_max_y, render.pixel_aspect_x, render.pixel_aspect_y),
+        (render.image_settings.color_management, render.image_settings.file_format),
+        (render.use_multiview, view.view_transform, view.look, view.use_curve_mapping),
+        scene.display_settings.display_device,
     )

@@ -60,6 +60,21 @@ def drained(steps: Steps[Found]) -> Found:
             time.sleep(_LOOK_SECONDS)
 
 
+def part_of(steps: Steps[Found], number: int, count: int, text: str) -> Steps[Found]:
+    """Steps of one of `count` things, `number` of which are done; the scene must stay until the last has read it."""
+    try:
+        while True:
+            try:
+                pause = next(steps)
+            except StopIteration as end:
+                return end.value
+            share = (number + (pause.share or 0.0)) / count
+            is_held = pause.holds_scene or number + 1 < count
+            yield replace(pause, holds_scene=is_held, text=text, share=share)
+    finally:
+        steps.close()
+
+
 def held(
     steps: Steps[Found], show: Callable[[], AbstractContextManager[object]], text: str, share: float
 ) -> Steps[Found]:

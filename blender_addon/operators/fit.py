@@ -4,17 +4,21 @@
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
+
 import bpy
-from bpy.props import IntProperty, StringProperty
+from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
 from ..export.fitted_slot import FittedSlot
-from ..export.steps import drained
+from ..export.steps import Pause, Steps, drained, part_of
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..result import shown_result
 from ..running import fit_queue, running_export, running_job
+from ..running.fit_queue import EndedFit, PreparedFit
 from ..sentences.translated import translated
 from .check import thorough_check
 from .fit_options import (
@@ -28,6 +32,7 @@ from .fit_options import (
 )
 from .materials import ticked_slots
 
+EXPORTING = "Object {} of {}"
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
@@ -124,6 +129,9 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
         if running_job.current is not None and bpy.app.background:
             cls.poll_message_set(translated("A fit is running; cancel it first"))
             return False
+        if running_export.current is not None:
+            cls.poll_message_set(translated("The scene is being exported for a fit"))
+            return False
         if not bpy.app.background and (reason := why_no_fit()):
             cls.poll_message_set(translated(reason))
             return False
@@ -136,23 +144,27 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Export one job for each material; the first starts, the others wait, or in background mode all are done."""
-        refused = []
+        asked: list[tuple[str, Steps[PreparedFit]]] = []
+        refused: list[EndedFit] = []
         for obj in selected_targets(context):
             try:
-                fit = self.prepare(context, obj, "")
-                if self.blocks():
-                    self.start(fit)
-                    running_job.wait(lambda line: print(f"Material Fit: {line}", flush=True))
-                elif running_job.current is None:
-                    self.start(fit)
-                else:
-                    fit_queue.add(fit)
+                asked.append((obj.active_material.name, self.steps(context, obj, "")))
             except FitError as error:
-                refused.append(f"{obj.name}: {error}")
-        for sentence in refused:
-            self.report({"WARNING"}, translated(sentence))
+                refused.append(EndedFit(obj.active_material.name, str(error), "ERROR"))
+        steps = _one_after_other(asked, self._start_and_wait if self.blocks() else start_or_queue, refused)
+        if asked and not bpy.app.background and not self.blocks():  # the first loads while it is exported
+            waiting_backend.prepare(python_of(context), idle_seconds(context), own_blender(SERVER, []))
+            running_export.start(context, steps, partial(_say_refused, refused))
+            return {"FINISHED"}
+        drained(steps)
+        for each in refused:
+            self.report({"WARNING"}, translated(f"{each.material_name}: {each.sentence}"))
         running_job.redraw()
         return {"FINISHED"} if running_job.current or shown_result.result else {"CANCELLED"}
+
+    def _start_and_wait(self, fit: PreparedFit) -> None:
+        self.start(fit)
+        running_job.wait(lambda line: print(f"Material Fit: {line}", flush=True))
 
 
 class MFO_OT_drop_queued(bpy.types.Operator):
@@ -181,6 +193,10 @@ class MFO_OT_cancel(bpy.types.Operator):
     bl_label = "Cancel Fit"
     bl_options = {"REGISTER"}
 
+    fit_alone: BoolProperty(
+        name="Fit Alone", description="Let an export for another fit go on; without it that is what ends", options=_SCRIPT
+    )
+
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Only while a fit runs or is exported, and was not cancelled yet."""
@@ -196,7 +212,7 @@ class MFO_OT_cancel(bpy.types.Operator):
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Ask the backend to stop; the timer sees it end. An export ends at once."""
-        if running_export.current is not None:
+        if running_export.current is not None and not self.fit_alone:
             running_export.close()
         else:
             running_job.cancel()
@@ -224,6 +240,32 @@ class MFO_OT_choose_shader(bpy.types.Operator):
             self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+def _one_after_other(
+    asked: Sequence[tuple[str, Steps[PreparedFit]]], start: Callable[[PreparedFit], None], refused: list[EndedFit]
+) -> Steps[int]:
+    """Export for each material of these names and `start` its fit; returns how many, the others are in `refused`."""
+    count = 0
+    for number, (name, steps) in enumerate(asked):
+        text = EXPORTING.format(number + 1, len(asked))
+        try:
+            if number:
+                yield Pause(holds_scene=True, text=text, share=number / len(asked))
+            start((yield from part_of(steps, number, len(asked), text)))
+            count += 1
+        except FitError as error:
+            refused.append(EndedFit(name, str(error), "ERROR"))
+    return count
+
+
+def _say_refused(refused: Sequence[EndedFit], started: int) -> None:
+    """Where any has started, among those of the queue that have ended."""
+    if not started:
+        running_job.fail([f"{each.material_name}: {each.sentence}" for each in refused])
+        return
+    for each in refused:
+        fit_queue.refused(each)
 
 
 def _error_summary() -> str:

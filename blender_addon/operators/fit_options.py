@@ -22,7 +22,7 @@ from ..export.reference.counted_part import CountedPart
 from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference import Picture
 from ..export.reference.reference_view import REFERENCE_VIEWS
-from ..export.steps import Steps, drained
+from ..export.steps import Steps
 from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
 from ..properties import chosen_of, crossed_limits, node_value_key
@@ -76,16 +76,14 @@ class FitOptions:
         """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
         start_fit(fit, timer=not self.blocks() and not bpy.app.background)
 
-    def prepare(self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str) -> PreparedFit:
-        """Export the job folder of the object's active material; raises `FitError` where it cannot be."""
-        return drained(self.steps(context, obj, job_folder))
-
     def steps(
         self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str, targets: Sequence[FittedSlot] = ()
     ) -> Steps[PreparedFit]:
-        """`prepare` in steps, which pause while a second Blender works; the operator is not needed any more then.
+        """Export the job folder of the object's active material, in steps that pause while a second Blender works.
 
-        With `targets` the materials of those slots are fitted together instead of the object's active one.
+        What operator and settings say is read at once, so the operator need not outlive the call. With `targets` the
+        materials of those slots are fitted together instead. The call and the steps raise `FitError` where the job
+        cannot be exported.
         """
         settings = context.scene.mfo
         materials = [each.material for each in targets if each.material is not None] or [_active_material(obj)]
@@ -101,21 +99,24 @@ class FitOptions:
         made = self.reference_view or settings.reference_view
         if made not in REFERENCE_VIEWS:
             raise FitError(f"reference_view is {made!r}: give 'scene' or 'standard'.")
-        python = python_of(context)
-        given = bpy.path.abspath(job_folder)
-        folder = Path(given) if given else new_job_folder(context, material.name)
-        is_new = not folder.exists()
+        python, given = python_of(context), bpy.path.abspath(job_folder)
         name = f"{len(materials)} materials" if targets else material.name
         uids, chosen = tuple(each.session_uid for each in materials), self._fit(settings, obj, targets)
         if targets and settings.queue:
             chosen["queue"] = True
-        try:
-            report = yield from export_steps(
-                context, obj, folder, reference, chosen, made, upright=False, targets=targets
-            )
-        except ExportError as error:
-            raise FitError(str(error)) from error
-        return PreparedFit(python, folder, name, uids, report.notes, is_new)
+
+        def exported() -> Steps[PreparedFit]:
+            folder = Path(given) if given else new_job_folder(context, material.name)
+            is_new = not folder.exists()
+            try:
+                report = yield from export_steps(
+                    context, obj, folder, reference, chosen, made, upright=False, targets=targets
+                )
+            except ExportError as error:
+                raise FitError(str(error)) from error
+            return PreparedFit(python, folder, name, uids, report.notes, is_new)
+
+        return exported()
 
     def _fit(
         self, settings: bpy.types.PropertyGroup, obj: bpy.types.Object, targets: Sequence[FittedSlot]

@@ -32,7 +32,7 @@ class Run:
         live.watch(context)
         if running_job.current is not None:
             _draw_progress(layout, context)
-        elif running_export.current is not None:
+        if running_export.current is not None:
             _draw_export(layout, context)
         _draw_buttons(layout, context)
         column = layout.column()
@@ -56,6 +56,10 @@ def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     runtime = context.window_manager.mfo_runtime
     if runtime.state == "IDLE" and runtime.sentence:  # of a file that was left, or of results that came back
         draw_sentence(layout.box(), context, runtime.sentence, "INFO")
+    if running_job.current is not None and runtime.sentence:  # why another one could not begin
+        box = layout.box()
+        box.alert = True
+        draw_sentence(box, context, runtime.sentence, "ERROR")
     if runtime.state not in {"DONE", "FAILED"} or running_job.is_answered(context):
         return
     failed = runtime.state == "FAILED"
@@ -92,14 +96,16 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     _draw_bar(layout, context, share, f"{said} · {seconds:.0f} s")
 
 
-def _draw_bar(layout: bpy.types.UILayout, context: bpy.types.Context, share: float, text: str) -> None:
+def _draw_bar(
+    layout: bpy.types.UILayout, context: bpy.types.Context, share: float, text: str, *, fit_alone: bool = False
+) -> None:
     """How far it is, and the way out; what is done stands below where it would cost the time left its room."""
     done, joint, rest = text.partition(_JOINT)
     fitting = not joint or fits(context, room(context) - UNIT - BUTTON, text)
     row = layout.row(align=True)
     row.scale_y = 1.4
     row.progress(factor=share, type="BAR", text=text if fitting else rest)
-    row.operator("mfo.cancel", text="", icon="X")
+    row.operator("mfo.cancel", text="", icon="X").fit_alone = fit_alone
     if not fitting:
         layout.label(text=done, translate=False)
 
@@ -107,7 +113,7 @@ def _draw_bar(layout: bpy.types.UILayout, context: bpy.types.Context, share: flo
 def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     runtime = context.window_manager.mfo_runtime
     column = layout.column()
-    _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text))
+    _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text), fit_alone=True)
     own = context.object.active_material if context.object else None
     is_one = runtime.material in bpy.data.materials  # several that are fitted together have no name of one
     if is_one and (own is None or runtime.material != own.name):

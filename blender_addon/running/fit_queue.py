@@ -77,6 +77,12 @@ def ended(material_name: str, sentence: str, icon: str) -> None:
         del finished[:-LINES]
 
 
+def refused(fit: EndedFit) -> None:
+    """Remember a fit that never began, beside those that did."""
+    finished.append(fit)
+    del finished[:-LINES]
+
+
 def clear() -> None:
     """Forget all fits, those that wait and those that ended."""
     global _running

@@ -10,13 +10,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
+import numpy as np
 
-from ..check.preflight import look, redraw
-from ..export.steps import STEP_SECONDS, Pause, Steps, advance
+from ..check.preflight import look_at_scene, redraw
+from ..export.steps import STEP_SECONDS, Found, Pause, Steps, advance
 from . import running_job
-from .fit_queue import PreparedFit
 
 TICK = 0.1  # seconds between two looks at what is waited for
 AT_ONCE = 1.0  # seconds that a press may take: the export of a plain scene is done then, and its fit has begun
@@ -30,10 +31,10 @@ _CHANGED = "The scene was changed while it was read for the fit: press Fit again
 class RunningExport:
     """The steps, the scene and view layer they need as context, and who gets what they return."""
 
-    steps: Steps[PreparedFit]
-    scene: str
+    steps: Steps[Any]
+    scene_uid: int
     view_layer: str
-    then: Callable[[PreparedFit], None]
+    then: Callable[[Any], None]
     began: float
     pause: Pause
     seen: object  # settings that no update of the depsgraph tells of
@@ -44,16 +45,17 @@ current: RunningExport | None = None
 _is_stepping = False  # what changes then is the export's own doing
 
 
-def start(context: bpy.types.Context, steps: Steps[PreparedFit], then: Callable[[PreparedFit], None]) -> None:
+def start(context: bpy.types.Context, steps: Steps[Found], then: Callable[[Found], None]) -> None:
     """Take the first steps; where they do not end there, a timer takes the others. Errors of the first are raised."""
     global current
-    seen = look(context.scene, context.view_layer)
+    seen = _look(context.scene)
     try:
         pause = _advance(steps, context.view_layer, AT_ONCE)
     except StopIteration as end:
         then(end.value)
         return
-    current = RunningExport(steps, context.scene.name, context.view_layer.name, then, time.monotonic(), pause, seen)
+    uid, layer = context.scene.session_uid, context.view_layer.name
+    current = RunningExport(steps, uid, layer, then, time.monotonic(), pause, seen)
     bpy.app.timers.register(_tick, first_interval=_interval(pause))
     running_job.forget_refusal()
     redraw()
@@ -110,9 +112,9 @@ def _tick() -> float | None:
     if job is None:
         return None
     try:
-        scene = bpy.data.scenes[job.scene]
+        scene = {each.session_uid: each for each in bpy.data.scenes}[job.scene_uid]  # it may have another name
         view_layer = scene.view_layers[job.view_layer]
-        if job.pause.holds_scene and (job.is_changed or look(scene, view_layer) != job.seen):
+        if job.pause.holds_scene and (job.is_changed or _look(scene) != job.seen):
             close(_CHANGED)
             return None
         if job.pause.is_over():
@@ -137,7 +139,7 @@ def _tick() -> float | None:
     return _interval(job.pause)
 
 
-def _advance(steps: Steps[PreparedFit], view_layer: bpy.types.ViewLayer, seconds: float) -> Pause:
+def _advance(steps: Steps[object], view_layer: bpy.types.ViewLayer, seconds: float) -> Pause:
     """Steps with what they put back: else Blender's next update would tell of it as of a change by the user."""
     pause = advance(steps, seconds)
     if pause.holds_scene:
@@ -145,12 +147,19 @@ def _advance(steps: Steps[PreparedFit], view_layer: bpy.types.ViewLayer, seconds
     return pause
 
 
+def _look(scene: bpy.types.Scene) -> object:
+    """What an export reads of the scene and its objects, and no update of the depsgraph tells of."""
+    slots = np.empty(len(scene.objects), dtype=np.int32)
+    scene.objects.foreach_get("active_material_index", slots)
+    return look_at_scene(scene), slots.tobytes()
+
+
 def _interval(pause: Pause) -> float:
     return DRAWN if pause.is_over() else TICK
 
 
-def _hand_over(job: RunningExport, fit: PreparedFit) -> None:
+def _hand_over(job: RunningExport, found: object) -> None:
     try:
-        job.then(fit)
+        job.then(found)
     except Exception as error:
         running_job.fail([str(error)])

@@ -183,7 +183,9 @@ def fail(sentences: Sequence[str]) -> None:
 def forget_refusal() -> None:
     """Say nothing any more of what kept an earlier fit from starting, or of a file that was left."""
     runtime = _runtime()
-    if not runtime.has_result and current is None:
+    if current is not None:
+        runtime.sentence = ""
+    elif not runtime.has_result:
         shown_result.clear(runtime)
 
 

@@ -216,3 +216,112 @@ def test_an_export_that_is_ended_leaves_nothing(scene: SimpleNamespace, tmp_path
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".") or "job" in path.name] == []
     with pytest.raises(ProcessLookupError):
         os.kill(pids[0], 0)
+
+
+@pytest.fixture
+def three(scene: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Three selected objects with materials of their own; the second has a socket that nothing can evaluate."""
+    from blender_addon.operators import fit, fit_options
+    from blender_addon.running import fit_queue, running_job
+
+    bpy = scene.bpy
+    for number in (1, 2):
+        bpy.ops.mesh.primitive_cube_add(location=(0.0, 3.0 * number, 0.0))
+        bpy.context.object.name = f"Cup {number}"
+        bpy.context.object.data.materials.append(bpy.data.materials["Glaze"].copy())
+        bpy.context.object.active_material.name = f"Clay {number}"
+    bpy.data.objects["Väse"].select_set(True)
+    bpy.data.objects["Cup 1"].select_set(True)
+    bpy.context.scene.mfo.reference_path = scene.reference
+    folders = iter(tmp_path / f"job_{i}" for i in range(9))
+    monkeypatch.setattr(fit_options, "new_job_folder", lambda *_: next(folders))
+    monkeypatch.setattr(fit, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), types=bpy.types))
+    monkeypatch.setattr(fit, "why_no_fit", lambda: "")
+    monkeypatch.setattr(fit.waiting_backend, "prepare", lambda *_: None)
+    started: list[str] = []
+    monkeypatch.setattr(fit, "start_or_queue", lambda prepared: started.append(prepared.material_name))
+    yield SimpleNamespace(bpy=bpy, started=started, folder=tmp_path, runtime=lambda: runtime(scene))
+    fit_queue.clear()
+    running_job.close()
+
+
+def test_selected_objects_are_exported_in_steps(three: SimpleNamespace, taken: list[object]) -> None:
+    """Each fit begins when its object has been read; a click on another object meanwhile ends nothing."""
+    from blender_addon.running import running_export
+
+    bpy = three.bpy
+    chosen = [obj.active_material.name for obj in bpy.context.selected_objects]
+    assert bpy.ops.mfo.fit_selected(wait=False) == {"FINISHED"}
+    assert three.started == []
+    assert running_export.progress() == (0.0, "Object 1 of 3")
+    assert not bpy.ops.mfo.fit_selected.poll()
+    seen = []
+    while running_export.current is not None:
+        seen.append((len(three.started), *running_export.progress()))
+        bpy.context.view_layer.objects.active = bpy.data.objects["Light"]
+        running_export._tick()
+    assert three.started == chosen
+    assert sorted({text for _, _, text in seen}) == [f"Object {n} of 3" for n in (1, 2, 3)]
+    shares = [share for _, share, _ in seen]
+    assert shares == sorted(shares)
+    assert {count for count, _, _ in seen} == {0, 1, 2}  # windows are drawn between them
+
+
+def test_cancel_keeps_the_fits_that_have_begun(three: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.running import running_export
+
+    three.bpy.ops.mfo.fit_selected(wait=False)
+    while len(three.started) < 1:
+        running_export._tick()
+    assert three.bpy.ops.mfo.cancel() == {"FINISHED"}
+    assert running_export.current is None
+    assert len(three.started) == 1
+    assert sorted(path.name for path in three.folder.iterdir() if "job" in path.name) == ["job_0"]
+
+
+def test_one_that_cannot_be_exported_stops_no_other(three: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.running import fit_queue, running_export
+
+    three.bpy.data.objects["Cup 1"].hide_render = True
+    three.bpy.ops.mfo.fit_selected(wait=False)
+    while running_export.current is not None:
+        running_export._tick()
+    assert len(three.started) == 2
+    assert [(each.material_name, each.icon) for each in fit_queue.finished] == [("Clay 1", "ERROR")]
+    assert "hidden in the render" in fit_queue.finished[0].sentence
+
+
+def test_where_none_can_be_exported_it_is_said(three: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.running import fit_queue, running_export
+
+    three.bpy.context.scene.camera = None
+    three.bpy.ops.mfo.fit_selected(wait=False)
+    while running_export.current is not None:
+        running_export._tick()
+    assert (three.started, fit_queue.finished) == ([], [])
+    assert three.runtime().state == "FAILED"
+    assert "camera" in three.runtime().sentence
+    assert len(three.runtime().messages) == 2
+
+
+def test_a_renamed_scene_goes_on(scene: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.running import running_export
+
+    log: list[str] = []
+    running_export.start(scene.bpy.context, steps(log, holds_scene=True), taken.append)
+    scene.bpy.context.scene.name = "Room"
+    log.append("go")
+    running_export._tick()
+    log.append("go")
+    running_export._tick()
+    assert taken == ["fit"]
+
+
+def test_the_cross_beside_a_fit_leaves_an_export(scene: SimpleNamespace, taken: list[object]) -> None:
+    from blender_addon.running import running_export
+
+    running_export.start(scene.bpy.context, steps([]), taken.append)
+    assert scene.bpy.ops.mfo.cancel(fit_alone=True) == {"FINISHED"}
+    assert running_export.current is not None
+    assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
+    assert running_export.current is None

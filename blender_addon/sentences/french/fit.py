@@ -256,6 +256,7 @@ FIT = {
     "The export was ended by an undo or another file: press Fit again.": "L'export a été arrêté par une annulation ou un autre fichier : appuyer de nouveau sur Ajuster.",
     "The scene was changed while it was read for the fit: press Fit again, and leave it as it is meanwhile.": "La scène a été modifiée pendant sa lecture pour l'ajustement : appuyer de nouveau sur Ajuster et la laisser telle quelle pendant ce temps.",
     "Cycles looks at picture {}": "Cycles regarde l'image {}",
+    "Object {} of {}": "Objet {} sur {}",
     "Picture {} of {}": "Image {} sur {}",
     "The fit of {} was ended as another file was opened.": "L'ajustement de {} a été arrêté à l'ouverture d'un autre fichier.",
     "It had found no values yet.": "Il n'avait pas encore trouvé de valeurs.",

@@ -256,6 +256,7 @@ FIT = {
     "The export was ended by an undo or another file: press Fit again.": "Rückgängig oder eine andere Datei hat den Export beendet: noch einmal Anpassen drücken.",
     "The scene was changed while it was read for the fit: press Fit again, and leave it as it is meanwhile.": "Die Szene wurde geändert, während sie für die Anpassung gelesen wurde: noch einmal Anpassen drücken und sie solange lassen, wie sie ist.",
     "Cycles looks at picture {}": "Cycles sieht Bild {} an",
+    "Object {} of {}": "Objekt {} von {}",
     "Picture {} of {}": "Bild {} von {}",
     "The fit of {} was ended as another file was opened.": "Die Anpassung von {} wurde beendet, als eine andere Datei geöffnet wurde.",
     "It had found no values yet.": "Sie hatte noch keine Werte gefunden.",

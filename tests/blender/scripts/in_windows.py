@@ -23,11 +23,11 @@ from steps import material, over, plain_picture, roughness, runtime, until
 
 addon_id, folder = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(folder)
-running_job, preflight, fit_queue, handlers, cycles_check, shown_result, waiting_backend = (
+running_job, running_export, preflight, fit_queue, handlers, cycles_check, shown_result, waiting_backend = (
     importlib.import_module(f"{addon_id}.blender_addon.{name}")
     for name in (
-        *("running.running_job", "check.preflight", "running.fit_queue", "running.handlers"),
-        *("running.cycles_check", "result.shown_result", "process.waiting_backend"),
+        *("running.running_job", "running.running_export", "check.preflight", "running.fit_queue"),
+        *("running.handlers", "running.cycles_check", "result.shown_result", "process.waiting_backend"),
     )
 )
 LONGEST_STALL = 0.05  # seconds
@@ -207,7 +207,7 @@ def queue():
     os.environ["MFO_FAKE"] = json.dumps({"seconds": 6})
     waiting_backend.close()
     do(bpy.ops.mfo.fit_selected)
-    assert len(fit_queue.waiting) == 2
+    yield from until(lambda: len(fit_queue.waiting) == 2 and running_export.current is None, 10)
     yield from until(lambda: len(fit_queue.finished) == 1 and runtime().fraction > 0.3, 20)
     yield from shot("13_queue")
     yield from until(lambda: len(fit_queue.finished) == 3 and not running_job.unrecorded, 40)
