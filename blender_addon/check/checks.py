@@ -7,7 +7,7 @@ The export itself checks more (geometry, lights, visibility): `mfo.check` adds w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +16,7 @@ import bpy
 from ..export.camera.read_camera import has_camera, note_picture_settings
 from ..export.camera.render_region import Size, pictured_region, pictured_size, render_region
 from ..export.findings import ExportError, Findings, Fix
+from ..export.fitted_slot import FittedSlot
 from ..export.images.image_pixels import UnreadableImageError, is_data, read_pixels, without_pixels
 from ..export.images.picture_header import PictureHeader
 from ..export.materials.read_material import read_target
@@ -39,6 +40,7 @@ from ..properties import SOCKET_ITEMS, crossed_limits, node_value_key
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
 from ..versions import overrides_of
+from .ticked_slots import NONE_TICKED, ticked_slots
 
 FINE, IGNORED, TO_CHOOSE, STOPS = "fine", "ignored", "to_choose", "stops"
 REGION_ALONE = "Render Region is on, and the picture shows the region alone."
@@ -57,8 +59,11 @@ class Finding:
 
 
 def quick_check(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple[Finding, ...]:
-    """Everything that can be known about the next fit of the active object without reading geometry; worst first."""
-    found = [*_target(scene, view_layer), *_picture(scene, view_layer), *_reference(scene), *_more_pictures(scene)]
+    """Everything that can be known about the next fit without reading geometry; worst first.
+
+    It is of the ticked materials where several are listed, else of the active object's.
+    """
+    found = [*_targets(scene, view_layer), *_picture(scene, view_layer), *_reference(scene), *_more_pictures(scene)]
     return in_order(found)
 
 
@@ -75,8 +80,29 @@ def in_order(found: list[Finding]) -> tuple[Finding, ...]:
     return tuple(f for level in levels for f in reversed(list(once.values())) if f.level == level)
 
 
-def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:
-    target = view_layer.objects.active
+def _targets(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Finding]:
+    if not scene.mfo.targets:
+        target = view_layer.objects.active
+        return _target(scene, view_layer, target, target.active_material_index if target is not None else 0)
+    slots = ticked_slots(scene)
+    found = [] if slots else [Finding(STOPS, NONE_TICKED)]
+    for each in slots:
+        found += [_named(finding, each) for finding in _target(scene, view_layer, each.object, each.slot)]
+    return found
+
+
+def _named(finding: Finding, fitted: FittedSlot) -> Finding:
+    """A line with the name of the material that it is of, unless it names it or the object; its buttons mend that."""
+    name = fitted.material.name if fitted.material is not None else ""
+    is_named = any(f"'{each}'" in finding.sentence for each in (name, fitted.object.name))
+    sentence = finding.sentence if is_named else f"'{name}': {finding.sentence}"
+    of = fitted.object.name, fitted.slot
+    return replace(finding, sentence=sentence, fixes=tuple(replace(fix, of=of) for fix in finding.fixes))
+
+
+def _target(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, target: bpy.types.Object | None, slot: int
+) -> list[Finding]:
     if target is None or target.type not in MESH_TYPES:
         what = "No object is active" if target is None else f"'{target.name}' has no faces"
         fixes = [Fix("select", item.name) for item in scene.objects if _can_be_fitted(item, view_layer)]
@@ -84,7 +110,6 @@ def _target(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fin
     findings = Findings()
     if target.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
         findings.error(f"Object '{target.name}' is hidden in the render: show it.", Fix("show_in_render"))
-    slot = target.active_material_index
     material = target.material_slots[slot].material if slot < len(target.material_slots) else None
     with without_pixels():
         read_target(material, target.name, slot, findings)

@@ -26,137 +26,159 @@ class MendingError(Exception):
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where to mend: the context, and the object's name and the slot of a material, None for the active ones."""
+
+    context: bpy.types.Context
+    of: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True)
 class Kind:
     """A remedy: its button (`{}` stands for the argument), the tooltip and the function that does it."""
 
     label: str
     tooltip: str
-    mend: Callable[[bpy.types.Context, str], None]
+    mend: Callable[[Place, str], None]
 
 
-def _target(context: bpy.types.Context) -> bpy.types.Object:
-    target = context.view_layer.objects.active
+def _target(at: Place) -> bpy.types.Object:
+    if at.of is not None:
+        return _object(at, at.of[0])
+    target = at.context.view_layer.objects.active
     if target is None:
         raise MendingError("No object is active: select the one whose material is to be fitted.")
     return target
 
 
-def _material(context: bpy.types.Context) -> bpy.types.Material:
-    material = _target(context).active_material
-    if material is None:
-        raise MendingError(f"Object '{_target(context).name}' has no material in its active slot.")
-    return material
+def _slot(at: Place) -> bpy.types.MaterialSlot | None:
+    """The slot whose material is to be mended; None where the object has none."""
+    slots, number = _target(at).material_slots, _number(at)
+    return slots[number] if number < len(slots) else None
 
 
-def _object(context: bpy.types.Context, name: str) -> bpy.types.Object:
-    found = context.scene.objects.get(name)
+def _number(at: Place) -> int:
+    return at.of[1] if at.of is not None else _target(at).active_material_index
+
+
+def _material(at: Place) -> bpy.types.Material:
+    slot = _slot(at)
+    if slot is None or slot.material is None:
+        raise MendingError(f"Object '{_target(at).name}' has no material in its slot {_number(at) + 1}.")
+    return slot.material
+
+
+def _object(at: Place, name: str) -> bpy.types.Object:
+    found = at.context.scene.objects.get(name)
     if found is None:
         raise MendingError(f"Object '{name}' is not in the scene any more: check again.")
     return found
 
 
-def _select(context: bpy.types.Context, name: str) -> None:
-    target = _object(context, name)
-    for item in context.view_layer.objects:
+def _select(at: Place, name: str) -> None:
+    target = _object(at, name)
+    for item in at.context.view_layer.objects:
         item.select_set(item == target)
-    context.view_layer.objects.active = target
+    at.context.view_layer.objects.active = target
 
 
-def _camera(context: bpy.types.Context, name: str) -> None:
-    context.scene.camera = _object(context, name)
+def _camera(at: Place, name: str) -> None:
+    at.context.scene.camera = _object(at, name)
 
 
-def _new_camera(context: bpy.types.Context, _argument: str) -> None:
+def _new_camera(at: Place, _argument: str) -> None:
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    context.scene.collection.objects.link(camera)
-    view = getattr(context.space_data, "region_3d", None)
+    at.context.scene.collection.objects.link(camera)
+    view = getattr(at.context.space_data, "region_3d", None)
     camera.matrix_world = view.view_matrix.inverted() if view else Matrix.Translation((0.0, 0.0, 10.0))
-    context.scene.camera = camera
+    at.context.scene.camera = camera
 
 
-def _perspective(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.camera.data.type = "PERSP"
+def _perspective(at: Place, _argument: str) -> None:
+    at.context.scene.camera.data.type = "PERSP"
 
 
-def _resolution(context: bpy.types.Context, size: str) -> None:
-    render = context.scene.render
+def _resolution(at: Place, size: str) -> None:
+    render = at.context.scene.render
     render.resolution_x, render.resolution_y = (int(number) for number in size.split("x"))
     render.resolution_percentage = 100
 
 
-def _whole_frame(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.render.use_border = False
+def _whole_frame(at: Place, _argument: str) -> None:
+    at.context.scene.render.use_border = False
 
 
-def _one_eye(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.render.use_multiview = False
+def _one_eye(at: Place, _argument: str) -> None:
+    at.context.scene.render.use_multiview = False
 
 
-def _cycles(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.render.engine = "CYCLES"
+def _cycles(at: Place, _argument: str) -> None:
+    at.context.scene.render.engine = "CYCLES"
 
 
-def _no_override(context: bpy.types.Context, _argument: str) -> None:
+def _no_override(at: Place, _argument: str) -> None:
     for name in ("material_override", "world_override"):
-        if getattr(context.view_layer, name, None) is not None:
-            setattr(context.view_layer, name, None)
+        if getattr(at.context.view_layer, name, None) is not None:
+            setattr(at.context.view_layer, name, None)
 
 
-def _show_in_render(context: bpy.types.Context, _argument: str) -> None:
-    target = _target(context)
+def _show_in_render(at: Place, _argument: str) -> None:
+    target = _target(at)
     target.hide_render = False
     for collection in target.users_collection:
         collection.hide_render = False
 
 
-def _reference_view(context: bpy.types.Context, made: str) -> None:
-    context.scene.mfo.reference_view = made
+def _reference_view(at: Place, made: str) -> None:
+    at.context.scene.mfo.reference_view = made
 
 
-def _whole_picture(context: bpy.types.Context, _argument: str) -> None:
-    count_all(context.scene.mfo.first_picture.part)
+def _whole_picture(at: Place, _argument: str) -> None:
+    count_all(at.context.scene.mfo.first_picture.part)
 
 
-def _upright(context: bpy.types.Context, _argument: str) -> None:
+def _upright(at: Place, _argument: str) -> None:
     try:
-        turn_upright(context)
+        turn_upright(at.context)
     except PictureCopyError as error:
         raise MendingError(str(error)) from error
 
 
-def _scale(context: bpy.types.Context, size: str) -> None:
+def _scale(at: Place, size: str) -> None:
     width, height = (int(number) for number in size.split("x"))
     try:
-        scale_to_frame(context, (width, height))
+        scale_to_frame(at.context, (width, height))
     except PictureCopyError as error:
         raise MendingError(str(error)) from error
 
 
-def _background(context: bpy.types.Context, name: str) -> None:
-    settings, image = context.scene.mfo, bpy.data.images.get(name)
+def _background(at: Place, name: str) -> None:
+    settings, image = at.context.scene.mfo, bpy.data.images.get(name)
     if image is None:
         raise MendingError(f"The picture '{name}' is not in this file any more: choose another.")
     settings.reference_source, settings.reference_image = "IMAGE", image
 
 
-def _colorspace(context: bpy.types.Context, name: str) -> None:
-    context.scene.mfo.reference_image.colorspace_settings.name = name
+def _colorspace(at: Place, name: str) -> None:
+    at.context.scene.mfo.reference_image.colorspace_settings.name = name
 
 
-def _new_material(context: bpy.types.Context, _argument: str) -> None:
-    target = _target(context)
+def _new_material(at: Place, _argument: str) -> None:
+    target = _target(at)
     material = bpy.data.materials.new(target.name)
     nodes_enabled(material)
     if not target.material_slots:
         target.data.materials.append(None)
-    target.active_material = material
+    slot = _slot(at)
+    assert slot is not None  # there is one by now
+    slot.material = material
     if target_shader(material) is None:
-        _principled(context, "")
+        _principled(at, "")
 
 
-def _principled(context: bpy.types.Context, _argument: str) -> None:
+def _principled(at: Place, _argument: str) -> None:
     """Put a Principled node on the output; what was there stays in the graph, without its link."""
-    material = _material(context)
+    material = _material(at)
     tree = nodes_enabled(material)
     output = active_output(tree) or tree.nodes.new("ShaderNodeOutputMaterial")
     before = surface_of(tree)
@@ -171,8 +193,8 @@ def _principled(context: bpy.types.Context, _argument: str) -> None:
     tree.links.new(node.outputs[0], output.inputs["Surface"])
 
 
-def _unlink(context: bpy.types.Context, name: str) -> None:
-    material = _material(context)
+def _unlink(at: Place, name: str) -> None:
+    material = _material(at)
     target = target_shader(material)
     if target is None or name not in target.own_names:
         raise MendingError(f"Material '{material.name}' has no socket {name} any more: check again.")
@@ -189,37 +211,47 @@ def _own_socket(material: bpy.types.Material, name: str) -> bpy.types.NodeSocket
     return target.sockets[name]
 
 
-def _make_local(context: bpy.types.Context, _argument: str) -> None:
-    target = _target(context)
+def _make_local(at: Place, _argument: str) -> None:
+    target, slot = _target(at), _slot(at)
+    before = slot.material if slot is not None else None
     try:
-        make_local(target)
+        _keep_listed(at, before, make_local(target, _number(at)))
     except LocalCopyError as error:
         raise MendingError(str(error)) from error
 
 
-def _single_user(context: bpy.types.Context, _argument: str) -> None:
+def _single_user(at: Place, _argument: str) -> None:
     """Give the target a copy of the material, and of the mesh where others have it, so that only it changes."""
-    target, material = _target(context), _material(context)
-    slot = target.material_slots[target.active_material_index]
+    target, material, slot = _target(at), _material(at), _slot(at)
+    assert slot is not None  # it has the material
     if slot.link == "DATA" and target.data.users > 1:
         target.data = target.data.copy()
-    target.active_material = material.copy()
+    copy = material.copy()
+    _keep_listed(at, material, copy)
+    slot.material = copy
 
 
-def _remove_driver(context: bpy.types.Context, name: str) -> None:
-    material = _material(context)
+def _keep_listed(at: Place, material: bpy.types.Material | None, copy: bpy.types.Material) -> None:
+    """Let the list of materials that are fitted together name the copy, where it named the material of the object."""
+    for entry in at.context.scene.mfo.targets:
+        if entry.object == _target(at) and entry.material == material:
+            entry.material = copy
+
+
+def _remove_driver(at: Place, name: str) -> None:
+    material = _material(at)
     target = target_shader(material)
     if target is None or name not in target.own_names:
         raise MendingError(f"There is no socket {name} any more: check again.")
     remove_driver(_own_socket(material, target.own_names[name]))
 
 
-def _replace_animation(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.mfo.animated = REPLACE
+def _replace_animation(at: Place, _argument: str) -> None:
+    at.context.scene.mfo.animated = REPLACE
 
 
-def _all_parameters(context: bpy.types.Context, _argument: str) -> None:
-    context.scene.mfo.parameter_set = "all"
+def _all_parameters(at: Place, _argument: str) -> None:
+    at.context.scene.mfo.parameter_set = "all"
 
 
 KINDS = {

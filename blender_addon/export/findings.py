@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True)
 class Fix:
-    """What one press could mend: a key of `mending.KINDS`, and what it needs to know (a name, a size)."""
+    """What one press could mend: a key of `mending.KINDS`, and what it needs to know (a name, a size).
+
+    `of` is the object's name and the slot whose material it mends, None for the active ones.
+    """
 
     kind: str
     argument: str = ""
+    of: tuple[str, int] | None = None
 
 
 class ExportError(Exception):
@@ -61,6 +65,14 @@ class Findings:
         """Remember what Mitsuba's principled cannot have, where that is the fit's model."""
         if self.of_mitsuba:
             self.note(sentence)
+
+    def take_over(self, found: Findings, of: tuple[str, int]) -> None:
+        """Remember what was found of one of several materials, in this slot of the object of this name."""
+        for sentence in found.errors:
+            self.error(sentence, *(replace(fix, of=of) for fix in found.fixes[sentence]))
+        for sentence in found.notes:
+            fixes = (replace(fix, of=of) for fix in found.fixes[sentence])
+            self.note(sentence, *fixes, explains=sentence in found.left_out)
 
     def raise_first(self) -> None:
         """Raise the first error.

@@ -211,10 +211,20 @@ def check_export(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[lis
     return findings.errors, findings.notes
 
 
-def export_findings(context: bpy.types.Context, obj: bpy.types.Object, model: str = "") -> Findings:
-    """Return what an export for a fit with this model would say, with what could be done about it, writing nothing."""
+def export_findings(
+    context: bpy.types.Context, obj: bpy.types.Object, model: str = "", targets: Sequence[FittedSlot] = ()
+) -> Findings:
+    """Return what an export for a fit with this model would say, with what could be done about it, writing nothing.
+
+    With `targets` of a fit of the materials of those slots instead of the object's active one.
+    """
     findings = Findings(of_mitsuba=model == MITSUBA)
-    data = read_scene(context, obj, findings)
+    try:
+        check_slots(targets)
+    except ExportError as problem:
+        findings.error(str(problem))
+        return findings
+    data = read_scene(context, obj, findings, targets=targets)
     if data is not None:
         finish_scene(data, findings)
         scene_files(data, findings)

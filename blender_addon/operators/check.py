@@ -7,11 +7,12 @@
 from contextlib import suppress
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import IntProperty, StringProperty
 
 from ..check import preflight
 from ..check.checks import from_export, in_order, quick_check
-from ..check.mending import KINDS, MendingError
+from ..check.mending import KINDS, MendingError, Place
+from ..check.ticked_slots import ticked_slots
 from ..export.job import ExportError, export_findings
 from ..properties import toggle_bound, toggle_node_value
 from ..running import running_job
@@ -29,7 +30,9 @@ class MFO_OT_check(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs an object."""
+        """Needs an object, or a list of materials."""
+        if context.scene.mfo.targets:
+            return True
         if not bpy.app.background and context.view_layer.objects.active is None:
             cls.poll_message_set(translated("Select the object whose material is to be fitted"))
             return False
@@ -54,6 +57,8 @@ class MFO_OT_mend(bpy.types.Operator):
 
     kind: StringProperty(options=_BUTTON)
     argument: StringProperty(options=_BUTTON)
+    object: StringProperty(options=_BUTTON)
+    slot: IntProperty(options=_BUTTON)
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -67,7 +72,7 @@ class MFO_OT_mend(bpy.types.Operator):
         try:
             if kind is None:
                 raise MendingError(f"There is no remedy {self.kind!r}: give one of {', '.join(KINDS)}.")
-            kind.mend(context, self.argument)
+            kind.mend(Place(context, (self.object, self.slot) if self.object else None), self.argument)
         except (MendingError, RuntimeError) as error:
             self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
@@ -111,10 +116,11 @@ def thorough_check(context: bpy.types.Context) -> None:
     scene, view_layer = context.scene, context.view_layer
     preflight.check_now(scene, view_layer)
     found = list(quick_check(scene, view_layer))
-    target = view_layer.objects.active
+    targets = ticked_slots(scene) if scene.mfo.targets else []
+    target = targets[0].object if targets else None if scene.mfo.targets else view_layer.objects.active
     if target is not None:
         with suppress(ExportError):  # the quick check names it
-            found += from_export(export_findings(context, target, context.scene.mfo.model))
+            found += from_export(export_findings(context, target, scene.mfo.model, targets))
     preflight.show_thorough(in_order(found))
 
 

@@ -13,6 +13,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
 from ..export.fitted_slot import FittedSlot
+from ..check.ticked_slots import NONE_TICKED, ticked_slots
 from ..export.steps import Pause, Steps, drained, part_of
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
@@ -30,7 +31,6 @@ from .fit_options import (
     start_or_queue,
     target_of,
 )
-from .materials import ticked_slots
 
 EXPORTING = "Object {} of {}"
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
@@ -109,7 +109,7 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
             return target_of(context, self.object), self.job_folder, []
         slots = ticked_slots(context.scene)
         if not slots:
-            raise FitError("No material of the list is ticked: tick those that are to be fitted, or fit one material.")
+            raise FitError(NONE_TICKED)
         obj = slots[0].object
         if len(slots) == 1 and obj.active_material_index == slots[0].slot:
             return obj, self.job_folder, []
@@ -194,7 +194,9 @@ class MFO_OT_cancel(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     fit_alone: BoolProperty(
-        name="Fit Alone", description="Let an export for another fit go on; without it that is what ends", options=_SCRIPT
+        name="Fit Alone",
+        description="Let an export for another fit go on; without it that is what ends",
+        options=_SCRIPT,
     )
 
     @classmethod

@@ -7,27 +7,10 @@
 import bpy
 from bpy.props import IntProperty
 
-from ..export.fitted_slot import FittedSlot
 from ..export.scene.seen_slots import seen_slots
 from ..result import shown_result
 from ..running import running_job
 from ..sentences.translated import translated
-
-
-def ticked_slots(scene: bpy.types.Scene) -> list[FittedSlot]:
-    """The slots of the list that are to be fitted together, as far as they are still there."""
-    found = []
-    for entry in scene.mfo.targets:
-        obj = entry.object
-        if not entry.use or obj is None or scene.objects.get(obj.name) is not obj:
-            continue
-        slots = [n for n, slot in enumerate(obj.material_slots) if slot.material is not None]
-        same = [n for n in slots if obj.material_slots[n].material == entry.material]
-        # the material may have moved to another slot since
-        slot = entry.slot if entry.slot in same else next(iter(same), None)
-        if slot is not None:
-            found.append(FittedSlot(obj, slot))
-    return found
 
 
 def _views(scene: bpy.types.Scene) -> list[tuple[bpy.types.Object, int]]:

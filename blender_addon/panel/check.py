@@ -67,3 +67,4 @@ def _draw_finding(layout: bpy.types.UILayout, context: bpy.types.Context, findin
             icon = "CHECKMARK" if is_mended else "TOOL_SETTINGS"
             button = buttons.operator("mfo.mend", text=label, icon=icon)
             button.kind, button.argument = fix.kind, fix.argument
+            button.object, button.slot = fix.of or ("", 0)

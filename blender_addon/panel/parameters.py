@@ -7,11 +7,11 @@ from itertools import groupby
 
 import bpy
 
+from ..check.ticked_slots import ticked_slots
 from ..export.nodes.target_shader import ALL, TargetShader, fits_all_leaves, fitted_leaves, leaf_name, target_shader
 from ..graph_values.mix_values import MixValue, inside_values
 from ..graph_values.place import holder_of, is_there
 from ..graph_values.table import GraphValue
-from ..operators.materials import ticked_slots
 from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, chosen_of, node_value_key
 from ..running import running_job
 from ..sentences.translated import word

@@ -24,21 +24,20 @@ def unwritable(material: bpy.types.Material | None) -> str:
     return ""
 
 
-def make_local(obj: bpy.types.Object) -> bpy.types.Material:
-    """Make the object, its mesh and its active material parts of this file; returns the material.
+def make_local(obj: bpy.types.Object, slot: int) -> bpy.types.Material:
+    """Make the object, its mesh and the material in a slot of it parts of this file; returns the material.
 
     Raises
     ------
     LocalCopyError
         If the object has no material, or one of the three stays in its library.
     """
-    slot = obj.active_material_index
     obj = _local(obj)
     if obj.data is not None:
         _local(obj.data)
     material = obj.material_slots[slot].material if slot < len(obj.material_slots) else None
     if material is None:
-        raise LocalCopyError(f"Object '{obj.name}' has no material in its active slot.")
+        raise LocalCopyError(f"Object '{obj.name}' has no material in its slot {slot + 1}.")
     return _local(material)
 
 

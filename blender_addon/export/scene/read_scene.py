@@ -102,7 +102,12 @@ def read_scene(
         camera = read_camera(scene, depsgraph, findings, picture)
         settings = _read_settings(scene, findings)
         fitted = targets or [FittedSlot(target, target.active_material_index, leaf)]
-        materials = [read_target(f.material, f.object.name, f.slot, findings, f.leaf) for f in fitted]
+        materials = []
+        for each in fitted:
+            of_one = Findings(findings.of_mitsuba) if targets else findings
+            materials.append(read_target(each.material, each.object.name, each.slot, of_one, each.leaf))
+            if targets:
+                findings.take_over(of_one, (each.object.name, each.slot))
         described = [material for material in materials if material is not None]
         if camera is None or len(described) < len(materials):
             return None
@@ -116,7 +121,9 @@ def read_scene(
         shapes = [data.target_of(number) for number in range(len(fitted))]
         for number, (each, shape) in enumerate(zip(fitted, shapes, strict=True)):
             if shape is None:
-                _say_no_faces(each, view_layer, walk.targets_left_out[number], findings)
+                of_one = Findings()
+                _say_no_faces(each, view_layer, walk.targets_left_out[number], of_one)
+                findings.take_over(of_one, (each.object.name, each.slot))
         there = [(each, shape) for each, shape in zip(fitted, shapes, strict=True) if shape is not None]
         if len(there) < len(fitted):
             return None

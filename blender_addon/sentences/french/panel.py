@@ -138,7 +138,7 @@ PANEL = {
     "Fit every value the picture can show": "Ajuster chaque valeur que l'image peut montrer",
     # what mending cannot do
     "No object is active: select the one whose material is to be fitted.": "Aucun objet n'est actif : sélectionner celui dont le matériau est à ajuster.",
-    "Object '{}' has no material in its active slot.": "L'objet '{}' n'a pas de matériau dans son slot actif.",
+    "Object '{}' has no material in its slot {}.": "L'objet '{}' n'a pas de matériau dans son slot {}.",
     "Object '{}' is not in the scene any more: check again.": "L'objet '{}' n'est plus dans la scène : vérifier de nouveau.",
     "The picture '{}' is not in this file any more: choose another.": "L'image '{}' n'est plus dans ce fichier : en choisir une autre.",
     "Material '{}' has no socket {} any more: check again.": "Le matériau '{}' n'a plus d'entrée {} : vérifier de nouveau.",

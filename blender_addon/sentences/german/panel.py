@@ -138,7 +138,7 @@ PANEL = {
     "Fit every value the picture can show": "Jeden Wert anpassen, den das Bild zeigen kann",
     # what mending cannot do
     "No object is active: select the one whose material is to be fitted.": "Kein Objekt ist aktiv: das auswählen, dessen Material angepasst werden soll.",
-    "Object '{}' has no material in its active slot.": "Objekt '{}' hat kein Material in seinem aktiven Slot.",
+    "Object '{}' has no material in its slot {}.": "Objekt '{}' hat kein Material in seinem Slot {}.",
     "Object '{}' is not in the scene any more: check again.": "Objekt '{}' ist nicht mehr in der Szene: erneut prüfen.",
     "The picture '{}' is not in this file any more: choose another.": "Das Bild '{}' ist nicht mehr in dieser Datei: ein anderes wählen.",
     "Material '{}' has no socket {} any more: check again.": "Material '{}' hat keinen Eingang {} mehr: erneut prüfen.",
