@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Mapping, Set
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,12 +32,17 @@ SHOWN_ONLY = {  # of a node or a socket: how it looks in the editor
 }  # fmt: skip
 # read files of their own, ask for more of an object than its mesh and place, or are as wide as a pixel of the picture
 NO_KEY = (
-    *("ShaderNodeScript", "ShaderNodeTexIES", "ShaderNodeTexPointDensity", "ShaderNodeWireframe"),
+    *("ShaderNodeScript", "ShaderNodeTexPointDensity", "ShaderNodeWireframe"),
     *("ShaderNodeObjectInfo", "ShaderNodeParticleInfo", "ShaderNodeHairInfo", "ShaderNodePointInfo"),
 )
 OF_IMAGE = ("alpha_mode", "use_view_as_render", "use_half_precision", "generated_type", "generated_color", "size",
             "generated_width", "generated_height", "use_generated_float", "channels", "is_float")  # fmt: skip
 ATTRIBUTE_VALUES = ("value", "vector", "color")  # names of what an attribute's items hold, by type
+
+
+OF_ANY_DATA = frozenset(prop.identifier for prop in bpy.types.ID.bl_rna.properties)  # its name, its users ...
+# of a lamp: as `lamp_table` sets them
+BRIGHTNESS = frozenset(("color", "energy", "use_shadow", "use_temperature", "temperature", "temperature_color"))
 
 
 class _NoKeyError(Exception):
@@ -74,6 +80,25 @@ def surface_key(
             key.mesh(mesh)
         finally:
             bpy.data.meshes.remove(mesh)
+
+    return key.of(put)
+
+
+def lamp_key(scene: bpy.types.Scene, instance: Any, asked: Mapping[str, Any]) -> str | None:
+    """The key of what the nodes of the lamp of a depsgraph's instance make of its light, by what is `asked` of them.
+
+    How bright it is and of what colour is taken out of that. Where the camera is does not matter: nodes that ask for
+    its view have no table.
+    """
+    data, matrix = instance.object.original.data, instance.matrix_world
+    key = _Key("lamp", scene, sorted(asked.items()))
+
+    def put() -> None:
+        tree = node_tree_of(data)
+        if data.animation_data is not None or asked_for(tree, OF_SURROUNDINGS) or turns_with_camera(tree):
+            raise _NoKeyError
+        key.put([list(row) for row in (matrix if asked["placed"] else matrix.to_3x3())])
+        key.struct(data, without=OF_ANY_DATA | BRIGHTNESS)
 
     return key.of(put)
 
@@ -123,17 +148,19 @@ class _Key:
             if node.bl_idname in NO_KEY or getattr(node, "attribute_type", "GEOMETRY") != "GEOMETRY":
                 raise _NoKeyError
             self.put("node", node.bl_idname, node.mute)
+            if node.bl_idname == "ShaderNodeTexIES" and node.mode == "EXTERNAL":
+                self._file(node.filepath, tree.library)
             self.struct(node, numbers)
         for link in tree.links:
             self.put(numbers[link.from_node.name], link.from_socket.identifier)
             self.put(numbers[link.to_node.name], link.to_socket.identifier, link.is_muted, link.is_valid)
 
-    def struct(self, struct: Any, numbers: dict[str, int] | None = None) -> None:
-        """All properties of a piece of data and of what belongs to it."""
+    def struct(self, struct: Any, numbers: dict[str, int] | None = None, without: Set[str] = frozenset()) -> None:
+        """All properties of a piece of data, but those `without`, and of what belongs to it."""
         is_shown = isinstance(struct, bpy.types.Node | bpy.types.NodeSocket)
         for prop in struct.bl_rna.properties:
             name = prop.identifier
-            if name == "rna_type" or (is_shown and name in SHOWN_ONLY):
+            if name == "rna_type" or name in without or (is_shown and name in SHOWN_ONLY):
                 continue
             value = getattr(struct, name)
             self.put(name)
@@ -151,6 +178,8 @@ class _Key:
             self._image(value)
         elif isinstance(value, bpy.types.NodeTree):
             self.tree(value)
+        elif isinstance(value, bpy.types.Text):
+            self.put("text", value.as_string())
         elif isinstance(value, bpy.types.ID):
             raise _NoKeyError
         elif isinstance(value, bpy.types.Node):
@@ -174,8 +203,11 @@ class _Key:
         elif image.packed_file is not None:
             self.put(bytes(image.packed_file.data))
         else:
-            path = Path(bpy.path.abspath(image.filepath_raw, library=image.library))
-            self.put(path.read_bytes() if path.is_file() else "missing")
+            self._file(image.filepath_raw, image.library)
+
+    def _file(self, given: str, library: bpy.types.Library | None) -> None:
+        path = Path(bpy.path.abspath(given, library=library))
+        self.put(path.read_bytes() if path.is_file() else "missing")
 
     def mesh(self, mesh: bpy.types.Mesh) -> None:
         """All attributes of a mesh, UV maps and colours among them, and its normals."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..export.render_state import render_state
 from .bake_cache import cached
-from .bake_key import surface_key, world_key
+from .bake_key import lamp_key, surface_key, world_key
 from .displaced import displaced_corners
 from .lamp import lamp_table
 from .panorama import world_panoramas
@@ -57,8 +57,13 @@ def lamp(request: Mapping[str, Any]) -> Mapping[str, Any]:
     """Measure what the nodes of the lamp of `instance` do, into `folder`; see `lamp_table`."""
     scene = bpy.data.scenes[request["scene"]]
     with _shown(scene, request["view_layer"]):
-        place = Path(request["folder"])
-        return _of_instance(request["instance"], lambda one, _: lamp_table(scene, one, request["asked"], place))
+        place, asked, cache = Path(request["folder"]), request["asked"], _cache(request)
+
+        def measured(instance: bpy.types.DepsgraphObjectInstance, _graph: object) -> dict[str, Any]:
+            key = lamp_key(scene, instance, asked) if cache is not None else None
+            return cached(cache, key, place, lambda: lamp_table(scene, instance, asked, place))
+
+        return _of_instance(request["instance"], measured)
 
 
 def paint(request: Mapping[str, Any]) -> Mapping[str, Any]:

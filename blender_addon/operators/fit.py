@@ -12,8 +12,8 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
-from ..export.fitted_slot import FittedSlot
 from ..check.ticked_slots import NONE_TICKED, ticked_slots
+from ..export.fitted_slot import FittedSlot
 from ..export.steps import Pause, Steps, drained, part_of
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend

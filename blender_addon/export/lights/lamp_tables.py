@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...bake.bake_cache import cache_folder
 from ...bake.baker import BakeError, Baker
 from ...bake.lamp_layout import CONSTANT, NORMAL, Lookup
 from ...bake.requests import name_of
@@ -33,7 +34,7 @@ class LampTables:
         asked = asdict(lookup) | {"rim": rim, "halves": halves}
         found: int | BakeError
         try:
-            found = self._baker.ask("lamp", instance=name_of(instance), asked=asked)
+            found = self._baker.ask("lamp", cache=cache_folder(), instance=name_of(instance), asked=asked)
         except BakeError as problem:
             found = problem
         self._asked[number] = lookup, found

@@ -95,7 +95,7 @@ def test_what_is_not_ticked_is_not_looked_at(listed: SimpleNamespace) -> None:
     assert not [f for f in check(listed) if "Wood" in f.sentence]
     for entry in entries:
         entry.use = False
-    assert [text for text in stopping(listed)] == [
+    assert list(stopping(listed)) == [
         "No material of the list is ticked: tick those that are to be fitted, or fit one material."
     ]
     assert listed.bpy.ops.mfo.check() == {"FINISHED"}

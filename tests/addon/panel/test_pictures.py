@@ -205,33 +205,57 @@ def test_a_killed_fit_has_the_pictures_that_it_left(
 def test_thumbnails_are_loaded_by_a_timer_and_anew_when_their_file_is_written(
     icons: Collection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """A panel that is drawn asks the disk nothing: the timer does, some seconds after it has looked last."""
     from blender_addon.panel import thumbnails
 
     timers: list[Any] = []
+    clock, drawn = [100.0], [0]
     app = SimpleNamespace(
         background=False,
         timers=SimpleNamespace(is_registered=timers.__contains__, register=lambda f, first_interval: timers.append(f)),
     )
     monkeypatch.setattr(thumbnails, "bpy", SimpleNamespace(app=app))
-    monkeypatch.setattr(thumbnails, "redraw", lambda: None)
+    monkeypatch.setattr(thumbnails, "redraw", lambda: drawn.__setitem__(0, drawn[0] + 1))
+    monkeypatch.setattr(thumbnails, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     path = tmp_path / "thumbnails" / "result.ppm"
-    assert thumbnails.thumbnail(path) == 0
-    assert timers == []  # there is none
+
+    def draw() -> int:
+        with monkeypatch.context() as disk:
+            for name in ("stat", "open", "exists", "is_file"):
+                disk.setattr(Path, name, lambda *_, **__: pytest.fail("a panel that is drawn asked the disk"))
+            return thumbnails.thumbnail(path)
+
+    def later() -> int:
+        """What is drawn once the timer has looked again, for which it is called once."""
+        clock[0] += thumbnails.LASTS + 0.1
+        draw()
+        assert timers.pop()() is None
+        return draw()
+
+    assert later() == 0
+    assert (timers, drawn) == ([], [0])  # there is none, which is no news
     fake_backend.thumbnail(tmp_path, "result", (200, 60, 40))
-    assert thumbnails.thumbnail(path) == 0
-    assert timers.pop()() is None
-    first = thumbnails.thumbnail(path)
-    assert first > 0
+    first = later()
+    assert (first > 0, drawn) == (True, [1])
+    assert (later(), drawn) == (first, [1])
     path.write_bytes(b"P6 4 2 255\n" + bytes(24))
-    assert thumbnails.thumbnail(path) == 0
-    timers.pop()()
-    assert thumbnails.thumbnail(path) not in (0, first)
+    second = later()
+    assert second not in (0, first)
+    previews_cleared(monkeypatch)
+    assert draw() == 0
+    assert later() > 0
     path.write_bytes(b"no picture")
-    assert thumbnails.thumbnail(path) == 0
-    timers.pop()()
-    assert thumbnails.thumbnail(path) == 0
-    assert timers == []  # it is not asked for again
+    assert later() == 0
+    path.unlink()
+    assert later() == 0
     thumbnails.close()
+
+
+def previews_cleared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when another fit begins."""
+    from blender_addon.pictures import previews
+
+    monkeypatch.setattr(previews, "_shown", {})
 
 
 @pytest.mark.parametrize("shows", [False, True])
