@@ -203,8 +203,11 @@ def _put_values(bpy: Any, chosen: argparse.Namespace, folder: Path) -> tuple[Any
         result = read_job_result(folder)
         name = chosen.material or result.material_name
         obj = bpy.context.scene.objects.get(result.object_name)
-        if obj is not None and chosen.make_local and unwritable(obj.active_material):
-            make_local(obj)
+        if obj is not None and chosen.make_local:
+            slots = [each.material for each in obj.material_slots]
+            slot = next((n for n, each in enumerate(slots) if each and each.name == name), obj.active_material_index)
+            if slot < len(slots) and unwritable(slots[slot]):
+                make_local(obj, slot)
         # the object's own comes first: a library may have a material of the same name
         fitted = [slot.material for slot in obj.material_slots if slot.material is not None] if obj is not None else []
         material = next((m for m in fitted if m.name == name), bpy.data.materials.get(name))

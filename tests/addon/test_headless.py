@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -46,3 +47,28 @@ def test_what_is_no_blend_file_is_called_what_it_is(addon: object, tmp_path: Pat
 
     with pytest.raises(HeadlessError, match=f"{words}: give a .blend file"):
         _open(tmp_path / name)
+
+
+def test_a_material_of_a_library_is_made_local_in_the_slot_that_it_is_in(
+    scene: SimpleNamespace, tmp_path: Path
+) -> None:
+    """Another slot may be the active one; the check in Cycles goes the same way."""
+    from blender_addon import headless
+
+    from .check.test_libraries import from_library
+
+    bpy, file, saved = scene.bpy, tmp_path / "linked.blend", tmp_path / "fitted.blend"
+    assert bpy.ops.mfo.fit(reference=scene.reference, job_folder=scene.job) == {"FINISHED"}
+    target = bpy.data.objects["Väse"]
+    target.active_material = from_library(scene, tmp_path, "materials", "Glaze")
+    target.data.materials.append(bpy.data.materials.new("Other"))
+    target.active_material_index = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
+    words = [str(file), "--job", scene.job, "--make-local", "--force", "--save-as", str(saved)]
+    chosen = headless._parser().parse_args(["apply", *words])
+    answer = chosen.run(chosen)
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    material = bpy.data.objects["Väse"].material_slots[0].material
+    assert (material.name, material.library) == (answer["material"], None)
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    assert shader.inputs["Roughness"].default_value == pytest.approx(answer["sockets"]["Roughness"], abs=1e-6)
