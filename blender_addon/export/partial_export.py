@@ -142,8 +142,8 @@ def partial_export(
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
             inside = [
-                request_of(context, each, own.values, region, data.origin)
-                for each, own in zip(fitted, wanted, strict=True)
+                request_of(context, each, data.materials[target_bsdf(k)], own.values, region, data.origin)
+                for k, (each, own) in enumerate(zip(fitted, wanted, strict=True))
             ]
             with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..graph_values.place import Place, write
 from .aov_render import Frame, world_to_frame
+from ..export.nodes.displacement import SHADING_NORMAL
 from .closure_tree import ClosureTree
 from .graph_copy import node_at, own_copy, remove_copy, variant_of
 from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
@@ -203,6 +204,9 @@ def _kinds(material: bpy.types.Material, paths: Mapping[str, Sequence[str]]) -> 
     """The types of the sockets at these paths, by name."""
     kinds = {}
     for name, (*path, socket) in paths.items():
+        if socket == SHADING_NORMAL:  # no socket of the shader
+            kinds[name] = "VECTOR"
+            continue
         _, shader = node_at(material.node_tree, path)
         found = shader.inputs[socket].type if socket else "VALUE"
         kinds[name] = found if found in ("RGBA", "VECTOR") else "VALUE"

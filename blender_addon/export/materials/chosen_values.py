@@ -22,10 +22,11 @@ from ..camera.render_region import picture_size
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material
+from ..nodes.displacement import SHADING_NORMAL
 from ..nodes.graph_findings import graph_problem
 from ..nodes.leaf_kinds import KINDS
 from ..nodes.shader_graph import plain_value
-from ..nodes.target_shader import TargetShader, fits_all_leaves, target_shader
+from ..nodes.target_shader import DIRECTIONS, TargetShader, fits_all_leaves, target_shader
 
 COPY = "scene.blend"  # of the file, in the folder of the graph's pictures: the backend has it evaluated
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}  # what a fit on recorded light asks of a material
@@ -134,19 +135,23 @@ def _numbers_of_leaves(target: TargetShader) -> list[int]:
 def request_of(
     context: bpy.types.Context,
     fitted: FittedSlot,
+    described: Material,
     values: Sequence[GraphValue],
     region: Region | None = None,
     origin: NDArray[np.float64] | None = None,
 ) -> dict[str, Any]:
     """What the entry `graph` of request.json has besides for these values; nothing where there are none.
 
-    The picture may show a `region` alone.
+    `described` is the material as the job has it. The picture may show a `region` alone.
     """
     material, target = fitted.material, target_shader(fitted.material, fitted.leaf)
     if not values or material is None or target is None:
         return {}
     tree = material.node_tree
     used = dict.fromkeys(name for value in values for name in value.sockets)
+    if not used.keys().isdisjoint(DIRECTIONS):  # one frame is made of all of them
+        bent = [name for name in (SHADING_NORMAL, *DIRECTIONS) if name in described.sockets]
+        used |= dict.fromkeys(name for name in bent if described.sockets[name].by_graph)
     numbers = _numbers_of_leaves(target)
 
     def path(name: str) -> list[str]:

@@ -40,6 +40,19 @@ def evaluator(request: Any, folder: Path) -> Any:
     return evaluate
 
 
+def bent_twice(tree: Any, node: Any) -> None:
+    """A Bump at Normal, and beside it what no value reaches: a displacement by bump and a Coat Normal."""
+    bump("Normal")(tree, node)
+    waves, displaced, bumped = (
+        tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexWave", "Displacement", "NormalMap")
+    )
+    waves.inputs["Scale"].default_value = 1.0
+    displaced.inputs["Scale"].default_value = 0.2
+    tree.links.new(waves.outputs["Factor"], displaced.inputs["Height"])
+    tree.links.new(displaced.outputs[0], tree.get_output_node("CYCLES").inputs["Displacement"])
+    tree.links.new(bumped.outputs[0], node.inputs["Coat Normal"])
+
+
 def masked(tree: Any, node: Any) -> None:
     """A Diffuse BSDF over it by noise, with a ramp of the same noise as colour, and a Glossy BSDF by a number."""
     noise_ramp(tree, node)
@@ -67,13 +80,14 @@ def masked(tree: Any, node: Any) -> None:
         (noise_ramp, {"Roughness": 0.4}, {"Color Ramp/Stop 0": (0.1, 0.6, 0.3), "Color Ramp/Position 1": 0.7}),
         (bump("Normal"), {"Base_Color": (0.4, 0.3, 0.2), "Roughness": 0.4}, {"Bump/Strength": 0.4}),
         (bump("Coat Normal"), {"Coat_Weight": 1.0, "Coat_Roughness": 0.3}, {"Bump/Strength": 0.5}),
+        (bent_twice, {"Roughness": 0.4, "Coat_Weight": 0.5, "Coat_Roughness": 0.3}, {"Bump/Strength": 0.4}),
         (
             masked,
             {"Base_Color": (0.1, 0.3, 0.7), "Roughness": 0.4},
             {"Color Ramp.001/Stop 0": 0.3, "Color Ramp/Stop 0": (0.1, 0.6, 0.3), "Color Ramp/Position 1": 0.7},
         ),
     ],
-    ids=["ramp", "bump", "coat", "mix"],
+    ids=["ramp", "bump", "coat", "several directions", "mix"],
 )
 def test_the_recorded_picture_at_other_values_is_cycles(
     scene: Any, export: Any, render_cycles: Any, mitsuba: Any, tmp_path: Path, build: Any, values: Any, change: Any
