@@ -15,9 +15,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..export.nodes.displacement import SHADING_NORMAL
 from ..graph_values.place import Place, write
 from .aov_render import Frame, world_to_frame
-from ..export.nodes.displacement import SHADING_NORMAL
 from .closure_tree import ClosureTree
 from .graph_copy import node_at, own_copy, remove_copy, variant_of
 from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere

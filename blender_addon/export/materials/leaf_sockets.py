@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..findings import Findings
 from ..material_model import Socket
+from ..nodes.leaf_kinds import sockets_of
 from ..nodes.shader_graph import plain_value
 
 GLOSSY, BELOW = "ShaderNodeBsdfAnisotropic", "ShaderNodeSubsurfaceScattering"
@@ -19,13 +20,12 @@ def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> di
     if node.bl_idname == GLOSSY:
         return _stretched(material, node, findings)
     if node.bl_idname == BELOW:
-        for name in ("IOR", "Anisotropy"):
-            if node.inputs[name].is_linked:
+        own = {name: sockets_of(node)[name] for name in ("IOR", "Anisotropy")}
+        for name, socket in own.items():
+            if socket.enabled and socket.is_linked:
                 findings.note(f"Material '{material}': what is linked to {name} of '{node.name}' is left out.")
-        return {f"Subsurface {name}": Socket(plain_value(node.inputs[name]), True) for name in ("IOR", "Anisotropy")}
-    if getattr(node, "fresnel_type", "F82") == "PHYSICAL_CONDUCTOR":
-        return _conductor(node)
-    return {}
+        return {f"Subsurface {name}": Socket(plain_value(socket), True) for name, socket in own.items()}
+    return conductor_sockets(node)
 
 
 def _stretched(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
@@ -47,8 +47,13 @@ def _stretched(material: str, node: bpy.types.Node, findings: Findings) -> dict[
     return {"Anisotropic": Socket(wide, True), "Anisotropic Rotation": Socket(turn % 1.0, True)}
 
 
-def _conductor(node: bpy.types.Node) -> dict[str, Socket]:
-    """A Metallic BSDF by index and extinction as colour and edge tint: its reflectance at cos 1 and 1/7."""
+def conductor_sockets(node: bpy.types.Node) -> dict[str, Socket]:
+    """A Metallic BSDF by index and extinction as colour and edge tint: its reflectance at cos 1 and 1/7.
+
+    Nothing of another node.
+    """
+    if getattr(node, "fresnel_type", "F82") != "PHYSICAL_CONDUCTOR":
+        return {}
     n, k = (np.array(node.inputs[name].default_value, dtype=np.float64)[:3] for name in ("IOR", "Extinction"))
     f0, edge = (_conductor_fresnel(c, n, k) for c in (1.0, 1.0 / 7.0))
     plain = f0 + (1.0 - f0) * (6.0 / 7.0) ** 5

@@ -36,6 +36,7 @@ from ..nodes.leaf_kinds import (
     WITHOUT_SPECULAR,
     inputs_of,
     only_nearest,
+    sockets_of,
 )
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
@@ -53,7 +54,7 @@ from ..nodes.target_shader import (
     target_shader,
     why_no_target,
 )
-from .leaf_sockets import distribution_of, other_sockets
+from .leaf_sockets import conductor_sockets, distribution_of, other_sockets
 
 SKIPPED_SOCKETS = ("Weight",)
 # what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
@@ -296,7 +297,8 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     model, renamed, constants = SIMPLE_SHADERS[node.bl_idname]
     sockets = {name: Socket(value) for name, value in constants.items()}
     for name, theirs in renamed.items():
-        sockets[name] = _read(theirs, Place(node.inputs[theirs], ()), material.name, False, findings)
+        sockets[name] = _read(theirs, Place(sockets_of(node)[theirs], ()), material.name, False, findings)
+    sockets |= conductor_sockets(node)
     if model == "null" and list(node.inputs["Color"].default_value)[:3] != [1.0, 1.0, 1.0]:
         findings.note(f"Material '{material.name}': {node.bl_label} is taken for white.")
     if model == "principled" or (model == "diffuse" and node.inputs["Roughness"].default_value > 0.0):

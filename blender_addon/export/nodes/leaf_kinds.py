@@ -131,9 +131,14 @@ def only_nearest(node: bpy.types.Node) -> bool:
     return kind.nearest or bool(other) or _unknown_setting(node, kind) is not None
 
 
+def sockets_of(node: bpy.types.Node) -> dict[str, bpy.types.NodeSocket]:
+    """The inputs of a node by name, those that a setting of it hides, too, which `node.inputs[name]` does not find."""
+    return {socket.name: socket for socket in node.inputs}
+
+
 def inputs_of(node: bpy.types.Node) -> dict[str, bpy.types.NodeSocket]:
     """The sockets of a node of a known kind by what the Principled BSDF calls their values."""
-    own = {socket.name: socket for socket in node.inputs}  # those that are switched off are not found by name
+    own = sockets_of(node)
     if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
         own.pop("Roughness")
     names = KINDS[node.bl_idname].names

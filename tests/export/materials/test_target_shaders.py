@@ -10,7 +10,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from blender_addon.export.findings import ExportError  # noqa: E402
+from blender_addon.export.findings import ExportError, Findings  # noqa: E402
+from blender_addon.export.materials.read_material import read_context, read_target  # noqa: E402
+from blender_addon.export.nodes.leaf_kinds import KINDS, is_fitted  # noqa: E402
 from blender_addon.versions import has_diffuse_roughness  # noqa: E402
 
 from ..scenes import diffuse_material, new_material  # noqa: E402
@@ -91,4 +93,50 @@ def test_a_shader_without_a_value_to_fit_is_refused_by_its_names(scene: Any, exp
     own = "Color (base_color) and Roughness (diffuse_roughness)" if has_diffuse_roughness() else "Color (base_color)"
     assert str(caught.value) == (
         f"A Diffuse BSDF has {own} alone, and none of them is left to fit: choose one that has no link."
+    )
+
+
+def settings_of_shaders() -> list[tuple[str, str, str]]:
+    """Every choice of every menu of a shader node that is fitted or held."""
+    tree = bpy.data.materials.new("Menus").node_tree or bpy.data.node_groups.new("Menus", "ShaderNodeTree")
+    found = []
+    for kind in KINDS:
+        node = tree.nodes.new(kind)
+        own = (p for p in node.bl_rna.properties if p.identifier not in bpy.types.Node.bl_rna.properties)
+        found += [(kind, p.identifier, item) for p in own if p.type == "ENUM" for item in p.enum_items.keys()]  # noqa: SIM118
+    return found
+
+
+@pytest.mark.parametrize(("kind", "setting", "choice"), settings_of_shaders())
+def test_a_socket_that_a_setting_hides_is_read(scene: Any, kind: str, setting: str, choice: str) -> None:
+    """As the target, as a held part of a mix, and on another object."""
+    material = new_material("Target")
+    tree, first, mix = material.node_tree, principled(material), material.node_tree.nodes.new("ShaderNodeMixShader")
+    node, output = tree.nodes.new(kind), tree.get_output_node("CYCLES").inputs["Surface"]
+    setattr(node, setting, choice)
+    shader = node.outputs[0]
+    tree.links.new(shader, output)
+    findings = Findings()
+    alone = read_target(material, "Ball", 0, findings)
+    assert (alone is None) == (not is_fitted(node))
+    assert read_context(material, "Ball", findings).sockets
+    tree.links.new(first.outputs[0], mix.inputs[1])
+    tree.links.new(shader, mix.inputs[2])
+    tree.links.new(mix.outputs[0], output)
+    both = read_target(material, "Ball", 0, Findings())
+    assert both is not None
+    assert len(both.leaves) == 1
+
+
+def test_a_metal_by_index_and_extinction_on_another_object_has_their_colour(scene: Any) -> None:
+    material = new_material("Gold")
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeBsdfMetallic")
+    node.fresnel_type = "PHYSICAL_CONDUCTOR"
+    n, k = np.array([0.18, 0.42, 1.37]), np.array([3.42, 2.35, 1.77])
+    node.inputs["IOR"].default_value, node.inputs["Extinction"].default_value = n, k
+    tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    found = read_context(material, "Ring", Findings())
+    np.testing.assert_allclose(
+        found.sockets["Base Color"].value, ((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2), rtol=1e-5
     )
