@@ -167,6 +167,7 @@ def partial_export(
         if len(unseen) == len(fitted):
             raise NotShownError(OUTSIDE.format(obj=fitted[0].object.name))
         files = scene_files(data, findings)
+        findings.raise_first()
         yield Pause()
         tell(0.5)
         paths = [f"{TARGETS}/{number}" for number in range(1, len(fitted) + 1)] if targets else [""]

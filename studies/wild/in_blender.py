@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import random
 import shutil
@@ -25,7 +26,7 @@ from mathutils import Vector  # pyright: ignore[reportMissingImports]
 from blender_addon.export.job import export_findings
 from blender_addon.headless import _open
 
-from .rows import how_read
+from .rows import UNSEEN, how_read
 
 # values of reflecting shaders that are moved for the start, with the range they are drawn from
 MOVED = {
@@ -53,6 +54,7 @@ def read(path: Path) -> dict[str, Any]:
     rows = []
     for material, users in sorted(_users(context).items(), key=lambda item: item[0].name):
         rows.append({"material": material.name, "sort": _sort(material)})
+        rows[-1] |= {"errors": [f"{UNSEEN} '{material.name}': it is nowhere."], "notes": []}
         for view, (obj, slot) in [(v, user) for v in (OWN, *range(len(VIEWS))) for user in users]:
             context.scene.camera = own
             obj.active_material_index = slot
@@ -116,6 +118,8 @@ def _sort(material: bpy.types.Material) -> str:
 def _look_at(scene: bpy.types.Scene, obj: bpy.types.Object, view: int) -> bool:
     """Give the scene the camera of a view; False where it is the file's own and does not show enough of the object."""
     corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+    if not all(math.isfinite(x) for corner in corners for x in corner):
+        return False
     if view == OWN:
         return scene.camera is not None and scene.camera.type == "CAMERA" and _spans(scene, corners)
     centre = sum(corners, Vector()) / len(corners)

@@ -12,7 +12,16 @@ import pytest
 
 from blender_addon.export.job import ExportError, check_export, export_job
 
-from .scenes import add_camera, add_mesh, add_quad, diffuse_material, emission_material, new_material, world_color
+from .scenes import (
+    add_camera,
+    add_light,
+    add_mesh,
+    add_quad,
+    diffuse_material,
+    emission_material,
+    new_material,
+    world_color,
+)
 
 
 def no_camera(scene: Any, target: Any) -> None:
@@ -76,6 +85,40 @@ def override(scene: Any, target: Any) -> None:
     bpy.context.view_layer.material_override = diffuse_material("Clay", (1, 1, 1))
 
 
+def camera_nowhere(scene: Any, target: Any) -> None:
+    scene.camera.rotation_euler.x = float("nan")
+
+
+def endless_lens(scene: Any, target: Any) -> None:
+    scene.camera.data.shift_x = float("nan")
+
+
+def lamp_nowhere(scene: Any, target: Any) -> None:
+    add_light("POINT").location.y = float("nan")
+
+
+def endless_lamp(scene: Any, target: Any) -> None:
+    add_light("SUN").data.energy = float("inf")
+
+
+def no_roughness(scene: Any, target: Any) -> None:
+    shader = target.active_material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Roughness"].default_value = float("nan")
+
+
+def other_without_colour(scene: Any, target: Any) -> None:
+    add_quad("Wall", 0.2, -1.0, diffuse_material("Wall", (float("nan"), 1, 1)))
+
+
+CAMERA = (
+    "The place or a setting of the camera is NaN or infinite: mend the driver, constraint or keyframe that gives it."
+)
+LAMP = (
+    "The place or a setting of light 'Light' is NaN or infinite: mend the driver, constraint or keyframe that gives "
+    "it, or hide the light in renders."
+)
+VALUE = "A value of material '{}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number."
+
 CASES: dict[Callable[[Any, Any], None], str] = {
     no_camera: "The scene has no camera: add one and make it the active camera.",
     panorama: "Camera 'Camera' is of type Pano: make it Perspective or Orthographic.",
@@ -92,6 +135,12 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     hidden: "Object 'Target' is hidden in the render: show it.",
     dark: "The scene has no light: add a light or give the world a colour.",
     override: "View layer 'ViewLayer' replaces materials or the world by 'Clay': remove the override.",
+    camera_nowhere: CAMERA,
+    endless_lens: CAMERA,
+    lamp_nowhere: LAMP,
+    endless_lamp: LAMP,
+    no_roughness: VALUE.format("Target"),
+    other_without_colour: VALUE.format("Wall"),
     no_faces: "No face of 'Target' uses its active material slot 1: choose another.",
 }
 

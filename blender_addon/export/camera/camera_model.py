@@ -15,6 +15,9 @@ from ..files.xml_scene import Element, add, boolean, integer, plugin, scalar, st
 TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 # Standard deviation of Cycles' Blackman-Harris filter over its width: 0.2770, so 0.4155 px at the default 1.5
 BLACKMAN_HARRIS_SIGMA = 0.2770
+CAMERA_NOT_FINITE = (
+    "The place or a setting of the camera is NaN or infinite: mend the driver, constraint or keyframe that gives it."
+)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...versions import cycles_settings
 from ..findings import Findings, Fix
-from .camera_model import Camera, PixelFilter
+from .camera_model import CAMERA_NOT_FINITE, Camera, PixelFilter
 from .render_region import Size, picture_size, pictured_region, render_region, square_size
 
 
@@ -31,6 +31,9 @@ def read_camera(
             f"{width}x{height} to {square_width}x{square_height} square pixels."
         )
     world = np.array(evaluated.matrix_world, dtype=np.float64)
+    if not np.isfinite(world).all():
+        findings.error(CAMERA_NOT_FINITE)
+        return None
     lengths = np.linalg.norm(world[:3, :3], axis=0)
     if lengths.min() < 1e-12:
         findings.error(f"Camera '{name}' has a scale of zero: give it and its parents a scale other than zero.")

@@ -14,10 +14,20 @@ Element = ElementTree.Element
 FORMAT_VERSION = "3.0.0"
 
 
+class NotFiniteError(ValueError):
+    """A number is NaN or infinite, which a scene file cannot hold."""
+
+
 def number(value: float) -> str:
-    """Write a float so that reading it back gives the same float32."""
+    """Write a float so that reading it back gives the same float32.
+
+    Raises
+    ------
+    NotFiniteError
+        If it is NaN or infinite.
+    """
     if not math.isfinite(value):
-        raise ValueError(f"{value} cannot be written to a scene file; numbers must be finite")
+        raise NotFiniteError(f"{value} cannot be written to a scene file; numbers must be finite")
     return format(float(value), ".9g")
 
 

@@ -4,16 +4,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera.camera_model import sensor_element
+from ..camera.camera_model import CAMERA_NOT_FINITE, sensor_element
 from ..files.exr_file import write_exr
 from ..files.ply_file import TriangleMesh, write_ply
-from ..files.xml_scene import Element, add, boolean, integer, plugin, reference, scalar, scene_text, string
+from ..files.xml_scene import (
+    Element,
+    NotFiniteError,
+    add,
+    boolean,
+    integer,
+    plugin,
+    reference,
+    scalar,
+    scene_text,
+    string,
+)
 from ..findings import Findings
 from ..lights.light_elements import light_element
 from ..lights.light_model import irradiance_at
@@ -30,6 +43,13 @@ LEAST_CLAMP = 1.0
 # the same where Cycles chooses by its light tree, which does not know what nodes make of lamps, so that single samples
 # of those are brighter: a gobo, an IES lamp and a softbox lost 0.8 % at 1, 0.4 % at 3 and nothing at 9
 LEAST_CLAMP_OF_NODES = 9.0
+LIGHT_NOT_FINITE = (
+    "The place or a setting of light '{name}' is NaN or infinite: mend the driver, constraint or keyframe that gives "
+    "it, or hide the light in renders."
+)
+MATERIAL_NOT_FINITE = (
+    "A value of material '{name}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number."
+)
 
 
 @dataclass
@@ -71,7 +91,7 @@ class SceneFiles:
 
 
 def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
-    """Return scene.xml and its files; what had to be approximated goes into `findings`."""
+    """Return scene.xml and its files; what had to be approximated goes into `findings`, and as an error what is NaN."""
     files = SceneFiles()
     targets = [shape for n in range(scene.target_count) if (shape := scene.target_of(n)) is not None]
     # of several the middle of their middles
@@ -83,14 +103,17 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
             integer("max_depth", scene.settings.max_depth),
             boolean("hide_emitters", _hide_emitters(scene)),
         ),
-        sensor_element(scene.camera, scene.settings.pixel_filter, scene.settings.spp),
     ]
+    with _finite(CAMERA_NOT_FINITE, findings):
+        children.append(sensor_element(scene.camera, scene.settings.pixel_filter, scene.settings.spp))
     emitters: list[tuple[Element, float]] = []
     world = world_element(scene.world, files.picture)
     if world is not None:
         emitters.append((world, world_irradiance(scene.world)))
     for index, light in enumerate(scene.lights):
-        emitters.append((light_element(light, f"light_{index + 1:04d}", files.picture), irradiance_at(light, middle)))
+        with _finite(LIGHT_NOT_FINITE.format(name=light.name), findings):
+            element = light_element(light, f"light_{index + 1:04d}", files.picture)
+            emitters.append((element, irradiance_at(light, middle)))
     _note_clamping(scene, sum(irradiance for _, irradiance in emitters), findings)
     _weigh(emitters)
     children += [element for element, _ in emitters]
@@ -100,12 +123,23 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
     fitted = {target_bsdf(number) for number in range(scene.target_count)}
     for identifier, material in scene.materials.items():
         is_target = identifier in fitted
-        children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
+        with _finite(MATERIAL_NOT_FINITE.format(name=material.name), findings):
+            children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
     _note_shadowless(scene, findings)
     for shape in scene.shapes:
-        children.append(_shape_element(shape, scene, files))
+        with _finite(MATERIAL_NOT_FINITE.format(name=scene.materials[shape.bsdf].name), findings):
+            children.append(_shape_element(shape, scene, files))
     files.text = scene_text(children)
     return files
+
+
+@contextmanager
+def _finite(sentence: str, findings: Findings) -> Iterator[None]:
+    """Report an error where a number within is NaN or infinite."""
+    try:
+        yield
+    except NotFiniteError:
+        findings.error(sentence)
 
 
 def _note_shadowless(scene: SceneData, findings: Findings) -> None:
