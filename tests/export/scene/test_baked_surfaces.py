@@ -382,6 +382,24 @@ def test_glow_of_any_tree_is_emission(stage: Any, export: Any) -> None:
     assert report.request["materials"][bsdf]["sockets"]["Emission Strength"]["value"] == 1.0
 
 
+@pytest.mark.parametrize("is_mixed", [False, True])
+def test_a_colour_in_the_place_of_a_shader_shines(is_mixed: bool, stage: Any, export: Any) -> None:
+    """As pictures and flat looks have them; Cycles makes an Emission of it."""
+    target, _, nodes = stage
+    added = nodes.new("AddShader")
+    nodes.tree.links.new(nodes.principled.outputs[0], added.inputs[0])
+    nodes.tree.links.new(nodes.place(), added.inputs[1])
+    nodes.tree.links.new(added.outputs[0] if is_mixed else nodes.place(), nodes.surface)
+    report = export(target)
+    bsdf, positions, uv = shape_of(report)
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    radiance = attribute(scene, "shape/emitter/texture[@name='radiance']/string", "value")
+    found = at_vertices(np.asarray(read_image(report.folder / radiance).pixels), uv)
+    assert np.sqrt(np.mean((found - (0.5 * positions + 0.5)) ** 2)) < 0.01
+    assert not [note for note in report.notes if "black" in note]
+    assert (bsdf in report.request["materials"]) == is_mixed  # alone it reflects nothing
+
+
 @pytest.mark.parametrize("owner", ["world", "scene", "layer"])
 def test_attributes_of_the_view_layer_are_those_of_the_users_scene(owner: str, stage: Any, export: Any) -> None:
     """Cycles looks for them at the view layer, then at the scene, then at the world."""
