@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_PLACE, OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from ..export.nodes.displacement import bends_normals, unbent
-from ..export.nodes.leaf_kinds import EMISSION
+from ..export.nodes.leaf_kinds import EMISSION, is_shader
 from ..probe.closure_tree import ClosureTree, Leaf, Value
 from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output
@@ -84,7 +84,7 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     asked: list[tuple[dict[str, Any], str, Value, bool]] = []
     leaves = []
     for leaf in closures.leaves:
-        kind = leaf.node.bl_idname if _is_shader(leaf.node) else EMISSION
+        kind = leaf.node.bl_idname if is_shader(leaf.node) else EMISSION
         found: dict[str, Any] = {"kind": kind, "label": leaf.node.bl_label, "sockets": {}}
         for name in ("distribution", "subsurface_method", "fresnel_type"):
             if hasattr(leaf.node, name):
@@ -315,11 +315,6 @@ class _Bake:
             return float(high[0]) if len(high) == 1 else [float(number) for number in high]
         pixels[~self._where] = covered.mean(axis=0)  # filtering may look at texels beside the islands
         return self.file(pixels)
-
-
-def _is_shader(node: bpy.types.Node) -> bool:
-    """Whether a node gives a shader; a colour in the place of one shines in Cycles (ShaderGraph::connect)."""
-    return any(output.type == "SHADER" for output in node.outputs)
 
 
 def _emits(tree: bpy.types.NodeTree) -> bool:

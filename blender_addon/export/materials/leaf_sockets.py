@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..findings import Findings
 from ..material_model import Socket
-from ..nodes.leaf_kinds import sockets_of
+from ..nodes.leaf_kinds import is_shader, sockets_of
 from ..nodes.shader_graph import plain_value
 
 GLOSSY, BELOW = "ShaderNodeBsdfAnisotropic", "ShaderNodeSubsurfaceScattering"
@@ -74,3 +74,14 @@ def distribution_of(node: bpy.types.Node) -> str:
     """The microfacet distribution of a node, or the one that stands in for it."""
     found = getattr(node, "distribution", "")
     return found if found in ("GGX", "MULTI_GGX") else "GGX"
+
+
+def note_black(material: str, name: str, node: bpy.types.Node, findings: Findings) -> None:
+    """Say that a part of a mix, of this name, has no model."""
+    if is_shader(node):
+        findings.note(f"Material '{material}': '{name}' ({node.bl_label}) is held as black.")
+        return
+    findings.note(
+        f"Material '{material}': '{name}' ({node.bl_label}) is a colour in the place of a shader, which shines in "
+        "Cycles and is held as black: link an Emission between them."
+    )

@@ -54,7 +54,7 @@ from ..nodes.target_shader import (
     target_shader,
     why_no_target,
 )
-from .leaf_sockets import conductor_sockets, distribution_of, other_sockets
+from .leaf_sockets import conductor_sockets, distribution_of, note_black, other_sockets
 
 SKIPPED_SOCKETS = ("Weight",)
 # what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
@@ -179,7 +179,7 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
         return Material(name, "null", read(named), weight=weight, node=tuple(leaf.path), labels=_labels(named))
     kind = KINDS.get(node.bl_idname)
     if kind is None:
-        findings.note(f"Material '{material.name}': '{name}' ({node.bl_label}) is held as black.")
+        note_black(material.name, name, node, findings)
         sockets = {key: Socket(value, True) for key, value in {**WITHOUT_SPECULAR, "Base Color": [0.0] * 3}.items()}
         return Material(name, "principled", sockets, weight=weight, node=tuple(leaf.path), is_nearest=True)
     skipped = (*SKIPPED_SOCKETS, *UNUSED_SOCKETS, *DIRECTIONS)

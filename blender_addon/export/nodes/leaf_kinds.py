@@ -106,6 +106,11 @@ _WHERE_PRESENT = {
 }
 
 
+def is_shader(node: bpy.types.Node) -> bool:
+    """Whether a node gives a shader; a colour in the place of one shines in Cycles (ShaderGraph::connect)."""
+    return any(output.type == "SHADER" for output in node.outputs)
+
+
 def is_fitted(node: bpy.types.Node) -> bool:
     """Whether the values of a node can be fitted: its model is exact."""
     return node.bl_idname in KINDS and why_not_fitted(node) is None

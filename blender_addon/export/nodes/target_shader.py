@@ -14,7 +14,7 @@ from ...versions import PRINCIPLED, node_tree_of
 from .closure_leaves import ClosureError, ClosureLeaf, Groups, by_identifier, closure_leaves
 from .displacement import displacement_in
 from .graph_findings import GROUP_INPUT
-from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, why_not_fitted
+from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, is_shader, why_not_fitted
 from .shader_graph import Links
 
 ALL_LEAVES = "*"  # what a material keeps where all shaders of its mix are fitted
@@ -203,8 +203,9 @@ def why_no_target(material: bpy.types.Material) -> str:
         problem = why_not_fitted(leaf.node) if leaf.node.bl_idname in KINDS else None
         if problem is not None:
             return f"'{leaf.node.name}' ({leaf.node.bl_label}) of material '{material.name}' {problem}."
+    reflecting = [leaf.node for leaf in leaves if is_shader(leaf.node)]
     shown = ", ".join(
-        dict.fromkeys(leaf.node.bl_label for leaf in leaves if leaf.node.bl_idname not in (EMISSION, TRANSPARENT))
+        dict.fromkeys(node.bl_label for node in reflecting if node.bl_idname not in (EMISSION, TRANSPARENT))
     )
     if shown:
         return (
