@@ -43,12 +43,12 @@ def baked_surface(
     """Bake the material in `slot` of a depsgraph's instance into `folder`, `size` texels along each side.
 
     Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``,
-    each with ``kind``, ``name``, ``weight``, ``sockets`` and what of the node's settings counts; ``emission`` and
-    for leaves ``normal``, where there are any; ``view``, ``paths``, ``around`` and ``place``: what of the view, of
-    light paths, of other objects and of its own place the nodes ask for; ``sides``: whether for the side that is
-    seen; ``left_out``: linked sockets that are not baked. A value is a number, a list, or the name of a .npy (size,
-    size, channels), first row at the top, in the working space. Normals are in the frame of the map: its u axis,
-    the normal's side of it, the smooth normal.
+    those that reflect light or let it through, each with ``kind``, ``name``, ``weight``, ``sockets`` and what of the
+    node's settings counts; ``emission`` and for leaves ``normal``, where there are any; ``view``, ``paths``,
+    ``around`` and ``place``: what of the view, of light paths, of other objects and of its own place the nodes ask
+    for; ``sides``: whether for the side that is seen; ``left_out``: linked sockets that are not baked. A value is a
+    number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working space. Normals
+    are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
     """
     shown = material_of_slot(instance.object, slot)
     assert shown is not None  # a surface without material needs no bake
@@ -83,9 +83,9 @@ def baked_surface(
 def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     asked: list[tuple[dict[str, Any], str, Value, bool]] = []
     leaves = []
-    for leaf in closures.leaves:
-        kind = leaf.node.bl_idname if is_shader(leaf.node) else EMISSION
-        found: dict[str, Any] = {"kind": kind, "label": leaf.node.bl_label, "sockets": {}}
+    reflecting = [leaf for leaf in closures.leaves if is_shader(leaf.node) and leaf.node.bl_idname != EMISSION]
+    for leaf in reflecting:
+        found: dict[str, Any] = {"kind": leaf.node.bl_idname, "label": leaf.node.bl_label, "sockets": {}}
         for name in ("distribution", "subsurface_method", "fresnel_type"):
             if hasattr(leaf.node, name):
                 found[name] = getattr(leaf.node, name)
@@ -96,7 +96,7 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
                 asked.append((found["sockets"], socket.name, closures.value(leaf.path, socket), several))
         leaves.append(found)
     baked.values(asked)
-    for found, leaf in zip(leaves, closures.leaves, strict=True):
+    for found, leaf in zip(leaves, reflecting, strict=True):
         normal = _normal(closures, leaf)
         if normal is not None or baked.is_bent:
             local = baked.local_normal(normal)
@@ -231,26 +231,36 @@ class _Bake:
             bpy.data.images.remove(blank)
 
     def values(self, asked: list[tuple[dict[str, Any], str, Value, bool]]) -> None:
-        """Put each value, or the name of its picture, where it is asked for; three numbers share a bake.
+        """Put each value, or the name of its picture, where it is asked for.
 
+        Three numbers share a bake, and so does all that one output gives.
         The last of each says whether its socket holds several numbers.
         """
-        numbers = []
+        colors: dict[int, tuple[Value, list[tuple[dict[str, Any], str]]]] = {}
+        numbers: dict[int, tuple[Value, list[tuple[dict[str, Any], str]]]] = {}
         for place, name, value, several in asked:
             if not hasattr(value, "is_output"):
                 place[name] = value
-            elif several:
-                place[name] = self._put(self._of_socket(value))
-            else:
-                numbers.append((place, name, value))
-        for first in range(0, len(numbers), 3):
-            three = numbers[first : first + 3]
+                continue
+            _, places = (colors if several else numbers).setdefault(value.as_pointer(), (value, []))
+            places.append((place, name))
+        for value, places in colors.values():
+            self._fill(places, self._of_socket(value))
+        listed = list(numbers.values())
+        for first in range(0, len(listed), 3):
+            three = listed[first : first + 3]
             joined = self._tree.nodes.new("ShaderNodeCombineColor")
-            for (_, _, value), socket in zip(three, joined.inputs, strict=False):
+            for (value, _), socket in zip(three, joined.inputs, strict=False):
                 self._tree.links.new(value, socket)
             pixels = self._of_socket(joined.outputs[0])
-            for channel, (place, name, _) in enumerate(three):
-                place[name] = self._put(pixels[:, :, channel : channel + 1])
+            for channel, (_, places) in enumerate(three):
+                self._fill(places, pixels[:, :, channel : channel + 1])
+
+    def _fill(self, places: list[tuple[dict[str, Any], str]], pixels: Pixels) -> None:
+        """Put what one output gives wherever it is asked for."""
+        found = self._put(pixels)
+        for place, name in places:
+            place[name] = found
 
     def local_normal(self, socket: bpy.types.NodeSocket | None) -> Pixels:
         """A normal in the frame of the map; without a `socket` the one that a displacement by bump makes."""

@@ -34,6 +34,7 @@ class ClosureTree:
 
     def __init__(self, tree: bpy.types.NodeTree, *, own_groups: bool = True) -> None:
         self._tree = tree
+        self._at_tops: dict[tuple[int, ...], bpy.types.NodeSocket] = {}
         self.groups = _own_groups(tree, 0) if own_groups else []
         output = active_output(tree)
         self.leaves: list[Leaf] = []
@@ -79,6 +80,14 @@ class ClosureTree:
             self.leaves.append(Leaf(node, path, weight))
 
     def _at_top(self, path: Path, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        """The output of the top tree that gives what one in groups does, always the same one."""
+        place = tuple(each.as_pointer() for each in (*path, socket))
+        if place not in self._at_tops:
+            self._at_tops[place] = self._led_up(path, socket)
+        return self._at_tops[place]
+
+    @staticmethod
+    def _led_up(path: Path, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
         for group in reversed(path):
             tree = group.node_tree
             output = _group_output(tree) or tree.nodes.new("NodeGroupOutput")

@@ -19,7 +19,6 @@ from ..material_model import Material, Part, Socket, Texture
 EXACT = {
     "ShaderNodeBsdfPrincipled": ("principled", {}, {}),
     "ShaderNodeBsdfTransparent": ("null", {}, {}),
-    "ShaderNodeEmission": ("emission", {}, {}),
     "ShaderNodeBsdfDiffuse": (
         "principled",
         {"Base Color": "Color", "Diffuse Roughness": "Roughness"},
@@ -91,7 +90,7 @@ class Baked:
         What is not as in Cycles goes into `findings`.
         """
         self._note(name, findings)
-        leaves = [leaf for leaf in self._answer["leaves"] if leaf["kind"] != "ShaderNodeEmission"]
+        leaves = self._answer["leaves"]
         weighted = [(self._weight(leaf["weight"]), self._leaf(leaf, name, findings)) for leaf in leaves]
         weighted = _normalised(weighted, name, findings)
         emission = self._emission()

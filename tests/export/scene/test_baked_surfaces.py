@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -380,6 +381,38 @@ def test_glow_of_any_tree_is_emission(stage: Any, export: Any) -> None:
     found = at_vertices(texture(report, bsdf, "Emission Color"), uv)
     assert np.sqrt(np.mean((found - 3.0 * (0.5 * positions + 0.5)) ** 2)) < 0.03
     assert report.request["materials"][bsdf]["sockets"]["Emission Strength"]["value"] == 1.0
+
+
+def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(
+    stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A picture in a group that many sockets take, and a glow beside: four bakes are the light, where faces are, and
+    the picture as a colour and as a number."""
+    from blender_addon.bake import surface
+
+    baked, bake = [], surface.bake
+    monkeypatch.setattr(surface, "bake", lambda stage, kind: (baked.append(kind), bake(stage, kind)))
+    _, ball, nodes = stage
+    group = bpy.data.node_groups.new("Picture", "ShaderNodeTree")
+    group.interface.new_socket("Colour", in_out="OUTPUT", socket_type="NodeSocketColor")
+    inside = group.nodes.new("ShaderNodeTexNoise")
+    group.links.new(inside.outputs["Color"], group.nodes.new("NodeGroupOutput").inputs[0])
+    picture, glow, added = nodes.new("Group"), nodes.new("Emission"), nodes.new("AddShader")
+    picture.node_tree = group
+    for socket in ("Base Color", "Specular Tint", "Sheen Tint", "Roughness", "Metallic"):
+        nodes.tree.links.new(picture.outputs[0], nodes.principled.inputs[socket])
+    nodes.tree.links.new(picture.outputs[0], glow.inputs["Color"])
+    nodes.tree.links.new(nodes.principled.outputs[0], added.inputs[0])
+    nodes.tree.links.new(glow.outputs[0], added.inputs[1])
+    nodes.tree.links.new(added.outputs[0], nodes.surface)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    instance = SimpleNamespace(object=ball.evaluated_get(depsgraph), matrix_world=ball.matrix_world, is_instance=False)
+    (leaf,) = surface.baked_surface(bpy.context.scene, instance, depsgraph, 0, tmp_path, 64)["leaves"]
+    assert len(baked) == 4
+    sockets = leaf["sockets"]
+    assert sockets["Base Color"] == sockets["Specular Tint"] == sockets["Sheen Tint"] != sockets["Roughness"]
+    assert sockets["Roughness"] == sockets["Metallic"]
+    assert np.load(tmp_path / sockets["Roughness"]).std() > 0.01
 
 
 @pytest.mark.parametrize("is_mixed", [False, True])
