@@ -325,3 +325,21 @@ def test_the_cross_beside_a_fit_leaves_an_export(scene: SimpleNamespace, taken: 
     assert running_export.current is not None
     assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
     assert running_export.current is None
+
+
+def test_a_result_that_goes_into_its_history_ends_no_export(scene: SimpleNamespace, taken: list[object]) -> None:
+    """Of several objects the first may be fitted while others are read."""
+    from blender_addon.result import history
+    from blender_addon.result.job_result import read_job_result
+    from blender_addon.running import running_export
+
+    bpy, log = scene.bpy, []
+    assert bpy.ops.mfo.fit(reference=scene.reference, job_folder=scene.job) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    running_export.start(bpy.context, steps(log, holds_scene=True), taken.append)
+    history.record(bpy.data.materials["Glaze"], read_job_result(Path(scene.job)))
+    bpy.context.view_layer.update()
+    for _ in range(2):
+        log.append("go")
+        running_export._tick()
+    assert taken == ["fit"]
