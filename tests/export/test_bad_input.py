@@ -101,6 +101,11 @@ def endless_lamp(scene: Any, target: Any) -> None:
     add_light("SUN").data.energy = float("inf")
 
 
+def endless_world(scene: Any, target: Any) -> None:
+    add_light("SUN")  # without it the scene has no light
+    world_color(scene, float("nan"))
+
+
 def no_roughness(scene: Any, target: Any) -> None:
     shader = target.active_material.node_tree.nodes["Principled BSDF"]
     shader.inputs["Roughness"].default_value = float("nan")
@@ -117,6 +122,7 @@ LAMP = (
     "The place or a setting of light 'Light' is NaN or infinite: mend the driver, constraint or keyframe that gives "
     "it, or hide the light in renders."
 )
+WORLD = "The colour or strength of the world is NaN or infinite: mend the driver or keyframe that gives it."
 VALUE = "A value of material '{}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number."
 
 CASES: dict[Callable[[Any, Any], None], str] = {
@@ -139,6 +145,7 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     endless_lens: CAMERA,
     lamp_nowhere: LAMP,
     endless_lamp: LAMP,
+    endless_world: WORLD,
     no_roughness: VALUE.format("Target"),
     other_without_colour: VALUE.format("Wall"),
     no_faces: "No face of 'Target' uses its active material slot 1: choose another.",

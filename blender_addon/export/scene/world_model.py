@@ -40,11 +40,18 @@ class World:
 
 
 def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> Element | None:
-    """Return the `<emitter>`, or None if the world is black."""
+    """Return the `<emitter>`, or None if the world is black.
+
+    Raises
+    ------
+    NotFiniteError
+        If its colour is NaN or infinite.
+    """
+    color = rgb("radiance", world.color)
     if not world.is_lit:
         return None
     if world.pixels is None:
-        return add(plugin("emitter", "constant", "world"), rgb("radiance", world.color))
+        return add(plugin("emitter", "constant", "world"), color)
     tinted = world.pixels * world.color.astype(np.float32)
     rotation = np.eye(3) if world.lookup is None else world.lookup
     matrix = np.eye(4)

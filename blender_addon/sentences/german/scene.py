@@ -214,6 +214,7 @@ SCENE = {
     "{} cannot be written to a scene file; numbers must be finite": "{} kann nicht in eine Szenendatei geschrieben werden; Zahlen müssen endlich sein",
     "The place or a setting of the camera is NaN or infinite: mend the driver, constraint or keyframe that gives it.": "Ort oder eine Einstellung der Kamera ist NaN oder unendlich: den Treiber, Constraint oder Keyframe berichtigen, der sie ergibt.",
     "The place or a setting of light '{}' is NaN or infinite: mend the driver, constraint or keyframe that gives it, or hide the light in renders.": "Ort oder eine Einstellung des Lichts '{}' ist NaN oder unendlich: den Treiber, Constraint oder Keyframe berichtigen, der sie ergibt, oder das Licht im Rendering verbergen.",
+    "The colour or strength of the world is NaN or infinite: mend the driver or keyframe that gives it.": "Farbe oder Stärke der Welt ist NaN oder unendlich: den Treiber oder Keyframe berichtigen, der sie ergibt, oder eine Zahl setzen.",
     "A value of material '{}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number.": "Ein Wert von Material '{}' ist NaN oder unendlich: den Treiber oder Keyframe berichtigen, der ihn ergibt, oder eine Zahl setzen.",
     "{} cannot be written: choose a folder you may write to.": "{} kann nicht geschrieben werden: einen Ordner wählen, in den du schreiben darfst.",
     "{} holds other files than a job; choose an empty or a new folder.": "{} enthält andere Dateien als einen Auftrag; einen leeren oder neuen Ordner wählen.",
