@@ -104,7 +104,6 @@ class SceneBakes:
         self._world: tuple[int, bpy.types.World] | None = None
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
-        self._count = 0  # of ids
         self._number: int | BakeError | None = None  # of the request for them, or why there is none
         # those ids, by what bent normals hang on of a place, by object, its data and slot
         self._ids: dict[tuple[str, int, int], dict[Scale, str]] = {}
@@ -141,8 +140,7 @@ class SceneBakes:
             scale = next(iter(known))
         if scale not in known:
             note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
-            self._count += 1
-            identifier = f"baked_{self._count:04d}"
+            identifier = f"baked_{sum(map(len, self._ids.values())) + 1:04d}"
             try:
                 if len(self._surfaces) >= MOST_SURFACES:
                     raise BakeError(f"It would be one of more than {MOST_SURFACES}.")

@@ -47,7 +47,7 @@ def world_element(world: World, save: Callable[[NDArray[np.float32]], str]) -> E
     NotFiniteError
         If its colour is NaN or infinite.
     """
-    color = rgb("radiance", world.color)
+    color = rgb("radiance", world.color)  # also of a picture: NaN would count as black
     if not world.is_lit:
         return None
     if world.pixels is None:

@@ -100,7 +100,7 @@ class ClosureTree(mi.BSDF):
         walking = [leaf for leaf in self.leaves if leaf.material.has_below]
         self.walking = walking[0] if len(walking) == 1 else None
         for leaf in self.leaves:
-            leaf.material.nested = leaf is not self.walking
+            leaf.material.walks = leaf is self.walking
         both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
         components = [leaf.material.flags() for leaf in self.leaves]
         if self.clear:
@@ -152,10 +152,10 @@ class ClosureTree(mi.BSDF):
     def below(self, si: mi.SurfaceInteraction3f, active: Any) -> Below | None:
         """What the view finds below a surface point; None where no light walks there."""
         leaf = self.walking
-        found = None if leaf is None else leaf.material.below(si, active)
-        return (
-            None if leaf is None or found is None else replace(found, weight=found.weight * leaf.weight_at(si, active))
-        )
+        found = leaf.material.below(si, active) if leaf is not None else None
+        if leaf is None or found is None:
+            return None
+        return replace(found, weight=found.weight * leaf.weight_at(si, active))
 
     @property
     def model(self) -> Any:

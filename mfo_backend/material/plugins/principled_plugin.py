@@ -9,7 +9,8 @@ changing such a value later brings the lobe back and compiles anew. `unreachable
 false leaves out directions no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world.
 `filtered` (false) reads what the integrator `cycles_path` puts where no texture of Mitsuba 3.9 looks: the least alpha
 of the microfacet lobes, for Filter Glossy, from `si.duv_dx.x`, and a 1 from `si.duv_dx.y` where it leaves what is below
-the surface to others; one that is `nested` in a `closure_tree` shows its stand-in all the same. `mi.traverse` shows
+the surface to others; a `closure_tree` of which several let light walk there takes that from them, and they show their
+stand-ins all the same. `mi.traverse` shows
 `<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be
 textures of world directions on the camera's side, zero for the mesh's own.
 
@@ -71,7 +72,7 @@ class BlenderPrincipled(mi.BSDF):
         shader = str(props.get("shader", "principled"))
         walks = str(props.get("subsurface_method", "RANDOM_WALK"))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader, walks)
-        self.filtered, self.nested = bool(props.get("filtered", False)), False
+        self.filtered, self.walks = bool(props.get("filtered", False)), True
         self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
@@ -228,7 +229,7 @@ class BlenderPrincipled(mi.BSDF):
         layers = layer_stack(values, wi, self.lobes, self.model)
         if self.filtered:
             layers = layers.blurred(si.duv_dx.x)
-            if layers.subsurface is not None and not self.nested:
+            if layers.subsurface is not None and self.walks:
                 layers = replace(layers, subsurface=layers.subsurface * (1 - si.duv_dx.y))
         return _Surface(layers, si, frame)
 

@@ -15,6 +15,7 @@ noisy for shiny materials, and black in mirrors. Choose the variant before impor
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,7 +39,14 @@ class Crossing:
 
 class Lamp(mi.Emitter):
     """Properties of all lamps: `radiance` (linear Rec.709), `to_world` (it shines along +Z), `camera` (false): whether
-    camera rays see it, `shadow` (true): whether its light casts shadows, and those of `LampPattern`."""
+    camera rays see it, `shadow` (true): whether its light casts shadows, and those of `LampPattern`.
+
+    Each kind has its own `towards`, a unit direction from a point to the lamp for random numbers in [0, 1), and
+    `crossing`, what a line from a point along a unit vector meets.
+    """
+
+    towards: Callable[[mi.Point3f, mi.Point2f], mi.Vector3f]
+    crossing: Callable[[mi.Point3f, mi.Vector3f], Crossing]
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
@@ -51,14 +59,6 @@ class Lamp(mi.Emitter):
     def frame(self, linear: np.ndarray) -> np.ndarray:
         """The space (3, 3) that patterns lie in, of the linear part of `to_world`."""
         return linear
-
-    def towards(self, point: mi.Point3f, u: mi.Point2f) -> mi.Vector3f:
-        """A unit direction from `point` to the lamp for random numbers `u` in [0, 1)."""
-        raise NotImplementedError
-
-    def crossing(self, point: mi.Point3f, direction: mi.Vector3f) -> Crossing:
-        """What a line from `point` along the unit vector `direction` meets."""
-        raise NotImplementedError
 
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True

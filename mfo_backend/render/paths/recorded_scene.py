@@ -238,6 +238,7 @@ class RecordedScene:
             held=self._kept,
             bumped=self._bumped,
             walks=NEAR_WALKS if self._walks else (),
+            mixed=self._mixed,
             light_paths=self.renderer.light_paths,
             samples=2 if self.needs.sampled else 1,
             glows=self._glows,

@@ -131,3 +131,24 @@ def test_one_shader_of_a_mix(
     """Whichever shader is fitted, and whether what light walks below may change."""
     lit(scene)
     same_level(partial(export, fit={"parameters": parameters}), render_cycles, ball(build()))
+
+
+@pytest.mark.parametrize("build", [wax_under_gloss, paint_over_wax])
+def test_a_mix_from_another_camera_is_what_its_own_camera_sees(
+    scene: Any, export: Any, render_cycles: Any, build: Callable[[], Any]
+) -> None:
+    """As it is recorded where a further picture is looked for: from the very place the level is the same."""
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    lit(scene)
+    of_one = partial(export, fit={"parameters": ["Principled BSDF/IOR"]})
+    renderer, _ = renderer_and_cycles(of_one, render_cycles, ball(build()))
+    recorded, levels = RecordedScene(renderer, int(renderer.target_mask().sum())), []
+    sensor = renderer.scene.sensors()[0]
+    for paths in (
+        recorded.record(renderer.start, grid=8, seed=0, near=True),
+        recorded.record_from(sensor, renderer.start, grid=8, seed=0),
+    ):
+        groups = paths.pixel_groups(paths.interior)
+        levels.append(np.asarray(recorded.evaluator(paths, groups)(renderer.start))[:, :, 0].mean(axis=0))
+    np.testing.assert_allclose(levels[1], levels[0], rtol=0.03)  # noise of blue is 1.4 % in each

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Baked surfaces whose normals nodes bend: instances of other sizes, surfaces seen from the side, displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+from xml.etree import ElementTree
+
+import bpy
+import numpy as np
+import pytest
+
+from mfo_backend.scene.image_file import read_image
+from studies.parity.cycles_parity import render_job
+
+from ..scene.test_baked_surfaces import Nodes, at_vertices, attribute, read_ply, stage
+from ..scenes import add_camera, add_light, add_quad, new_material
+
+__all__ = ["stage"]  # a fixture
+
+
+def _instances(ball: Any, *scales: tuple[float, float, float]) -> None:
+    """Put instances of `ball` in its place."""
+    prefab = bpy.data.collections.new("Prefab")
+    prefab.objects.link(ball)
+    bpy.context.scene.collection.objects.unlink(ball)
+    for number, scale in enumerate(scales):
+        empty = bpy.data.objects.new("Instance", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", prefab
+        empty.scale, empty.location.x, empty.rotation_euler.z = scale, 0.3 * number - 1.0, 0.5 * number
+        bpy.context.scene.collection.objects.link(empty)
+
+
+def _bump(nodes: Nodes) -> None:
+    """A height that grows with the object's own z; its slope is 0.5 on a ball of one metre."""
+    separate, bump = nodes.new("SeparateXYZ"), nodes.new("Bump")
+    bump.inputs["Distance"].default_value = 0.5
+    nodes.tree.links.new(nodes.new("TexCoord").outputs["Object"], separate.inputs[0])
+    nodes.tree.links.new(separate.outputs["Z"], bump.inputs["Height"])
+    nodes.tree.links.new(bump.outputs[0], nodes.principled.inputs["Normal"])
+
+
+def _references(report: Any) -> list[str]:
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    refs = [attribute(shape, "ref", "id") for shape in scene.iterfind("shape")]
+    return [each for each in refs if each.startswith("baked")]
+
+
+def test_bumps_of_instances_have_the_slopes_of_each_size(stage: Any, export: Any) -> None:
+    """A height over an object's own z is half as steep on an instance of twice its size; turned ones share a bake."""
+    target, ball, nodes = stage
+    ball.scale, ball.rotation_euler = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+    _bump(nodes)
+    _instances(ball, (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (1.0, 1.0, 1.0), (1.0, 2.0, 1.0))
+    report = export(target)
+    assert _references(report) == ["baked_0001", "baked_0002", "baked_0001", "baked_0003"]
+    scene = ElementTree.parse(report.folder / "scene.xml").getroot()
+    for number, size in ((0, 1.0), (1, 2.0)):
+        name = f"baked_{number + 1:04d}"
+        shape = next(each for each in scene.iterfind("shape") if attribute(each, "ref", "id") == name)
+        positions, uv = read_ply(report.folder / attribute(shape, "string", "value"))
+        bsdf = next(each for each in scene.iterfind("bsdf") if each.get("id") == name)
+        bumped = next(each for each in bsdf.iter("bsdf") if each.get("type") == "normalmap")
+        picture = np.asarray(read_image(report.folder / attribute(bumped, "texture/string", "value")).pixels)
+        outwards = (positions - (0.3 * number - 1.0, 0.0, 0.0)) / (0.5 * size)
+        # along the surface the height changes with the cosine to the axis
+        slope = 0.5 / size * np.sqrt(np.clip(1.0 - outwards[:, 2] ** 2, 0.0, 1.0))
+        found = 2.0 * at_vertices(picture, uv)[:, 2] - 1.0
+        # facets are up to 7.5 degrees off the ball; by the other size it is 0.04
+        assert np.median(np.abs(found - 1.0 / np.hypot(1.0, slope))) < 0.02
+
+
+def test_a_normal_map_on_instances_of_other_sizes_shares_a_bake_and_on_stretched_ones_not(
+    stage: Any, export: Any
+) -> None:
+    target, ball, nodes = stage
+    bent = nodes.new("NormalMap")
+    bent.inputs["Color"].default_value = (0.7, 0.5, 0.9, 1.0)
+    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    nodes.tree.links.new(bent.outputs[0], nodes.principled.inputs["Normal"])
+    _instances(ball, (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (1.0, 2.0, 1.0), (-1.0, 1.0, 1.0))
+    assert _references(export(target)) == ["baked_0001", "baked_0001", "baked_0002", "baked_0003"]
+
+
+def test_bumps_on_instances_of_many_sizes_are_baked_for_some_and_named(stage: Any, export: Any) -> None:
+    from blender_addon.export.scene.scene_bakes import MOST_SCALES
+
+    target, ball, nodes = stage
+    _bump(nodes)
+    _instances(ball, *((0.5 + 0.1 * number,) * 3 for number in range(MOST_SCALES + 2)))
+    report = export(target)
+    assert _references(report) == [f"baked_{number + 1:04d}" for number in range(MOST_SCALES)] + ["baked_0001"] * 2
+    said = f"beyond {MOST_SCALES} sizes all have those of the first."
+    assert [said in note for note in report.notes].count(True) == 1
+
+
+@pytest.mark.parametrize("lean", [-0.8, 0.8], ids=["towards the camera", "away from the camera"])
+def test_a_leaning_normal_on_a_surface_that_is_seen_from_the_side_shades_as_in_cycles(
+    lean: float, scene: Any, export: Any, render_cycles: Callable[[], np.ndarray]
+) -> None:
+    """Diffuse light falls on a normal as it is, also on one that the camera does not see; reflections bend it."""
+    add_light("SUN", rotation=(-0.6, 0.0, 0.0), energy=3.0)
+    add_camera("PERSP", (0.0, -4.0, 0.8), (1.374, 0.0, 0.0))
+    target = add_quad("Target", 0.1, 0.1, new_material("Target"))
+    floor = add_quad("Floor", 3.0, 0.0, new_material("Floor"))
+    nodes = Nodes(floor.data.materials[0])
+    normal = nodes.new("CombineXYZ")
+    normal.inputs["Y"].default_value, normal.inputs["Z"].default_value = lean, 1.0
+    nodes.tree.links.new(normal.outputs[0], nodes.principled.inputs["Normal"])
+    expected = render_cycles()
+    job = export(target, reference=bpy.data.images.new("Any", 32, 32)).folder
+    found = np.mean(render_job(job, 64, "roughness"), axis=0)
+    lit = expected.min(axis=-1) > 0.05
+    assert lit.sum() > 50
+    assert found[lit].mean() == pytest.approx(expected[lit].mean(), rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["BUMP", "a Bump node"])
+def test_a_displacement_by_bump_takes_the_place_of_the_smooth_normal_and_a_bump_lies_on_it(
+    method: str, scene: Any, export: Any, render_cycles: Callable[[], np.ndarray]
+) -> None:
+    """A matt slope under a sun that grazes the floor: only the Bump's has the shadows of bumps, a seventh of it."""
+    add_light("SUN", rotation=(1.2, 0.0, 0.0), energy=3.0)
+    add_camera("ORTHO", ortho_scale=1.0)
+    target = add_quad("Target", 0.1, 0.1, new_material("Target"))
+    floor = add_quad("Floor", 3.0, 0.0, new_material("Floor", Roughness=1.0, Specular_IOR_Level=0.0))
+    nodes = Nodes(floor.data.materials[0])
+    separate = nodes.new("SeparateXYZ")
+    nodes.tree.links.new(nodes.new("TexCoord").outputs["Object"], separate.inputs[0])
+    if method == "BUMP":
+        moved = nodes.new("Displacement")
+        moved.inputs["Midlevel"].default_value, moved.inputs["Scale"].default_value = 0.0, 1.0
+        output = nodes.tree.get_output_node("CYCLES").inputs["Displacement"]
+        floor.data.materials[0].displacement_method = "BUMP"
+        height, normal, to = moved.inputs["Height"], moved.outputs[0], output
+    else:
+        bump = nodes.new("Bump")
+        bump.inputs["Distance"].default_value = 1.0
+        height, normal, to = bump.inputs["Height"], bump.outputs[0], nodes.principled.inputs["Normal"]
+    nodes.tree.links.new(separate.outputs["Y"], height)
+    nodes.tree.links.new(normal, to)
+    expected = render_cycles()
+    job = export(target, reference=bpy.data.images.new("Any", 32, 32)).folder
+    found = np.mean(render_job(job, 64, "roughness"), axis=0)
+    assert expected.mean() > 0.5  # the slope faces the sun; flat it is 0.28
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.01)
