@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_PLACE, OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from ..export.nodes.displacement import bends_normals, unbent
-from ..export.nodes.leaf_kinds import EMISSION, is_shader
+from ..export.nodes.leaf_kinds import EMISSION, KINDS, distribution_of, is_shader, only_nearest, walks_of
 from ..probe.closure_tree import ClosureTree, Leaf, Value
 from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output
@@ -86,9 +86,8 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     reflecting = [leaf for leaf in closures.leaves if is_shader(leaf.node) and leaf.node.bl_idname != EMISSION]
     for leaf in reflecting:
         found: dict[str, Any] = {"kind": leaf.node.bl_idname, "label": leaf.node.bl_label, "sockets": {}}
-        for name in ("distribution", "subsurface_method", "fresnel_type"):
-            if hasattr(leaf.node, name):
-                found[name] = getattr(leaf.node, name)
+        found |= {"distribution": distribution_of(leaf.node), "walks": walks_of(leaf.node)}
+        found["nearest"] = leaf.node.bl_idname in KINDS and only_nearest(leaf.node)
         asked.append((found, "weight", leaf.weight, False))
         for socket in leaf.node.inputs:
             if socket.name not in SKIPPED and socket.type != "SHADER" and socket.enabled:

@@ -24,6 +24,7 @@ from .materials.chosen_leaves import chosen_mix_values, name_shares, with_mix_va
 from .materials.chosen_values import COPY, by_graph, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
+from .materials.read_material import with_default_tangent
 from .materials.wanted_values import WantedValues, fits_of_each, wanted_values
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
@@ -108,7 +109,7 @@ def partial_export(
     wanted = [wanted_values(each, own, findings) for each, own in zip(fitted, asked, strict=True)]
     size = size_of(reference, upright=upright)
     region = pictured_region(context.scene.render, size)
-    with probe_for(fitted, always=any(each.values for each in wanted)) as probe:
+    with probe_for(fitted, always=any(each.values or each.turns for each in wanted)) as probe:
         # names that the user chose are those of the leaf that the panel shows
         by_share = isinstance(fit.get("parameters", "all"), str)
         if leaves is None:
@@ -215,7 +216,8 @@ def _read_values(
     assert target is not None  # it was read
     if unwritable(material):
         findings.note(f"The values cannot be applied as it is. {unwritable(material)}", explains=False)
-    data.materials[bsdf] = by_graph(data.materials[bsdf], target, wanted.values, findings)
+    described = with_default_tangent(data.materials[bsdf], is_fitted=wanted.turns)
+    data.materials[bsdf] = by_graph(described, target, wanted.values, findings)
     findings.raise_first()
     chosen = chosen_mix_values(material, target, wanted.of_mix, wanted.fit, findings)
     data.materials[bsdf] = with_mix_values(data.materials[bsdf], target, chosen)

@@ -30,7 +30,8 @@ from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
 BUMP = "ShaderNodeBump"
-DIRECTIONS = (SHADING_NORMAL, "Normal", "Coat Normal", "Tangent")
+TANGENT = "Tangent"
+DIRECTIONS = (SHADING_NORMAL, "Normal", "Coat Normal", TANGENT)
 NOT_SEEN = "The camera does not see '{obj}': move it into the frame."
 # Cycles says so on its stderr alone, and shows nothing
 TOO_MANY = "The nodes of '{material}' are too many for Cycles to evaluate at once: leave nodes out."
@@ -298,6 +299,8 @@ def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[st
             continue
         socket = shader.inputs[name]
         source = source_of(socket)
+        if source is None and name == TANGENT:  # Cycles' own: about the object's Z axis, as a new Tangent node has it
+            source = inner.nodes.new("ShaderNodeTangent").outputs[0]
         if source is None:
             raise ProbeRequestError(f"{name} of '{shader.name}' has no link any more.")
         kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type

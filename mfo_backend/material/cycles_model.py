@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..types.errors import BadInputError
+from .lobes.microfacet import ASHIKHMIN_SHIRLEY, BECKMANN, GGX, Microfacets
 
-DISTRIBUTIONS = ("MULTI_GGX", "GGX")
+# of microfacets, Blender's words; the last is that of the fibres of a Sheen BSDF
+DISTRIBUTIONS = ("MULTI_GGX", "GGX", "BECKMANN", "ASHIKHMIN_SHIRLEY", "ASHIKHMIN")
 # nodes whose lobes are those of the Principled BSDF but for their Fresnel terms and tints
 SHADERS = ("principled", "glossy", "glass", "refraction", "translucent", "subsurface")
 
@@ -21,6 +23,10 @@ class CyclesModel:
     ----------
     multiple_scattering
         Energy compensation of metal, specular and glass, the node's "Multiscatter GGX".
+    facets
+        The distribution of the microfacets of metal, specular and glass.
+    velvet
+        Sheen is Ashikhmin's velvet, the other setting of a Sheen BSDF.
     coat_compensation
         The coat is compensated and layered by its tabulated albedo (from 4.5), else by the Fresnel term at the view.
     diffuse_roughness
@@ -45,6 +51,8 @@ class CyclesModel:
     """
 
     multiple_scattering: bool = True
+    facets: Microfacets = GGX
+    velvet: bool = False
     coat_compensation: bool = True
     diffuse_roughness: bool = True
     film_fourier: bool = True
@@ -72,11 +80,13 @@ def cycles_model(
     if major_minor < (4, 2):
         raise BadInputError(f"Blender {'.'.join(map(str, version))} has another Principled BSDF: use 4.2 or newer.")
     if distribution not in DISTRIBUTIONS:
-        raise BadInputError(f"Unknown distribution {distribution!r}: choose {' or '.join(DISTRIBUTIONS)}.")
+        raise BadInputError(f"Unknown distribution {distribution!r}: choose one of {', '.join(DISTRIBUTIONS)}.")
     if shader not in SHADERS:
         raise BadInputError(f"Unknown shader {shader!r}: choose one of {', '.join(SHADERS)}.")
     return CyclesModel(
         multiple_scattering=distribution == "MULTI_GGX",
+        facets={"BECKMANN": BECKMANN, "ASHIKHMIN_SHIRLEY": ASHIKHMIN_SHIRLEY}.get(distribution, GGX),
+        velvet=distribution == "ASHIKHMIN",
         coat_compensation=major_minor >= (4, 5),
         diffuse_roughness=major_minor >= (4, 3),
         film_fourier=major_minor >= (5, 0),

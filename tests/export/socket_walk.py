@@ -20,7 +20,8 @@ if __name__ == "__main__":
 from blender_addon.export.findings import Findings
 from blender_addon.export.materials.material_elements import bsdf_element
 from blender_addon.export.materials.node_graph import names_by_graph
-from blender_addon.export.materials.read_material import read_context, read_target
+from blender_addon.export.materials.read_context import read_context
+from blender_addon.export.materials.read_material import read_target
 from blender_addon.export.nodes.target_shader import target_shader
 from mfo_backend.material.principled.principled_parameters import PARAMETER_OF_SOCKET
 

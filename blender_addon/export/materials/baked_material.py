@@ -14,49 +14,9 @@ from numpy.typing import NDArray
 from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..material_model import Material, Part, Socket, Texture
+from ..nodes.leaf_kinds import KINDS, TRANSPARENT
+from .leaf_sockets import BELOW, conductor_colors
 
-# closures with an equal: node -> (our model, {our socket: the node's}, constants of ours)
-EXACT = {
-    "ShaderNodeBsdfPrincipled": ("principled", {}, {}),
-    "ShaderNodeBsdfTransparent": ("null", {}, {}),
-    "ShaderNodeBsdfDiffuse": (
-        "principled",
-        {"Base Color": "Color", "Diffuse Roughness": "Roughness"},
-        {"Specular IOR Level": 0.0, "Roughness": 1.0},
-    ),
-    "ShaderNodeBsdfSheen": (
-        "principled",
-        {"Sheen Tint": "Color", "Sheen Roughness": "Roughness"},
-        {"Base Color": (0.0, 0.0, 0.0), "Sheen Weight": 1.0, "Specular IOR Level": 0.0, "Roughness": 1.0},
-    ),
-    "ShaderNodeBsdfMetallic": (
-        "principled",
-        {"Base Color": "Base Color", "Specular Tint": "Edge Tint", "Roughness": "Roughness"},
-        {"Metallic": 1.0},
-    ),
-}
-# and those whose nearest model is something else
-_MIRROR = ("principled", {"Base Color": "Color", "Specular Tint": "Color", "Roughness": "Roughness"}, {"Metallic": 1.0})
-_MATTE = ("diffuse", {"Base Color": "Color"}, {})
-NEAREST = {
-    "ShaderNodeBsdfGlossy": _MIRROR,
-    "ShaderNodeBsdfAnisotropic": _MIRROR,
-    "ShaderNodeBsdfGlass": (
-        "principled",
-        {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"},
-        {"Transmission Weight": 1.0},
-    ),
-    "ShaderNodeBsdfRefraction": (
-        "principled",
-        {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"},
-        {"Transmission Weight": 1.0},
-    ),
-    "ShaderNodeSubsurfaceScattering": _MATTE,
-    "ShaderNodeBsdfTranslucent": _MATTE,
-    "ShaderNodeBsdfToon": _MATTE,
-    "ShaderNodeBsdfHair": _MATTE,
-    "ShaderNodeBsdfHairPrincipled": _MATTE,
-}
 EMISSION = ("Emission Color", "Emission Strength")
 TURNED = ("Anisotropic", "Anisotropy")  # sockets that turn highlights along a tangent
 WHITE = 1.0 - 1e-3  # a Transparent BSDF of this colour or brighter counts as white
@@ -109,34 +69,40 @@ class Baked:
         return found | {identifier: Material(name, "mix", emission, parts=tuple(parts))}
 
     def _leaf(self, leaf: Mapping[str, Any], name: str, findings: Findings) -> Material:
-        kind, given = leaf["kind"], leaf["sockets"]
-        known = EXACT.get(kind) or NEAREST.get(kind)
-        if known is None:
+        given = leaf["sockets"]
+        if leaf["kind"] == TRANSPARENT:
+            if np.min(self._socket(given["Color"]).value) < WHITE:
+                findings.note(f"Material '{name}': Transparent BSDF is taken for white.")
+            return Material(name, "null")
+        kind = KINDS.get(leaf["kind"])
+        if kind is None:
             findings.note(f"Material '{name}': {leaf['label']} is shown as black.")
             return Material(name, "diffuse", {"Base Color": BLACK})
-        if kind in NEAREST or leaf.get("fresnel_type") == "PHYSICAL_CONDUCTOR":
+        if leaf["nearest"]:
             findings.note(f"Material '{name}': {leaf['label']} is approximated by its nearest model.")
-        model, renamed, constants = known
-        if model == "principled" and not renamed:
-            sockets = {ours: self._socket(value) for ours, value in given.items()}
-            sockets |= {"Emission Strength": Socket(0.0)} if "Emission Strength" in sockets else {}
-        else:
-            sockets = {ours: Socket(value) for ours, value in constants.items()}
-            sockets |= {ours: self._socket(given[theirs]) for ours, theirs in renamed.items() if theirs in given}
-        if kind == "ShaderNodeBsdfTransparent" and np.min(self._socket(given["Color"]).value) < WHITE:
-            findings.note(f"Material '{name}': Transparent BSDF is taken for white.")
+        sockets = {ours: Socket(value) for ours, value in kind.held.items()}
+        names = {ours: ours for ours in given} if kind.names is None else kind.names
+        sockets |= {ours: self._socket(given[theirs]) for ours, theirs in names.items() if theirs in given}
+        if leaf["kind"] == BELOW:
+            sockets |= {f"Subsurface {own}": self._socket(given[own]) for own in ("IOR", "Anisotropy") if own in given}
+        if "Extinction" in given:
+            index, extinction = (self._array(given[own]) for own in ("IOR", "Extinction"))
+            colours = zip(("Base Color", "Specular Tint"), conductor_colors(index, extinction), strict=True)
+            sockets |= {ours: Socket(c.mean(axis=(0, 1)).tolist(), True, _picture(c)) for ours, c in colours}
+        if "Emission Strength" in sockets:
+            sockets["Emission Strength"] = Socket(0.0)
         normal = None
-        if "normal" in leaf and model != "null":
+        if "normal" in leaf:
             normal = _texture((0.5 * np.load(self._folder / leaf["normal"]) + 0.5).astype(np.float32))
-        distribution = leaf.get("distribution") or ""
         return Material(
             name,
-            model,
+            "principled",
             sockets,
-            distribution if distribution in ("GGX", "MULTI_GGX") else "MULTI_GGX",
-            leaf.get("subsurface_method") or "RANDOM_WALK",
+            leaf["distribution"],
+            leaf["walks"],
             normal=normal,
             displaced=normal is not None and bool(leaf["displaced"]),
+            shader=kind.shader,
         )
 
     def _emission(self) -> dict[str, Socket]:
@@ -158,6 +124,11 @@ class Baked:
         if isinstance(value, list):
             return Socket([float(number) for number in to_rec709(value)])
         return Socket(value)
+
+    def _array(self, value: Any) -> NDArray[np.float64]:
+        """A value per channel, (height, width, 3), one of them where it is the same everywhere."""
+        found = np.load(self._folder / value) if isinstance(value, str) else np.reshape(value, (1, 1, -1))
+        return np.broadcast_to(found, (*found.shape[:2], 3)).astype(np.float64)
 
     def _weight(self, value: Any) -> NDArray[np.float32]:
         if isinstance(value, str):
@@ -186,6 +157,10 @@ class Baked:
         if self._answer["paths"]:
             asked = ", ".join(self._answer["paths"])
             findings.note(f"Material '{name}' asks Light Path for {asked}: the fit has it as diffuse rays see it.")
+
+
+def _picture(values: NDArray[np.float64]) -> Texture | None:
+    return None if values.shape[:2] == (1, 1) else _texture(np.ascontiguousarray(values, dtype=np.float32))
 
 
 def _texture(pixels: NDArray[np.float32]) -> Texture:

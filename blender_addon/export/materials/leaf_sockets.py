@@ -1,22 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What shader nodes other than the Principled BSDF say in words of their own, as sockets of a Principled BSDF."""
+"""Sockets of shader nodes as those of a Principled BSDF: their links, and what other nodes say in their own words."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..findings import Findings
+from ...versions import DIFFUSE, has_diffuse_roughness
+from ..findings import Findings, Fix
 from ..material_model import Socket
+from ..nodes.graph_findings import graph_problem
 from ..nodes.leaf_kinds import is_shader, sockets_of
-from ..nodes.shader_graph import plain_value
+from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket
+from ..nodes.target_shader import Place
 
 GLOSSY, BELOW = "ShaderNodeBsdfAnisotropic", "ShaderNodeSubsurfaceScattering"
 
 
 def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
     """What a node other than the Principled BSDF says in words of its own: held."""
+    if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
+        rough = node.inputs["Roughness"]
+        if rough.is_linked or plain_value(rough) > 0.0:
+            findings.note(f"Material '{material}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.")
+        return {"Diffuse Roughness": Socket(0.0, True)}
     if node.bl_idname == GLOSSY:
         return _stretched(material, node, findings)
     if node.bl_idname == BELOW:
@@ -55,10 +65,15 @@ def conductor_sockets(node: bpy.types.Node) -> dict[str, Socket]:
     if getattr(node, "fresnel_type", "F82") != "PHYSICAL_CONDUCTOR":
         return {}
     n, k = (np.array(node.inputs[name].default_value, dtype=np.float64)[:3] for name in ("IOR", "Extinction"))
+    f0, tint = conductor_colors(n, k)
+    return {"Base Color": Socket(f0.tolist(), True), "Specular Tint": Socket(tint.tolist(), True)}
+
+
+def conductor_colors(n: NDArray[np.float64], k: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Colour and edge tint, in the shape of `n`, of a metal by index and extinction."""
     f0, edge = (_conductor_fresnel(c, n, k) for c in (1.0, 1.0 / 7.0))
     plain = f0 + (1.0 - f0) * (6.0 / 7.0) ** 5
-    tint = np.clip(edge / np.maximum(plain, 1e-6), 0.0, 1.0)
-    return {"Base Color": Socket(f0.tolist(), True), "Specular Tint": Socket(tint.tolist(), True)}
+    return f0, np.clip(edge / np.maximum(plain, 1e-6), 0.0, 1.0)
 
 
 def _conductor_fresnel(c: float, n: NDArray[np.float64], k: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -70,12 +85,6 @@ def _conductor_fresnel(c: float, n: NDArray[np.float64], k: NDArray[np.float64])
     return 0.5 * (s + p)
 
 
-def distribution_of(node: bpy.types.Node) -> str:
-    """The microfacet distribution of a node, or the one that stands in for it."""
-    found = getattr(node, "distribution", "")
-    return found if found in ("GGX", "MULTI_GGX") else "GGX"
-
-
 def note_black(material: str, name: str, node: bpy.types.Node, findings: Findings) -> None:
     """Say that a part of a mix, of this name, has no model."""
     if is_shader(node):
@@ -85,3 +94,38 @@ def note_black(material: str, name: str, node: bpy.types.Node, findings: Finding
         f"Material '{material}': '{name}' ({node.bl_label}) is a colour in the place of a shader, which shines in "
         "Cycles and is held as black: link an Emission between them."
     )
+
+
+def is_uv_tangent(node: bpy.types.Node) -> bool:
+    """Whether a node gives the tangent of the object's active UV map."""
+    return node.bl_idname == "ShaderNodeTangent" and node.direction_type == "UV_MAP" and not node.uv_map
+
+
+def read_value(name: str, place: Place, material: str, is_target: bool, findings: Findings) -> Socket:
+    """A socket and what is linked to it; what no picture can say Cycles evaluates, of the target, or is named."""
+    try:
+        read = read_socket(place.socket)
+        if is_target:
+            refuse_link(name, place, material, findings, is_copied=False)
+            if place.socket.is_linked and not read.linked:  # by a link that Cycles leaves out: nothing is written here
+                return replace(read, linked=True)
+        return read
+    except UnsupportedNodeError as problem:
+        if is_target:
+            refuse_link(name, place, material, findings, is_copied=True)
+        else:
+            findings.note(
+                f"{name} of material '{material}' is linked to {problem}, which cannot be exported; the "
+                "socket's own value is used."
+            )
+        return Socket(plain_value(place.socket), True, by_graph=is_target)
+
+
+def refuse_link(name: str, place: Place, material: str, findings: Findings, *, is_copied: bool) -> None:
+    """An error where Cycles could not evaluate what feeds a socket of the target."""
+    problem = graph_problem(place.socket, groups=place.groups, is_copied=is_copied)
+    if problem is not None:
+        findings.error(
+            f"{name} of material '{material}' is linked to {problem}: mend or unlink it.",
+            Fix("unlink", name),
+        )

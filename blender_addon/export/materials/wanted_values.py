@@ -16,6 +16,9 @@ from ..nodes.target_shader import target_shader
 from .chosen_leaves import named_mix_values
 from .chosen_values import chosen_graph_values
 
+# as Principled, Metallic and the backend call them
+_TURNING = ("anisotropic", "anisotropic_rotation", "anisotropy", "rotation")
+
 
 @dataclass(frozen=True)
 class WantedValues:
@@ -25,6 +28,12 @@ class WantedValues:
     values: list[GraphValue]
     of_mix: list[str]
     fit: dict[str, Any]
+
+    @property
+    def turns(self) -> bool:
+        """Whether names of the fit turn highlights along a tangent."""
+        asked = self.fit.get("parameters", "all")
+        return not isinstance(asked, str) and any(plain_name(name) in _TURNING for name in map(str, asked))
 
 
 def wanted_values(fitted: FittedSlot, fit: dict[str, Any], findings: Findings, leaf: str | None = None) -> WantedValues:

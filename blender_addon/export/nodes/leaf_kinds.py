@@ -41,8 +41,6 @@ class LeafKind:
         Settings of the node that the model holds, by their name; others are shown as the first.
     nearest
         Whether the model is only the nearest, whatever the settings.
-    distributions
-        Microfacet distributions that the model holds, of nodes that have them; others are shown as GGX.
     """
 
     names: Mapping[str, str] | None = None
@@ -50,16 +48,12 @@ class LeafKind:
     shader: str = "principled"
     settings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     nearest: bool = False
-    distributions: tuple[str, ...] = ()
 
 
-_GGX = ("GGX", "MULTI_GGX")
 KINDS: dict[str, LeafKind] = {
     PRINCIPLED: LeafKind(),
     DIFFUSE: LeafKind({"Base Color": "Color", "Diffuse Roughness": "Roughness"}, WITHOUT_SPECULAR),
-    "ShaderNodeBsdfAnisotropic": LeafKind(
-        {"Base Color": "Color", "Roughness": "Roughness"}, _METAL, "glossy", distributions=_GGX
-    ),
+    "ShaderNodeBsdfAnisotropic": LeafKind({"Base Color": "Color", "Roughness": "Roughness"}, _METAL, "glossy"),
     "ShaderNodeBsdfMetallic": LeafKind(
         {
             "Base Color": "Base Color",
@@ -71,15 +65,13 @@ KINDS: dict[str, LeafKind] = {
         },
         _METAL,
         settings={"fresnel_type": ("F82",)},
-        distributions=_GGX,
     ),
     "ShaderNodeBsdfSheen": LeafKind(
         {"Sheen Tint": "Color", "Sheen Roughness": "Roughness"},
         {"Base Color": [0.0, 0.0, 0.0], "Sheen Weight": 1.0, **WITHOUT_SPECULAR},
-        settings={"distribution": ("MICROFIBER",)},
     ),
-    "ShaderNodeBsdfGlass": LeafKind({**_CLEAR, **_FILM}, _GLASS, "glass", distributions=_GGX),
-    "ShaderNodeBsdfRefraction": LeafKind(_CLEAR, _GLASS, "refraction", distributions=("GGX",)),
+    "ShaderNodeBsdfGlass": LeafKind({**_CLEAR, **_FILM}, _GLASS, "glass"),
+    "ShaderNodeBsdfRefraction": LeafKind(_CLEAR, _GLASS, "refraction"),
     "ShaderNodeBsdfTranslucent": LeafKind(_MATTE, {"Metallic": 0.0, "Alpha": 1.0}, "translucent"),
     "ShaderNodeSubsurfaceScattering": LeafKind(
         {
@@ -132,8 +124,18 @@ def why_not_fitted(node: bpy.types.Node) -> str | None:
 def only_nearest(node: bpy.types.Node) -> bool:
     """Whether a node of a known kind is held as a model that is only the nearest."""
     kind = KINDS[node.bl_idname]
-    other = kind.distributions and node.distribution not in kind.distributions
-    return kind.nearest or bool(other) or _unknown_setting(node, kind) is not None
+    return kind.nearest or _unknown_setting(node, kind) is not None
+
+
+def distribution_of(node: bpy.types.Node) -> str:
+    """The distribution of a node's microfacets or, of velvet, of its fibres; that of other lobes counts for nothing."""
+    found = getattr(node, "distribution", "")
+    return "GGX" if found in ("", "MICROFIBER") else found
+
+
+def walks_of(node: bpy.types.Node) -> str:
+    """How light goes below the surface of a shader node, by the Principled BSDF's words."""
+    return getattr(node, "subsurface_method", None) or getattr(node, "falloff", "RANDOM_WALK")
 
 
 def sockets_of(node: bpy.types.Node) -> dict[str, bpy.types.NodeSocket]:

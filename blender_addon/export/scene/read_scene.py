@@ -27,7 +27,8 @@ from ..findings import Findings, Fix
 from ..fitted_slot import FittedSlot
 from ..lights.read_light import read_light
 from ..material_model import Material, grey
-from ..materials.read_material import needs_bake, note_volume, read_context, read_target
+from ..materials.read_context import needs_bake, read_context
+from ..materials.read_material import note_volume, read_target
 from ..meshes.coincident import shared_faces
 from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count

@@ -29,7 +29,7 @@ from ..lights.lamp_tables import LampTables
 from ..lights.light_model import Light
 from ..material_model import grey
 from ..materials.baked_material import Baked
-from ..materials.read_material import read_context
+from ..materials.read_context import read_context
 from ..meshes.mesh_arrays import CornerMesh, world_mesh
 from ..meshes.read_mesh import material_of_slot
 from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for

@@ -163,7 +163,6 @@ SCENE = {
     "Material '{}': {}": "Matériau '{}' : {}",
     "Material '{}': {} depend on the view; the fit has them as the camera sees them.": "Matériau '{}' : {} dépendent de la vue ; l'ajustement les a comme la caméra les voit.",
     "Material '{}': {} has no counterpart in Mitsuba's principled and is missing in a fit with the model mitsuba_principled.": "Matériau '{}' : {} n'a pas d'équivalent dans le principled de Mitsuba et manque à un ajustement avec le modèle mitsuba_principled.",
-    "Material '{}': {} is approximated by its closest simple equivalent.": "Matériau '{}' : {} est approché par son équivalent simple le plus proche.",
     "Material '{}': {} is approximated by its nearest model.": "Matériau '{}' : {} est approché par son modèle le plus proche.",
     "'{}' is a node, not a value: name its values, as '{}'.": "'{}' est un nœud, pas une valeur : nommer ses valeurs, comme '{}'.",
     "Material '{}': {} is fitted as its nearest model.": "Matériau '{}' : {} est ajusté comme son modèle le plus proche.",

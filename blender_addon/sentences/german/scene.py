@@ -164,7 +164,6 @@ SCENE = {
     "Material '{}': {}": "Material '{}': {}",
     "Material '{}': {} depend on the view; the fit has them as the camera sees them.": "Material '{}': {} hängen vom Blick ab; die Anpassung hat sie, wie die Kamera sie sieht.",
     "Material '{}': {} has no counterpart in Mitsuba's principled and is missing in a fit with the model mitsuba_principled.": "Material '{}': {} hat kein Gegenstück in Mitsubas principled und fehlt in einer Anpassung mit dem Modell mitsuba_principled.",
-    "Material '{}': {} is approximated by its closest simple equivalent.": "Material '{}': {} wird durch das nächste einfache Gegenstück angenähert.",
     "Material '{}': {} is approximated by its nearest model.": "Material '{}': {} wird durch sein nächstes Modell angenähert.",
     "'{}' is a node, not a value: name its values, as '{}'.": "'{}' ist ein Node, kein Wert: seine Werte nennen, wie '{}'.",
     "Material '{}': {} is fitted as its nearest model.": "Material '{}': {} wird als sein nächstes Modell angepasst.",

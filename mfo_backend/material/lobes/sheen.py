@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sheen: a layer of fibres as one linearly transformed cosine (Zeltner, Burley, Chiang 2022)."""
+"""Sheen: a layer of fibres as one linearly transformed cosine (Zeltner, Burley, Chiang 2022), or Ashikhmin's velvet."""
 
 from __future__ import annotations
 
@@ -21,18 +21,53 @@ class SheenLobe:
     sin_phi: Any
 
     def value(self, wo: Any) -> Any:
-        """Normalised lobe times cosine at `wo`; integrates to 1 over the hemisphere, so it is its own density."""
+        """Normalised lobe times cosine at `wo`; integrates to 1 over the hemisphere."""
         x = self.cos_phi * wo.x + self.sin_phi * wo.y
         y = self.cos_phi * wo.y - self.sin_phi * wo.x
         z = dr.maximum(wo.z, 0)
         q = dr.square(self.a * x + self.b * z) + dr.square(self.a * y) + dr.square(z)
         return z / dr.pi * dr.square(self.a / dr.maximum(q, 1e-12))
 
+    def pdf(self, wo: Any) -> Any:
+        """Density of `sample` per solid angle."""
+        return self.value(wo)
+
     def sample(self, cosine_direction: Any) -> Any:
         """A direction of the lobe from a cosine-distributed one."""
         w = cosine_direction
         x, y = (w.x - self.b * w.z) / self.a, w.y / self.a
         return dr.normalize(type(w)(self.cos_phi * x - self.sin_phi * y, self.sin_phi * x + self.cos_phi * y, w.z))
+
+
+@dataclass(frozen=True)
+class VelvetLobe:
+    """The velvet of M. Ashikhmin, "Distribution-based BRDFs" (2007), with the Gaussian normals and masking of Cycles.
+
+    It stands alone in a node, so that its `albedo`, which lies over nothing, is left at 1.
+    """
+
+    wi: Any
+    sigma: Any
+    albedo: Any = 1.0
+
+    def value(self, wo: Any) -> Any:
+        """D G / (4 mu) at `wo` above the surface, the cosine included."""
+        h = dr.normalize(self.wi + wo)
+        cosine = dr.maximum(dr.dot(self.wi, h), 1e-5)
+        sin2 = dr.maximum(dr.square(h.x) + dr.square(h.y), 1e-7)
+        inverse = dr.rcp(dr.square(dr.maximum(self.sigma, 0.01)))
+        normals = dr.exp(-dr.square(h.z) / sin2 * inverse) * inverse / (dr.pi * dr.square(sin2))
+        masking = dr.minimum(1, 2 * h.z / cosine * dr.minimum(self.wi.z, wo.z))
+        value = normals * masking / (4 * dr.maximum(self.wi.z, 1e-7))
+        return dr.select((wo.z > 0) & (h.z < 1 - 1e-5), value, 0)
+
+    def pdf(self, wo: Any) -> Any:
+        """Density of `sample` per solid angle."""
+        return dr.maximum(wo.z, 0) / dr.pi
+
+    def sample(self, cosine_direction: Any) -> Any:
+        """That direction: no factor of the lobe is larger than what masking leaves of the cosine."""
+        return cosine_direction
 
 
 def sheen_lobe(wi: Any, roughness: Any) -> SheenLobe:

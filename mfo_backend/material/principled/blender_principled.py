@@ -16,7 +16,7 @@ from ..arrays import dual as dr
 from ..cycles_model import CyclesModel
 from ..lobes.diffuse import lambert, oren_nayar
 from ..lobes.fresnel import dielectric
-from ..lobes.microfacet import density, reflection, smith_lambda
+from ..lobes.microfacet import reflection
 from .bumped_normals import BumpedNormals, about
 from .layers import Layers, layer_stack
 from .needed_lobes import ALL_LOBES, Lobes
@@ -110,7 +110,7 @@ def _microfacets(layers: Layers, wo: Any, half: Half) -> Any:
         fresnel += layers.metal * layers.metal_fresnel(c)
     if layers.specular is not None and layers.specular_fresnel is not None:
         fresnel += layers.specular * layers.specular_fresnel(c)
-    return fresnel * reflection(layers.wi, wo, h, layers.ax, layers.ay)
+    return fresnel * reflection(layers.wi, wo, h, layers.ax, layers.ay, layers.facets)
 
 
 def _coat(layers: Layers, wi: Any, wo: Any, half: Half) -> Any:
@@ -123,7 +123,7 @@ def _glass_reflection(layers: Layers, wo: Any, half: Half) -> Any:
     if layers.glass_fresnel is None:
         return 0
     h, c = half
-    lobe = reflection(layers.wi, wo, h, layers.glass_alpha, layers.glass_alpha)
+    lobe = reflection(layers.wi, wo, h, layers.glass_alpha, layers.glass_alpha, layers.facets)
     return layers.glass * layers.glass_reflected * layers.glass_fresnel(c) * lobe
 
 
@@ -164,8 +164,9 @@ def refracted(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     wi, alpha = layers.wi, layers.glass_alpha
     h, jacobian, possible = refraction_normal(layers, wo)
     c = dr.abs(dr.dot(wi, h))
-    g2 = dr.rcp(1 + smith_lambda(wi, alpha, alpha) + smith_lambda(wo, alpha, alpha))
-    lobe = density(h, alpha, alpha) * g2 * c * jacobian / dr.maximum(wi.z, 1e-7)
+    facets = layers.facets
+    lobe = facets.density(h, alpha, alpha) * facets.seen(wi, wo, h, alpha, alpha)
+    lobe *= c * jacobian / dr.maximum(wi.z, 1e-7)
     counted = (wo.z < 0) & (wi.z > 0)
     return dr.select(
         counted & possible if reachable_only else counted,

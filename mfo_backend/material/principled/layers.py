@@ -26,7 +26,8 @@ from ..lobes.fresnel import (
     normal_incidence,
 )
 from ..lobes.fresnel_term import ConstantTerm, DielectricTerm, MetalTerm
-from ..lobes.sheen import SheenLobe, sheen_lobe
+from ..lobes.microfacet import GGX, Microfacets
+from ..lobes.sheen import SheenLobe, VelvetLobe, sheen_lobe
 from ..lobes.thin_film import ThinFilm
 from .bumped_normals import BumpedNormals, about
 from .needed_lobes import Lobes
@@ -55,8 +56,9 @@ class Layers:
     emission: Any
     ax: Any
     ay: Any
+    facets: Microfacets = GGX
     sheen: Any = None
-    sheen_shape: SheenLobe | None = None
+    sheen_shape: SheenLobe | VelvetLobe | None = None
     coat: Any = None
     coat_alpha: Any = None
     coat_ior: Any = None
@@ -123,14 +125,14 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
         stretch = dr.sqrt(1 - 0.9 * most * saturate(p["anisotropic"] / most))
         ax, ay = dr.minimum(ax / stretch, 1), ay * stretch
         lobe_roughness = dr.sqrt(dr.sqrt(ax * ay))
-    stack |= {"ax": ax, "ay": ay}
+    stack |= {"ax": ax, "ay": ay, "facets": model.facets}
 
     w = colour(saturate(p["alpha"])) if lobes.alpha else colour(1)
     stack["transparency"] = 1 - saturate(p["alpha"]) if lobes.alpha else number(0)
     frame = Layers(view, cosine, sine, wi.z, 0, 0, ax, ay)
     stack["normals"] = normals = BumpedNormals.of(parameters, frame.to_frame, shade=model.bumps_shade)
     if lobes.sheen:
-        w = _add_sheen(stack, p, w, view if normals is None else about(normals.diffuse, view))
+        w = _add_sheen(stack, p, w, view if normals is None else about(normals.diffuse, view), model)
     if lobes.coat:
         w = _add_coat(stack, p, w, mu if normals is None else dr.maximum(dr.dot(normals.coat, view), 1e-7), model)
     stack["emission"] = p["emission_color"] * p["emission_strength"] * w
@@ -191,8 +193,9 @@ def _compensation(white: tuple[Any, Any] | None, mean_fresnel: Any) -> Compensat
     return NO_COMPENSATION if white is None else compensation(*white, mean_fresnel)
 
 
-def _add_sheen(stack: dict[str, Any], p: Mapping[str, Any], w: Any, view: Any) -> Any:
-    shape = sheen_lobe(view, saturate(p["sheen_roughness"]))
+def _add_sheen(stack: dict[str, Any], p: Mapping[str, Any], w: Any, view: Any, model: CyclesModel) -> Any:
+    roughness = saturate(p["sheen_roughness"])
+    shape = VelvetLobe(view, roughness) if model.velvet else sheen_lobe(view, roughness)
     albedo, tint = at_least(p["sheen_weight"], 0) * shape.albedo, at_least(p["sheen_tint"], 0)
     stack |= {"sheen": w * albedo * tint, "sheen_shape": shape}
     # of the tint alone: at weight 0 all channels of the product are equal, and the slope would be that of any of them

@@ -90,7 +90,7 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = F
         alpha = layers.glass_alpha
         density += choice["glass"] * visible_pdf(wi, h, alpha, alpha) / (4 * c) * reflect_probability(layers, c)
     if choice["sheen"] is not None and layers.sheen_shape is not None:
-        density += choice["sheen"] * layers.sheen_shape.value(wo)
+        density += choice["sheen"] * layers.sheen_shape.pdf(wo)
     if choice["diffuse"] is not None:
         density += choice["diffuse"] * dr.maximum(wo.z, 0) / dr.pi
     density = dr.select(above & (wi.z > 0), density, 0)

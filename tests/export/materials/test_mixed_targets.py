@@ -89,6 +89,9 @@ GLOW = shader("Emission", Color=BLUE, Strength=0.3)
 CASES = {
     "glossy": GLOSSY,
     "single scattering": shader("BsdfAnisotropic", {"distribution": "GGX"}, Color=GOLD, Roughness=0.6),
+    "Beckmann": shader("BsdfAnisotropic", {"distribution": "BECKMANN"}, Color=GOLD, Roughness=0.5),
+    "Ashikhmin-Shirley": shader("BsdfAnisotropic", {"distribution": "ASHIKHMIN_SHIRLEY"}, Color=GOLD, Roughness=0.5),
+    "velvet": shader("BsdfSheen", {"distribution": "ASHIKHMIN"}, Color=RED, Roughness=0.7),
     "metallic": shader("BsdfMetallic", Base_Color=GOLD, Edge_Tint=RED, Roughness=0.35),
     "sheen": SHEEN,
     "diffuse under a fresnel": mix(fresnel, DIFFUSE, GLOSSY),
@@ -112,6 +115,28 @@ def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: 
     assert rms < 0.025  # of highlights, at 16 rays a pixel
 
 
+TURNED = {
+    "principled": shader("BsdfPrincipled", Metallic=1.0, Roughness=0.5, Anisotropic=0.8),
+    "glossy": shader("BsdfAnisotropic", Color=GOLD, Roughness=0.5, Anisotropy=0.6, Rotation=0.1),
+    "metallic": shader("BsdfMetallic", Base_Color=GOLD, Roughness=0.5, Anisotropy=0.7),
+    "in a mix": mix(noise, DIFFUSE, shader("BsdfAnisotropic", Color=GOLD, Roughness=0.4, Anisotropy=-0.6)),
+}
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_a_tangent_without_a_link_circles_the_objects_axis(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str
+) -> None:
+    if name == "metallic" and not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
+        pytest.skip("Blender 4.2 has no Metallic BSDF")
+    lit_scene(scene)
+    target = ball(material_of(TURNED[name]))
+    target.rotation_euler = (1.2, 0.3, 0.0)
+    found, truth = recorded_and_cycles(export, render_cycles, target)
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
+    assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.025  # of highlights, at 16 rays a pixel
+
+
 def cut_by_noise(tree: Any) -> Any:
     surface = PLASTIC(tree)
     tree.links.new(noise(tree), surface.node.inputs["Alpha"])
@@ -121,12 +146,26 @@ def cut_by_noise(tree: Any) -> Any:
 CLEAR = shader("BsdfTransparent", Color=(0.9, 0.9, 0.9))
 CASES_OF_PATHS = {
     "glass": shader("BsdfGlass", Color=GOLD, Roughness=0.3),
+    "glass, Beckmann": shader("BsdfGlass", {"distribution": "BECKMANN"}, Color=GOLD, Roughness=0.4),
     "translucent": mix(0.5, DIFFUSE, shader("BsdfTranslucent", Color=GOLD)),
     # the far side is seen through what nodes make clear
     "holes": mix(noise, PLASTIC, CLEAR),
     "holes by alpha": cut_by_noise,
     "two glasses": mix(noise, shader("BsdfGlass", Color=RED), shader("BsdfGlass", Color=BLUE)),
 }
+
+
+def lit_by_the_sky(scene: Any) -> None:
+    scene.render.resolution_x = scene.render.resolution_y = 24
+    add_camera("PERSP", location=(0.0, -4.0, 0.0), rotation=(1.5708, 0.0, 0.0))
+    scene.cycles.samples = 1024
+    for kind in ("max", "diffuse", "glossy", "transmission"):
+        setattr(scene.cycles, f"{kind}_bounces", 6)
+    scene.world = bpy.data.worlds.new("World")
+    if scene.world.node_tree is None:
+        scene.world.use_nodes = True
+    sky = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    sky.inputs["Color"].default_value = (0.6, 0.8, 1.0, 1.0)
 
 
 @pytest.mark.parametrize("name", CASES_OF_PATHS)
@@ -140,16 +179,7 @@ def test_pictures_of_whole_paths_are_cycles(
 
     from ..scenes import add_quad, diffuse_material
 
-    scene.render.resolution_x = scene.render.resolution_y = 24
-    add_camera("PERSP", location=(0.0, -4.0, 0.0), rotation=(1.5708, 0.0, 0.0))
-    scene.cycles.samples = 1024
-    for kind in ("max", "diffuse", "glossy", "transmission"):
-        setattr(scene.cycles, f"{kind}_bounces", 6)
-    scene.world = bpy.data.worlds.new("World")
-    if scene.world.node_tree is None:
-        scene.world.use_nodes = True
-    sky = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
-    sky.inputs["Color"].default_value = (0.6, 0.8, 1.0, 1.0)
+    lit_by_the_sky(scene)
     add_quad("Floor", 6.0, -1.2, diffuse_material("Floor", (0.5, 0.2, 0.1)))
     target = ball(material_of(CASES_OF_PATHS[name]))
     found, truth = renderer_and_cycles(export, render_cycles, target)
@@ -165,3 +195,30 @@ def test_pictures_of_whole_paths_are_cycles(
         rms = np.sqrt(np.mean((shown - truth[mask]) ** 2)) / truth[mask].mean()
         assert abs(level) < 0.01
         assert rms < 0.08
+
+
+NEIGHBOURS = {
+    "glossy": GLOSSY,
+    "Beckmann": CASES["Beckmann"],
+    "velvet": CASES["velvet"],
+    "glass": CASES_OF_PATHS["glass"],
+    "translucent": shader("BsdfTranslucent", Color=GOLD),
+}
+
+
+@pytest.mark.parametrize("name", NEIGHBOURS)
+def test_the_shader_of_a_neighbour_is_that_of_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str
+) -> None:
+    """Baked, and no less exact than as the target."""
+    from ..scenes import add_quad
+
+    lit_by_the_sky(scene)
+    shader = material_of(NEIGHBOURS[name])
+    shader.name = "Neighbour"
+    ball(shader)
+    found, truth = renderer_and_cycles(export, render_cycles, add_quad("Floor", 6.0, -1.2, new_material("Target")))
+    shown, middle = found.image(found.start, seed=0, spp=1024), np.s_[8:16, 8:16]
+    assert not found.target_mask()[middle].any()
+    assert abs(shown[middle].mean() / truth[middle].mean() - 1.0) < 0.01
+    assert np.sqrt(np.mean((shown[middle] - truth[middle]) ** 2)) / truth[middle].mean() < 0.08

@@ -11,7 +11,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from blender_addon.export.findings import ExportError, Findings  # noqa: E402
-from blender_addon.export.materials.read_material import read_context, read_target  # noqa: E402
+from blender_addon.export.materials.read_context import read_context  # noqa: E402
+from blender_addon.export.materials.read_material import read_target  # noqa: E402
 from blender_addon.export.nodes.leaf_kinds import KINDS, is_fitted  # noqa: E402
 from blender_addon.versions import has_diffuse_roughness  # noqa: E402
 

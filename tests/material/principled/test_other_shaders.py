@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mfo_backend.material.cycles_model import cycles_model
+from mfo_backend.material.cycles_model import DISTRIBUTIONS, cycles_model
 from mfo_backend.material.principled.blender_principled import blender_principled
 
 from .. import parity
@@ -34,35 +34,31 @@ class Node:
     shader: str = "principled"
 
 
+TURNED = {**COLOUR, "anisotropic": "Anisotropy", "anisotropic_rotation": "Rotation"}
+METALLIC = {**TURNED, "base_color": "Base Color", "specular_tint": "Edge Tint"}
+GLOSSY = (parity.BASE, {"metallic": 1.0})
 STRETCHED = {"anisotropic": (0.0, 1.108), "anisotropic_rotation": (0.0, 1.0)}
+STREAKED = ({**parity.BASE, **STRETCHED}, {"metallic": 1.0})
+# Cycles takes 1 - (N.H)^2 in single precision, here into an exponent; ours in single and double agree to 1e-6
+SINGLE = {"most": 1e-4, "worst": 3e-4}
+BENT = (*GLASS, True)
+CLOTH = {"sheen_tint": "Color", "sheen_roughness": "Roughness"}
+FIBRES = (
+    {"sheen_roughness": (0.1, 1.0), "sheen_tint": (0.0, 1.0)},
+    {"sheen_weight": 1.0, "base_color": 0.0, "specular_ior_level": 0.0},
+)
 METAL = {**parity.BASE, "specular_tint": (0.0, 1.0), **parity.TURN}
 NODES = (
     Node("BsdfAnisotropic", COLOUR, parity.Group("glossy", parity.BASE, {"metallic": 1.0}), shader="glossy"),
     Node("BsdfAnisotropic", COLOUR, parity.Group("glossy, GGX", parity.BASE, {"metallic": 1.0}), "GGX", "glossy"),
     Node(
         "BsdfAnisotropic",
-        {**COLOUR, "anisotropic": "Anisotropy", "anisotropic_rotation": "Rotation"},
-        parity.Group("glossy, stretched", {**parity.BASE, **STRETCHED}, {"metallic": 1.0}),
+        TURNED,
+        parity.Group("glossy, stretched", *STREAKED),
         shader="glossy",
     ),
-    Node(
-        "BsdfMetallic",
-        {
-            "base_color": "Base Color", "specular_tint": "Edge Tint", "roughness": "Roughness",
-            "anisotropic": "Anisotropy", "anisotropic_rotation": "Rotation",
-        },
-        parity.Group("metallic", METAL, {"metallic": 1.0}),
-    ),
-    Node(
-        "BsdfSheen",
-        {"sheen_tint": "Color", "sheen_roughness": "Roughness"},
-        parity.Group(
-            "sheen",
-            {"sheen_roughness": (0.1, 1.0), "sheen_tint": (0.0, 1.0)},
-            {"sheen_weight": 1.0, "base_color": 0.0, "specular_ior_level": 0.0},
-        ),
-        "MICROFIBER",
-    ),
+    Node("BsdfMetallic", METALLIC, parity.Group("metallic", METAL, {"metallic": 1.0})),
+    Node("BsdfSheen", CLOTH, parity.Group("sheen", *FIBRES), "MICROFIBER"),
     Node("BsdfGlass", CLEAR, parity.Group("glass", *GLASS), shader="glass"),
     Node("BsdfGlass", CLEAR, parity.Group("glass, through", *GLASS, refracted=True), "GGX", "glass"),
     Node("BsdfRefraction", CLEAR, parity.Group("refraction", *GLASS, refracted=True), "GGX", "refraction"),
@@ -73,6 +69,15 @@ NODES = (
         parity.Group("translucent", {"base_color": (0.0, 1.0)}, {}, refracted=True),
         shader="translucent",
     ),
+    Node("BsdfAnisotropic", COLOUR, parity.Group("glossy, Beckmann", *GLOSSY, **SINGLE), "BECKMANN", "glossy"),
+    Node("BsdfAnisotropic", COLOUR, parity.Group("glossy, Ashikhmin", *GLOSSY), "ASHIKHMIN_SHIRLEY", "glossy"),
+    Node("BsdfAnisotropic", TURNED, parity.Group("stretched, Beckmann", *STREAKED, **SINGLE), "BECKMANN", "glossy"),
+    Node("BsdfAnisotropic", TURNED, parity.Group("stretched, Ashikhmin", *STREAKED), "ASHIKHMIN_SHIRLEY", "glossy"),
+    Node("BsdfMetallic", METALLIC, parity.Group("metallic, Beckmann", METAL, {"metallic": 1.0}, **SINGLE), "BECKMANN"),
+    Node("BsdfSheen", CLOTH, parity.Group("velvet", *FIBRES), "ASHIKHMIN"),
+    Node("BsdfGlass", CLEAR, parity.Group("glass, Beckmann", *GLASS, **SINGLE), "BECKMANN", "glass"),
+    Node("BsdfGlass", CLEAR, parity.Group("through, Beckmann", *BENT, **SINGLE), "BECKMANN", "glass"),
+    Node("BsdfRefraction", CLEAR, parity.Group("bent, Beckmann", *BENT, **SINGLE), "BECKMANN", "refraction"),
 )  # fmt: skip
 
 
@@ -82,7 +87,7 @@ def answers() -> dict[str, tuple[parity.Cases, Any]]:
     batches = []
     for node, drawn in zip(NODES, cases, strict=True):
         sockets = {node.names[name]: value for name, value in drawn.values.items() if name in node.names}
-        if "stretched" in node.group.name:  # its own measure: along the tangent below 0
+        if node.names is TURNED:  # its own measure: along the tangent below 0
             sockets["Anisotropy"] = np.sqrt(1.0 - 0.9 * sockets["Anisotropy"]) - 1.0
         asked = {"view": drawn.view, "light": drawn.light, "sockets": sockets}
         batches.append({**asked, "node": f"ShaderNode{node.kind}", "distribution": node.distribution})
@@ -101,10 +106,10 @@ def test_value_is_that_of_cycles(node: Node) -> None:
         for name, value in cases.values.items()
     }
     view, light = (vector(*(number(d[:, k]) for k in range(3))) for d in (cases.view, cases.light))
-    distribution = node.distribution if "GGX" in node.distribution else "MULTI_GGX"
+    distribution = node.distribution if node.distribution in DISTRIBUTIONS else "MULTI_GGX"
     model = cycles_model((5, 0), distribution, node.shader)
     ours = np.array(blender_principled(parameters, view, light, model=model), float).T
     error = parity.relative_difference(ours, theirs)
-    assert np.quantile(error, 0.99) < 3e-5, np.sort(error)[-20:]
+    assert np.quantile(error, 0.99) < max(node.group.most, 3e-5), np.sort(error)[-20:]
     assert error.max() < 3e-4
     assert (theirs.max() > 0.0) == (node.group.name != "refraction, above")

@@ -116,7 +116,10 @@ def test_versions_differ_as_documented() -> None:
 
 @pytest.mark.parametrize(
     ("version", "distribution", "message"),
-    [((4, 1, 0), "GGX", "Blender 4.1.0 has another Principled BSDF"), ((5, 0), "BECKMANN", "choose MULTI_GGX or GGX")],
+    [
+        ((4, 1, 0), "GGX", "Blender 4.1.0 has another Principled BSDF"),
+        ((5, 0), "PHONG", "choose one of MULTI_GGX, GGX, BECKMANN"),
+    ],
 )
 def test_unknown_models_are_refused(version: tuple[int, ...], distribution: str, message: str) -> None:
     with pytest.raises(BadInputError, match=message):
