@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..types.errors import BadInputError
-from .lobes.microfacet import ASHIKHMIN_SHIRLEY, BECKMANN, GGX, Microfacets
 
 # of microfacets, Blender's words; the last is that of the fibres of a Sheen BSDF
 DISTRIBUTIONS = ("MULTI_GGX", "GGX", "BECKMANN", "ASHIKHMIN_SHIRLEY", "ASHIKHMIN")
@@ -23,8 +22,8 @@ class CyclesModel:
     ----------
     multiple_scattering
         Energy compensation of metal, specular and glass, the node's "Multiscatter GGX".
-    facets
-        The distribution of the microfacets of metal, specular and glass.
+    microfacets
+        Those of metal, specular and glass, by the names of `lobes.microfacet.MICROFACETS`.
     velvet
         Sheen is Ashikhmin's velvet, the other setting of a Sheen BSDF.
     coat_compensation
@@ -51,7 +50,7 @@ class CyclesModel:
     """
 
     multiple_scattering: bool = True
-    facets: Microfacets = GGX
+    microfacets: str = "GGX"
     velvet: bool = False
     coat_compensation: bool = True
     diffuse_roughness: bool = True
@@ -85,7 +84,7 @@ def cycles_model(
         raise BadInputError(f"Unknown shader {shader!r}: choose one of {', '.join(SHADERS)}.")
     return CyclesModel(
         multiple_scattering=distribution == "MULTI_GGX",
-        facets={"BECKMANN": BECKMANN, "ASHIKHMIN_SHIRLEY": ASHIKHMIN_SHIRLEY}.get(distribution, GGX),
+        microfacets=distribution if distribution in ("BECKMANN", "ASHIKHMIN_SHIRLEY") else "GGX",
         velvet=distribution == "ASHIKHMIN",
         coat_compensation=major_minor >= (4, 5),
         diffuse_roughness=major_minor >= (4, 3),

@@ -37,7 +37,7 @@ PRESENT = {
 }
 VALUES = {"RGBA": (0.3, 0.2, 0.1, 1.0), "VECTOR": (0.3, 0.2, 0.1), "VALUE": 0.37, "INT": 3, "BOOLEAN": True}
 # An unlinked normal is the surface's own whatever its hidden value; Weight is Cycles' own, and never shown
-WITHOUT_EFFECT = {"Normal", "Coat Normal", "Weight"}
+WITHOUT_EFFECT = {"Normal", "Coat Normal", "Tangent", "Weight"}
 
 
 def silent_sockets() -> list[str]:

@@ -28,7 +28,7 @@ class Microfacets:
     density
         D(h), 1/sr, of a normal and the two alphas.
     seen
-        G2, the part of the microfacets of normal `h` that `wi` sees and `wo` reaches, of `wi`, `wo`, `h` and the alphas.
+        G2, the part of the microfacets of normal `h` that both directions see, of `wi`, `wo`, `h` and the alphas.
     """
 
     density: Callable[[Any, Any, Any], Any]
@@ -87,8 +87,11 @@ def _seen_ashikhmin_shirley(wi: Any, wo: Any, h: Any, ax: Any, ay: Any) -> Any:
 
 
 GGX = Microfacets(density, _seen_ggx)
-BECKMANN = Microfacets(_density_beckmann, _seen_beckmann)
-ASHIKHMIN_SHIRLEY = Microfacets(_density_ashikhmin_shirley, _seen_ashikhmin_shirley)
+MICROFACETS = {
+    "GGX": GGX,
+    "BECKMANN": Microfacets(_density_beckmann, _seen_beckmann),
+    "ASHIKHMIN_SHIRLEY": Microfacets(_density_ashikhmin_shirley, _seen_ashikhmin_shirley),
+}
 
 
 def reflection(wi: Any, wo: Any, h: Any, ax: Any, ay: Any, facets: Microfacets = GGX) -> Any:

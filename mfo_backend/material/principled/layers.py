@@ -26,7 +26,7 @@ from ..lobes.fresnel import (
     normal_incidence,
 )
 from ..lobes.fresnel_term import ConstantTerm, DielectricTerm, MetalTerm
-from ..lobes.microfacet import GGX, Microfacets
+from ..lobes.microfacet import GGX, MICROFACETS, Microfacets
 from ..lobes.sheen import SheenLobe, VelvetLobe, sheen_lobe
 from ..lobes.thin_film import ThinFilm
 from .bumped_normals import BumpedNormals, about
@@ -125,7 +125,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
         stretch = dr.sqrt(1 - 0.9 * most * saturate(p["anisotropic"] / most))
         ax, ay = dr.minimum(ax / stretch, 1), ay * stretch
         lobe_roughness = dr.sqrt(dr.sqrt(ax * ay))
-    stack |= {"ax": ax, "ay": ay, "facets": model.facets}
+    stack |= {"ax": ax, "ay": ay, "facets": MICROFACETS[model.microfacets]}
 
     w = colour(saturate(p["alpha"])) if lobes.alpha else colour(1)
     stack["transparency"] = 1 - saturate(p["alpha"]) if lobes.alpha else number(0)
