@@ -42,11 +42,14 @@ class CyclesModel:
         lobe on the other side times the base colour. Light enters below "subsurface" with an index of its own.
     skin
         How light enters below the surface and how far it goes there, the node's "Random Walk (Skin)".
+    disk
+        Light leaves around where it entered by a profile of the distance, the node's "Christensen-Burley".
     radius_is_path
         The radius is the mean free path below the surface, as of "Random Walk" from 5.2 on; "Random Walk (Legacy)", and
         before, a radius goes for a shorter way.
     walks_again
-        Light that has left from below walks below the next surface, too (from 5.0); before, that is a diffuse one.
+        Light that has left from below walks below the next surface, too (from 5.0); before, and by a profile, that is a
+        diffuse one.
     """
 
     multiple_scattering: bool = True
@@ -58,6 +61,7 @@ class CyclesModel:
     bumps_shade: bool = True
     shader: str = "principled"
     skin: bool = False
+    disk: bool = False
     radius_is_path: bool = False
     walks_again: bool = False
 
@@ -92,6 +96,7 @@ def cycles_model(
         bumps_shade=major_minor >= (4, 5),
         shader=shader,
         skin=subsurface_method == "RANDOM_WALK_SKIN",
+        disk=subsurface_method == "BURLEY",
         radius_is_path=subsurface_method == "RANDOM_WALK" and major_minor >= (5, 2),
-        walks_again=major_minor >= (5, 0),
+        walks_again=major_minor >= (5, 0) and subsurface_method != "BURLEY",
     )

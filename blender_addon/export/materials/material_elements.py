@@ -96,9 +96,11 @@ def approximated(material: Material) -> list[str]:
         found.append("Subsurface of several shaders is shown as diffuse: no light travels below the surface.")
     elif below and material.passes_light:
         found.append("Subsurface is fitted as diffuse, for the material lets light through.")
-    elif below and below[0].subsurface_method == "BURLEY":
-        found.append("Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.")
-    elif below and below[0].subsurface_method != "RANDOM_WALK" and below[0].value("Subsurface Anisotropy", 0.0) < 0.0:
+    elif (
+        below
+        and below[0].subsurface_method not in ("RANDOM_WALK", "BURLEY")
+        and below[0].value("Subsurface Anisotropy", 0.0) < 0.0
+    ):
         found.append("a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")

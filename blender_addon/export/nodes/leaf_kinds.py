@@ -81,7 +81,6 @@ KINDS: dict[str, LeafKind] = {
         },
         {**WITHOUT_SPECULAR, "Subsurface Weight": 1.0},
         "subsurface",
-        settings={"falloff": ("RANDOM_WALK", "RANDOM_WALK_SKIN", "RANDOM_WALK_LEGACY")},
     ),
     "ShaderNodeBsdfToon": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),

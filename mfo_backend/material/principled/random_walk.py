@@ -14,7 +14,7 @@ Walk" is another model, and what it was has the name "Random Walk (Legacy)".
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ...types.parameter import Parameter, ParameterTable
@@ -22,9 +22,11 @@ from ..arrays import dual as dr
 from ..arrays.clamp import at_least, saturate
 from ..cycles_model import CyclesModel
 from ..lobes.microfacet import visible_pdf
+from .disk_profile import DiskProfile
 
 # What a recorded walk holds: its collisions, its length in scene units (0 is no walk), the normal of the microfacet
-# that it entered through, in the frame of the view, and the logarithm of its density but for that of later directions
+# that it entered through, in the frame of the view, and the logarithm of its density but for that of later directions.
+# By a profile the first is the distance on the disk, the second that of where it leaves, and the normal is nothing
 WALK = ParameterTable(
     Parameter(f"walk_{name}", 1, -1e6, 1e6, 0.0)
     for name in ("collisions", "length", "normal_x", "normal_y", "log_density")
@@ -106,11 +108,12 @@ class Medium:
 class Below:
     """What a view finds below a surface: how much of it goes there, RGB, the medium, and how it is bent on its way.
 
-    That is by microfacets of this alpha and index; half of the views into `skin` enter to all sides alike.
+    Into a `DiskProfile` it is not. Elsewhere that is by microfacets of this alpha and index; half of the views into
+    `skin` enter to all sides alike.
     """
 
     weight: Any
-    medium: Medium
+    medium: Medium | DiskProfile
     alpha: Any
     ior: Any
     skin: bool
@@ -119,6 +122,9 @@ class Below:
     def of(parameters: Mapping[str, Any], weight: Any, ior: Any, model: CyclesModel) -> Below:
         """That of parameter values by name, below an interface of index `ior`."""
         roughness = saturate(parameters["roughness"])
+        if model.disk:
+            colour = dr.minimum(at_least(parameters["base_color"], 0), 1)
+            return Below(weight * colour, DiskProfile.of(parameters), 0 * roughness + 1, ior, False)
         medium = Medium.of(parameters, model)
         if model.skin:
             return Below(weight, medium, 0 * roughness + 1, parameters["subsurface_ior"], True)
@@ -130,16 +136,16 @@ class Below:
         """What a `view` shows of a walk, RGB; by the names of `WALK`."""
         collisions, length, x, y, log_density = (walk[name] for name in WALK.names)
         shown = self.weight * self.medium.carried(collisions, length, log_density)
-        if self.skin:
+        if self.skin or isinstance(self.medium, DiskProfile):
             return shown
         normal = dr.kind_of(view)(x, y, dr.safe_sqrt(1 - x * x - y * y))
         return shown * visible_pdf(view, normal, self.alpha, self.alpha)
 
     def gathered(self, index: Any) -> Below:
         """That of some points."""
-        medium, (weight, alpha, ior) = self.medium, (_at(v, index) for v in (self.weight, self.alpha, self.ior))
-        names = ("albedo", "extinction", "share", "anisotropy")
-        return Below(weight, Medium(*(_at(getattr(medium, name), index) for name in names)), alpha, ior, self.skin)
+        of_medium = {each.name: _at(getattr(self.medium, each.name), index) for each in fields(self.medium)}
+        weight, alpha, ior = (_at(value, index) for value in (self.weight, self.alpha, self.ior))
+        return Below(weight, type(self.medium)(**of_medium), alpha, ior, self.skin)
 
 
 def _at(value: Any, index: Any) -> Any:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random walks of light below a surface, from where a view enters to where it leaves again.
 
-A walk stays inside of its own shape, or of all shapes whose attribute `BODY` is its own's, whatever else is there, as
-Cycles' does inside of its object (kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one
+A walk stays inside of its body, whatever else is there, as Cycles' does inside of its object
+(kernel/integrator/subsurface.h). How far it goes between collisions is drawn for one
 of several extinctions, and its density is that of all of them (A. Wilkie et al., "Hero Wavelength Spectral Sampling",
 2014), so that one walk serves all channels and values nearby. Choose the variant before importing this.
 """
@@ -21,13 +21,14 @@ import drjit as dr
 import mitsuba as mi
 
 from ...material.lobes.microfacet import sample_visible, visible_pdf
+from ...material.principled.disk_profile import DiskProfile
 from ...material.principled.random_walk import LEAST_INDEX, MOST_COLLISIONS, MOST_INDEX, Below
+from .bodies import bodies_of, met_inside
+from .disk_probes import probed
 from .path_random import PathRandom
-from .smooth_facets import shape_number, shape_table
 
 # Collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise. No measurement
 CERTAIN = 8
-BODY = "body"
 _PER_COLLISION = 4  # places of the random numbers
 
 
@@ -58,6 +59,8 @@ def walked(
     brightest channel does.
     """
     medium = below.medium
+    if isinstance(medium, DiskProfile):
+        return _probed(scene, si, medium, random, active, spread, choice)
     extinctions = [medium.extinction[k] * factor for k in range(3) for factor in spread]
     d, h, entry_density, enters = _entered(si, below, random, alphas)
     width = dr.width(si.p)
@@ -65,7 +68,7 @@ def walked(
     free = extinctions[0] + dr.zeros(mi.Float, width)
     for k, extinction in enumerate(extinctions[1:], 1):
         free = dr.select(chosen >= k, extinction, free)
-    shape, prim, bodies = mi.ShapePtr(si.shape), mi.UInt32(si.prim_index), _bodies(scene)
+    shape, prim, bodies = mi.ShapePtr(si.shape), mi.UInt32(si.prim_index), bodies_of(scene)
     g, survival = (value + dr.zeros(mi.Float, width) for value in (medium.anisotropy, dr.max(medium.albedo)))
     length, out = dr.zeros(mi.Float, width), dr.full(mi.Bool, False, width)
     state = (
@@ -80,7 +83,7 @@ def walked(
         u = numbers.pair(place + 1)
         t = -dr.log(1.0 - u.x) / free
         ray = mi.Ray3f(p, d, t, 0.0, mi.Color0f())
-        met = _met_inside(scene, bodies, ray, shape, prim, collisions == 0, active)
+        met = met_inside(scene, bodies, ray, shape, prim, collisions == 0, active)
         leaves = active & met.is_valid()
         found = dr.select(leaves, met, found)
         out |= leaves
@@ -110,6 +113,23 @@ def walked(
     density = sum(dr.exp(each - largest) for each in logs) / len(logs)
     log_density = largest + dr.log(density) + passed + dr.log(entry_density)
     return Walks(exits, out, (count, length, h.x, h.y, log_density))
+
+
+def _probed(
+    scene: mi.Scene,
+    si: mi.SurfaceInteraction3f,
+    profile: DiskProfile,
+    random: PathRandom,
+    active: mi.Bool,
+    spread: Sequence[float],
+    choice: mi.Float | None,
+) -> Walks:
+    """The same of a profile, as walks without collisions."""
+    exits, out, (on_disk, distance, log_density) = probed(
+        scene, si, profile, random, active, spread=spread, choice=choice
+    )
+    nothing = dr.zeros(mi.Float, dr.width(si.p))
+    return Walks(exits, out, (on_disk, distance, nothing, nothing, log_density))
 
 
 def _entered(
@@ -143,52 +163,3 @@ def _scattered(d: mi.Vector3f, g: mi.Float, u: mi.Point2f) -> mi.Vector3f:
     sine = dr.safe_sqrt(1.0 - cosine * cosine)
     s, c = dr.sincos(2.0 * dr.pi * u.y)
     return dr.normalize(mi.Frame3f(d).to_world(mi.Vector3f(c * sine, s * sine, cosine)))
-
-
-def _bodies(scene: mi.Scene) -> mi.UInt32 | None:
-    """The body of each shape by its number in this process, 0 of one by itself; None where all are."""
-    numbered = [(shape, int(shape_number(shape, BODY))) for shape in scene.shapes()]
-    numbered = [(shape, number) for shape, number in numbered if number]
-    return shape_table(*map(list, zip(*numbered, strict=True)), mi.UInt32) if numbered else None
-
-
-def _body_of(shape: mi.ShapePtr, bodies: mi.UInt32) -> mi.UInt32:
-    number = dr.reinterpret_array(mi.UInt32, shape)
-    known = number < dr.opaque(mi.UInt32, dr.width(bodies))
-    return dr.select(known, dr.gather(mi.UInt32, bodies, number, known), 0)
-
-
-def _met_inside(
-    scene: mi.Scene,
-    bodies: mi.UInt32 | None,
-    ray: mi.Ray3f,
-    shape: mi.ShapePtr,
-    prim: mi.UInt32,
-    first: mi.Bool,
-    active: mi.Bool,
-) -> mi.PreliminaryIntersection3f:
-    """The first hit of a body on a ray from within; where a walk enters, `first`, not the triangle `prim`."""
-    found = scene.ray_intersect_preliminary(ray, active=active)
-
-    def is_other(found, active):
-        entered = (found.shape == shape) & first & (found.prim_index == prim)
-        own = found.shape == shape
-        if bodies is not None:
-            body = _body_of(shape, bodies)
-            own |= (body > 0) & (_body_of(found.shape, bodies) == body)
-        return active & found.is_valid() & (entered | ~own)
-
-    def onward(found, passed, passing):
-        start = passed + found.t * (1.0 + 1e-6) + 1e-7
-        rest = mi.Ray3f(ray.o + start * ray.d, ray.d, ray.maxt - start, 0.0, mi.Color0f())
-        further = scene.ray_intersect_preliminary(rest, active=passing)
-        found = dr.select(passing, further, found)
-        passed = dr.select(passing, start, passed)
-        return found, passed, is_other(found, passing)
-
-    found, passed, _ = dr.while_loop(
-        (found, dr.zeros(mi.Float, dr.width(ray.o)), is_other(found, active)), lambda f, p, passing: passing, onward,
-        label="other shapes",
-    )  # fmt: skip
-    found.t = found.t + passed
-    return found

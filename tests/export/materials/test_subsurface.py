@@ -26,6 +26,15 @@ def lit(scene: Any) -> None:
     add_light("POINT", location=(2.5, 1.0, 1.5), energy=300.0, shadow_soft_size=0.0)
 
 
+def monkey(material: Any) -> Any:
+    bpy.ops.mesh.primitive_monkey_add(rotation=(-1.2, 0.0, 0.3))
+    item = bpy.context.object
+    item.modifiers.new("Smooth", "SUBSURF").levels = 2
+    bpy.ops.object.shade_smooth()
+    item.data.materials.append(material)
+    return item
+
+
 def same_level(export: Any, render_cycles: Any, target: Any) -> None:
     """Levels of a recorded picture within its noise, about 0.7 % in blue."""
     from mfo_backend.render.paths.recorded_scene import RecordedScene
@@ -46,6 +55,18 @@ def test_a_ball_of_wax(scene: Any, export: Any, render_cycles: Any, method: str,
     material = new_material("Wax", Subsurface_Anisotropy=anisotropy, **VALUES)
     principled(material).subsurface_method = method
     same_level(export, render_cycles, ball(material))
+
+
+@pytest.mark.parametrize("scale", [0.8, 4.0])
+@pytest.mark.parametrize("shape", [ball, monkey])
+def test_the_profile_of_christensen_and_burley(
+    scene: Any, export: Any, render_cycles: Any, shape: Callable[[Any], Any], scale: float
+) -> None:
+    """Of a ball, and of a head with ears and eyes that are no part of it."""
+    lit(scene)
+    material = new_material("Skin", **{**VALUES, "Subsurface_Scale": scale})
+    principled(material).subsurface_method = "BURLEY"
+    same_level(export, render_cycles, shape(material))
 
 
 def test_the_node_by_itself(scene: Any, export: Any, render_cycles: Any) -> None:
