@@ -218,7 +218,6 @@ FIT = {
     "Thin Wall is left out.": "Thin Wall est omis.",
     "Subsurface of several shaders is shown as diffuse: no light travels below the surface.": "Subsurface de plusieurs shaders est montré comme diffus : aucune lumière ne passe sous la surface.",
     "Subsurface is fitted as diffuse, for the material lets light through.": "Subsurface est ajusté comme diffus, car le matériau laisse passer la lumière.",
-    "Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.": "Christensen-Burley est ajusté comme une marche aléatoire : choisir Random Walk pour Subsurface.",
     "a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.": "une Subsurface Anisotropy négative est ajustée comme zéro : choisir Random Walk pour Subsurface.",
     # progress
     "The backend ended without a result": "Le backend s'est terminé sans résultat",

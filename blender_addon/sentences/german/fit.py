@@ -218,7 +218,6 @@ FIT = {
     "Thin Wall is left out.": "Thin Wall wird weggelassen.",
     "Subsurface of several shaders is shown as diffuse: no light travels below the surface.": "Subsurface mehrerer Shader wird als diffus gezeigt: Kein Licht läuft unter der Oberfläche.",
     "Subsurface is fitted as diffuse, for the material lets light through.": "Subsurface wird als diffus angepasst, denn das Material lässt Licht durch.",
-    "Christensen-Burley is fitted as a random walk: choose Random Walk for Subsurface.": "Christensen-Burley wird als Random Walk angepasst: für Subsurface Random Walk wählen.",
     "a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.": "eine Subsurface Anisotropy unter null wird als null angepasst: für Subsurface Random Walk wählen.",
     # progress
     "The backend ended without a result": "Das Backend endete ohne Ergebnis",

@@ -225,7 +225,7 @@ def test_what_has_no_model_is_named(mixed: SimpleNamespace) -> None:
         node = mixed.tree.nodes.new(kind)
         mixed.tree.links.new(node.outputs[0], mixed.output.inputs["Surface"])
         assert said in why_no_target(mixed.material)
-    skin = mixed.tree.nodes.new("ShaderNodeSubsurfaceScattering")
-    skin.falloff = "BURLEY"
-    mixed.tree.links.new(skin.outputs[0], mixed.output.inputs["Surface"])
-    assert "choose Random Walk" in why_no_target(mixed.material)
+    metal = mixed.tree.nodes.new("ShaderNodeBsdfMetallic")
+    metal.fresnel_type = "PHYSICAL_CONDUCTOR"
+    mixed.tree.links.new(metal.outputs[0], mixed.output.inputs["Surface"])
+    assert "choose F82 Tint" in why_no_target(mixed.material)

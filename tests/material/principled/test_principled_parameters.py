@@ -111,6 +111,8 @@ def test_versions_differ_as_documented() -> None:
     assert cycles_model((5, 2), subsurface_method="RANDOM_WALK_LEGACY") == cycles_model((5, 0))
     assert (middle.walks_again, cycles_model((5, 0)).walks_again) == (False, True)
     assert cycles_model(subsurface_method="RANDOM_WALK_SKIN").skin
+    assert cycles_model(subsurface_method="BURLEY").disk
+    assert not cycles_model(subsurface_method="BURLEY").walks_again
     assert not cycles_model((5, 0), "GGX").multiple_scattering
 
 
