@@ -23,8 +23,8 @@ from ..camera.highlight_cells import highlight_cells
 from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
+from ..random_numbers.even_points import even_points
 from ..transport.camera_view import CameraView
-from ..transport.even_points import even_points
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from ..transport.traced_radiance import traced_radiance

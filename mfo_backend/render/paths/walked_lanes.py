@@ -16,8 +16,8 @@ import mitsuba as mi
 from ...material.principled.random_walk import LEAST_ALPHA, WALK, Below
 from ...types.light_paths import LightPaths
 from ..camera.primary_rays import fresh_sampler
+from ..random_numbers.path_random import PathRandom
 from ..transport.exit_light import exit_light
-from ..transport.path_random import PathRandom
 from ..transport.subsurface_walks import walked
 from .merged_lanes import TechniqueLanes
 

@@ -28,9 +28,9 @@ from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
+from ..random_numbers.path_random import PathRandom
 from ..transport.camera_view import CameraView
 from ..transport.cycles_path import DIFFUSE, TRANSMITS, seen_world
-from ..transport.path_random import PathRandom
 from ..transport.shadow_rays import ShadowRays, left_of, sample_light
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from .traced_target import TracedTarget

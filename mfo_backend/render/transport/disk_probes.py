@@ -18,8 +18,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ...material.principled.disk_profile import END, LEAST_WIDTH, SHARE_BEFORE_END, DiskProfile, leaving
+from ..random_numbers.path_random import PathRandom
 from .bodies import bodies_of, met_inside
-from .path_random import PathRandom
 
 AXES = (0.5, 0.25, 0.25)  # probabilities of the normal and of two directions across it
 MOST_HITS = 16  # of one line; Cycles takes four of them by chance

@@ -20,7 +20,7 @@ from ...material.arrays.own_memory import own_memory
 from ...material.principled.random_walk import WALK
 from ...types.light_paths import LightPaths
 from ..lamps.met_lamps import DELTA, SceneLamps
-from .path_random import PathRandom
+from ..random_numbers.path_random import PathRandom
 from .shadow_rays import ShadowRays
 from .smooth_facets import leaves_on, met_light, seen_side
 from .subsurface_walks import walked

@@ -23,9 +23,9 @@ import mitsuba as mi
 from ...material.lobes.microfacet import sample_visible, visible_pdf
 from ...material.principled.disk_profile import DiskProfile
 from ...material.principled.random_walk import LEAST_INDEX, MOST_COLLISIONS, MOST_INDEX, Below
+from ..random_numbers.path_random import PathRandom
 from .bodies import bodies_of, met_inside
 from .disk_probes import probed
-from .path_random import PathRandom
 
 # Collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise. No measurement
 CERTAIN = 8

@@ -20,7 +20,7 @@ def even_points():
     load_variant()
     import mitsuba as mi
 
-    from mfo_backend.render.transport.even_points import even_points
+    from mfo_backend.render.random_numbers.even_points import even_points
 
     def points(dimensions, first, block, seed):
         number = mi.UInt32(np.arange(first, first + COUNT, dtype=np.uint32))
