@@ -30,8 +30,10 @@ def cache_folder() -> Path:
 def use_kernel_cache() -> None:
     """Have Dr.Jit keep compiled kernels in a folder of ours; to be called before drjit is imported.
 
-    Above `KERNEL_LIMIT` Dr.Jit 1.5 deletes those that were not used for longest: at its start, once an hour, and one
-    process at a time, for which a stamp file is its lock. `DRJIT_CACHE_DIR` and `DRJIT_CACHE_MAXSIZE` override both.
+    Above `KERNEL_LIMIT` Dr.Jit 1.5 deletes those that were not used for longest: at its start, once an hour, by a stamp
+    file. Where two processes find the stamp missing or an hour old at the same instant, both may delete, and as neither
+    counts what the other has deleted, more goes than must, always the oldest first; what is missed is compiled again.
+    `DRJIT_CACHE_DIR` and `DRJIT_CACHE_MAXSIZE` override both.
     """
     os.environ.setdefault("DRJIT_CACHE_MAXSIZE", KERNEL_LIMIT)
     if not os.environ.get("DRJIT_CACHE_DIR"):
