@@ -25,20 +25,26 @@ from mfo_backend.cli.blender_host import BlenderHost, find_blender_host
 from mfo_backend.types.certainty import Level
 from mfo_backend.types.errors import SetupError
 
+from .class_fit import ClassFit
+
 METHOD = "balanced"
 
 
 class OneFit:
-    """Measures a scene of the bench or, for the scenario ``"hard"``, a hard case with its number as the seed."""
+    """Measures a scene of the bench or, for the scenario ``"hard"``, a hard case with its number as the seed; for
+    ``"classes"`` a job from Blender's own material to a plastic, metal, coat, cloth, glass, cutout or glowing one."""
 
     def __init__(self, folder: Path, size: int) -> None:
         self._folder, self._size = folder, size
+        self._classes = ClassFit(folder)
         self._runner = FitRunner(folder, size, Assets(None), host=_blender())
         for name in ("picture", "difference_of", "reference_flip", "relit", "flip"):
             _remembered(name)
 
     def __call__(self, scenario: str, scene: int) -> dict[str, Any]:
         """`solved`, `error` (mean FLIP), names `wrong`ly called determined, `values`, CPU `seconds` of the fit."""
+        if scenario == "classes":
+            return self._classes(scene)
         if scenario == "hard":
             names = sorted(name for name, case in HARD_CASES.items() if not case.is_glass and case.fitted)
             name, seed = names[scene % len(names)], scene // len(names)

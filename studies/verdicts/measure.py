@@ -60,11 +60,17 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
     baked = ("--reference-view", "scene") if case.picture == "png" else ()
     asked = (folder / "start.blend", *words, *baked)
     code, result = run_module("mfo_backend", "blend", *asked, allowed=MATCHED_OR_NOT)
-    after = folder / "after.exr"
-    run_module("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job", "--out", after,
-        "--samples", case.judge_samples, "--seed", 2)  # fmt: skip
+    return Row(
+        kind, asdict(case), result.get("verdict") or "", result.get("verdict_cause") or "",
+        code, *flips_in_cycles(case, folder), start_flip=result["errors"]["flip"][0], seconds=result["seconds"],
+        values=values_of(case, result), notes=result["notes"],
+    )  # fmt: skip
+
+
+def values_of(case: Case, result: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Each fitted value, what it truly is (None where something is planted), its standard deviation and its level."""
     truth = {"metallic": 0.0} | {name.lower().replace(" ", "_"): value for name, value in sockets_of(case).items()}
-    values = {
+    return {
         name: {
             "value": value,
             "truth": None if case.plant else truth.get(name, result["initial"].get(name)),
@@ -72,11 +78,13 @@ def _measured(kind: str, case: Case, folder: Path) -> Row:
         }
         for name, value in result["recovered"].items()
     }
-    return Row(
-        kind, asdict(case), result.get("verdict") or "", result.get("verdict_cause") or "",
-        code, *flips(folder), start_flip=result["errors"]["flip"][0], seconds=result["seconds"], values=values,
-        notes=result["notes"],
-    )  # fmt: skip
+
+
+def flips_in_cycles(case: Case, folder: Path) -> tuple[float, float, float, float]:
+    """Render the fitted file of `folder`/job in Cycles to after.exr, then see `flips`."""
+    run_module("blender_addon.headless", "check", folder / "start.blend", "--job", folder / "job",
+        "--out", folder / "after.exr", "--samples", case.judge_samples, "--seed", 2)  # fmt: skip
+    return flips(folder)
 
 
 def flips(folder: Path) -> tuple[float, float, float, float]:

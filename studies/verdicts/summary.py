@@ -41,10 +41,11 @@ def summary(rows: Sequence[Row]) -> str:
 def determined(values: Iterable[dict[str, Any]]) -> tuple[int, int]:
     """How many values called determined are wrong, and how many there are; those of unknown truth are not counted."""
     known = [value for value in values if value.get("level") == "determined" and value["truth"] is not None]
-    return sum(_is_wrong(value) for value in known), len(known)
+    return sum(is_wrong(value) for value in known), len(known)
 
 
-def _is_wrong(value: dict[str, Any]) -> bool:
+def is_wrong(value: dict[str, Any]) -> bool:
+    """Whether a fitted value of known truth is further from it than a determined one may be."""
     found, truth = np.ravel(value["value"]), np.ravel(value["truth"])
     away = np.abs(found - truth[: len(found)])
     return bool(np.any((away > OFF) & (away > DEVIATIONS * np.ravel(value["sd"]))))
