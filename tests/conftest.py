@@ -15,7 +15,6 @@ from hypothesis import HealthCheck, settings
 
 from mfo_backend.render.machine.cache_folder import use_kernel_cache
 
-os.environ.setdefault("MFO_BAKES", "")  # tests leave nothing in the user's folders
 use_kernel_cache()  # the one of the commands that tests start: what either has compiled is there for both
 
 # a machine under load is slow, so no example has a deadline; the database would write into the working folder
@@ -34,6 +33,14 @@ class _RootIsAFolder:
 
 def pytest_configure(config) -> None:
     config.pluginmanager.register(_RootIsAFolder())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def bakes(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """One folder of bakes for all processes of a run: nothing is left in the user's, and what is there is made once."""
+    own = tmp_path_factory.getbasetemp()
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    os.environ.setdefault("MFO_BAKES", str(shared / "bakes"))
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of one small scene for all tests here, made by Blender in processes of their own."""
+"""Files of one small scene for all tests here, made by the Blender in this process; `mfo` has processes of its own."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import subprocess
@@ -45,11 +47,25 @@ def run_mfo(*arguments: object, environment: dict[str, str] | None = None) -> Do
     return Done(done.returncode, done.stdout, done.stderr)
 
 
-def run_bpy(code: str, *arguments: object) -> None:
-    """Run a script with the bpy module in a process of its own; `argv` are its arguments."""
-    words = [sys.executable, "-c", f"import sys, bpy\nargv = sys.argv[1:]\n{code}", *map(str, arguments)]
-    done = subprocess.run(words, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
-    assert done.returncode == 0, done.stderr
+def run_bpy(code: str, *arguments: object) -> Any:
+    """Run a script that opens or builds its scene with the bpy module in this process; returns what it calls `found`.
+
+    `argv` are its arguments.
+    """
+    import bpy
+
+    names = {"bpy": bpy, "argv": [str(each) for each in arguments]}
+    exec(compile(code, "<script>", "exec"), names)
+    return names.get("found")
+
+
+def run_headless(*words: object) -> Done:
+    """Run a command of the add-on's `headless.py` with the bpy module in this process."""
+    from blender_addon import headless
+
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        code = headless.main([str(word) for word in words])
+    return Done(code, said.getvalue(), "")
 
 
 # one render, written in three ways
@@ -84,13 +100,13 @@ class Scene:
 @pytest.fixture(scope="session")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     folder = tmp_path_factory.mktemp("scene")
-    command = [sys.executable, "-m", "blender_addon.headless", "demo-scene", str(folder), "--size", str(SIZE)]
-    subprocess.run(command, check=True, capture_output=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
-    made = Scene(
+    made = run_headless("demo-scene", folder, "--size", SIZE)
+    assert made.code == 0, made.stdout
+    files = Scene(
         folder, *(folder / n for n in ("start.blend", "truth.blend", "reference.exr", "reference.png", "agx.png"))
     )
-    run_bpy(RENDER, made.truth, made.exr, made.png, made.agx_png)
-    return made
+    run_bpy(RENDER, files.truth, files.exr, files.png, files.agx_png)
+    return files
 
 
 @pytest.fixture(scope="session")

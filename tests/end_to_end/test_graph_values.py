@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -25,10 +25,9 @@ for stop in stops:
 bpy.ops.wm.save_as_mainfile(filepath=argv[0])
 """
 SHOW = """
-import json
 bpy.ops.wm.open_mainfile(filepath=argv[0])
 stops = bpy.data.objects["Suzanne"].active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
-open(argv[1], "w").write(json.dumps([list(stop.color) for stop in stops]))
+found = [list(stop.color) for stop in stops]
 """
 
 
@@ -44,7 +43,7 @@ head.keyframe_insert("rotation_euler", frame=1)
 head.rotation_euler[2] += 0.6
 head.keyframe_insert("rotation_euler", frame=9)
 scene.frame_end = 10
-bpy.ops.wm.save_as_mainfile(filepath=argv[0])
+bpy.ops.wm.save_as_mainfile(filepath=argv[2])
 low, high = head.active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
 low.color, high.color = (0.8, 0.1, 0.05, 1.0), (0.05, 0.2, 0.7, 1.0)
 scene.cycles.samples = 64
@@ -56,31 +55,45 @@ bpy.ops.render.render(write_still=True)
 """
 
 
-def test_stops_of_a_ramp_are_found_and_applied(tmp_path: Path) -> None:
-    start, picture, saved = tmp_path / "start.blend", tmp_path / "reference.exr", tmp_path / "saved.blend"
-    run_bpy(BUILD, start, picture)
+@dataclass(frozen=True)
+class Ramp:
+    """A file whose ramp has grey stops, and a picture of what they truly are."""
+
+    start: Path
+    picture: Path
+
+
+@pytest.fixture(scope="module")
+def ramp(tmp_path_factory: pytest.TempPathFactory) -> Ramp:
+    folder = tmp_path_factory.mktemp("ramp")
+    made = Ramp(folder / "start.blend", folder / "front.exr")
+    run_bpy(BUILD, made.start, made.picture)
+    return made
+
+
+def test_stops_of_a_ramp_are_found_and_applied(ramp: Ramp, tmp_path: Path) -> None:
+    saved = tmp_path / "saved.blend"
     names = "Color Ramp/Stop 0, color ramp/stop 1"
     done = run_mfo(
-        "blend", start, "--object", "Suzanne", "--reference", picture, "--parameters", names, "--preset", "fast",
-        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+        "blend", ramp.start, "--object", "Suzanne", "--reference", ramp.picture, "--parameters", names,
+        "--preset", "fast", "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
     )  # fmt: skip
     assert done.code == 0, done.stderr
     assert set(done.answer["recovered"]) == {"Color Ramp/Stop 0", "Color Ramp/Stop 1"}
     levels = {name: entry["level"] for name, entry in done.answer["certainty"].items()}
     assert levels == dict.fromkeys(done.answer["recovered"], "determined")
-    run_bpy(SHOW, saved, tmp_path / "stops.json")
-    low, high = json.loads((tmp_path / "stops.json").read_text())
+    low, high = run_bpy(SHOW, saved)
     assert low == pytest.approx([0.8, 0.1, 0.05, 1.0], abs=0.02)
     assert high == pytest.approx([0.05, 0.2, 0.7, 1.0], abs=0.02)
 
 
-def test_two_pictures_of_values_inside_nodes(tmp_path: Path) -> None:
+def test_two_pictures_of_values_inside_nodes(ramp: Ramp, tmp_path: Path) -> None:
     """Another camera, frame and size: what nodes give is evaluated for each, and both say one set of values."""
-    start, front, side = tmp_path / "start.blend", tmp_path / "front.exr", tmp_path / "side.exr"
-    run_bpy(BUILD, start, front)
-    run_bpy(SIDE, start, side)
+    start, side = tmp_path / "start.blend", tmp_path / "side.exr"
+    run_bpy(SIDE, ramp.start, side, start)
     done = run_mfo(
-        "blend", start, "--object", "Suzanne", "--reference", front, "--reference", f"{side}@camera=Side,frame=9",
+        "blend", start, "--object", "Suzanne",
+        "--reference", ramp.picture, "--reference", f"{side}@camera=Side,frame=9",
         "--parameters", "Color Ramp/Stop 0, Color Ramp/Stop 1", "--preset", "fast", "--out", tmp_path / "job", "--json",
     )  # fmt: skip
     assert done.code == 0, done.stderr
