@@ -324,5 +324,5 @@ GROUPS = {
 }  # fmt: skip
 SETTINGS = tuple(setting for group in GROUPS.values() for setting in group)
 # of what the plain scene has at times, and of what two settings make together
-PLAIN_WORDS = ("smooth over few faces", "casts no shadows")
+PLAIN_WORDS = ("smooth over few faces", "casts no shadows", "Subsurface is fitted as diffuse")
 WORDS = {setting.name: setting.words for setting in SETTINGS}

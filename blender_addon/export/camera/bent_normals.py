@@ -10,6 +10,7 @@ from .camera_model import Camera
 
 # Cycles bends a normal where the mirrored view would be lower than this cosine above the face, or 0.9 of the view's
 LOWEST = 0.01
+MOST_TRIANGLES = 50_000  # that are looked at, evenly through the mesh: 20 ms
 
 
 def share_of_bent_normals(mesh: TriangleMesh, camera: Camera) -> float:
@@ -17,8 +18,9 @@ def share_of_bent_normals(mesh: TriangleMesh, camera: Camera) -> float:
 
     Obstacles are not looked at.
     """
-    corners = mesh.positions.astype(np.float64)[mesh.triangles]
-    normals = mesh.normals.astype(np.float64)[mesh.triangles]
+    triangles = mesh.triangles[:: max(1, len(mesh.triangles) // MOST_TRIANGLES)]
+    corners = mesh.positions[triangles].astype(np.float64)
+    normals = mesh.normals[triangles].astype(np.float64)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(across, axis=1)
     facet = across / np.maximum(area, 1e-30)[:, None]

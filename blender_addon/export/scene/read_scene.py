@@ -55,6 +55,7 @@ SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROB
 DEFAULT_SPP = 64
 # of the target's area; 0.09 on a ball of 12 segments, whose diffuse light is 0.6 % off, 0.02 on one of 24
 MOST_BENT = 0.05
+MOST_OTHERS = 3  # objects beside those that are fitted which are named for it: the worst tell of the kind
 
 
 def read_scene(
@@ -217,7 +218,7 @@ class _Walk:
         self.target_bodies = [0] * len(targets)
         self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
-        self.leaning_normals = set[str]()  # objects with custom normals, or with smooth faces beside flat ones
+        self.leaning_normals = set[str]()  # objects with normals that are not those of their faces
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
@@ -287,7 +288,7 @@ class _Walk:
             return
         note_visibility(item, self.findings)
         hidden = camera_misses(instance, self.depsgraph.view_layer)
-        if item.data.has_custom_normals or item.data.normals_domain == "CORNER":
+        if item.data.has_custom_normals or item.data.normals_domain != "FACE":
             self.leaning_normals.add(item.name)
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
@@ -359,11 +360,13 @@ class _Walk:
             )
 
     def note_bent_normals(self, fitted: Sequence[tuple[FittedSlot, Shape]]) -> None:
-        """Report `fitted` objects, and others whose normals lean, if they turn away from the camera."""
+        """Report objects whose normals turn away from the camera, `fitted` ones and others."""
         meshes = dict(reversed([place for place in self.places if place[0] in self.leaning_normals]))
-        meshes |= {each.object.name: shape.mesh for each, shape in fitted}
-        for name, mesh in meshes.items():
-            share = share_of_bent_normals(mesh, self.data.camera)
+        own = {each.object.name: shape.mesh for each, shape in fitted}
+        shares = {name: share_of_bent_normals(mesh, self.data.camera) for name, mesh in (meshes | own).items()}
+        others = sorted((name for name in shares if name not in own), key=lambda name: -shares[name])
+        for name in (*own, *others[:MOST_OTHERS]):
+            share = shares[name]
             if share > MOST_BENT:
                 self.findings.note(
                     f"Object '{name}' is smooth over few faces, or has custom normals: on {100 * share:.0f} % of it "

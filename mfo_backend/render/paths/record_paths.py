@@ -25,6 +25,7 @@ from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..random_numbers.even_points import even_points
 from ..transport.camera_view import CameraView
+from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from ..transport.traced_radiance import traced_radiance
@@ -279,7 +280,7 @@ def _sampled_lights(
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat)
     density = proposal.density(si.wi, wo, hits.coat)
     valid = front & (wo.z > 0.0) & (density > 0.0) & leaves_on(si, wo, False)
-    ray = si.spawn_ray(si.to_world(wo))
+    ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
     emitter = far.emitter(scene, valid)
@@ -296,7 +297,9 @@ def _sampled_lights(
         if dr.width(index) > 0:
             some = first.of_rays(index - index // rays * rays)
             met, towards = (dr.gather(type(a), a, index) for a in (met, wo))
-            total = dr.gather(mi.Color3f, weight, index) + _over_others(scene, some, met, towards, settings)
+            total = dr.gather(mi.Color3f, weight, index) + _over_others(
+                scene, shadows.starts, some, met, towards, settings
+            )
             dr.scatter(weight, total, index, mode=dr.ReduceMode.Permute)
     # the share may be negative, where the pixel filter is
     share *= terminator.bend(si, wo, valid)
@@ -322,6 +325,7 @@ def _walks(
 
 def _over_others(
     scene: mi.Scene,
+    starts: RayStarts,
     hits: _Hits,
     met: mi.PreliminaryIntersection3f,
     wo: mi.Vector3f,
@@ -337,7 +341,7 @@ def _over_others(
         value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo)
         before = (likely, value / dr.maximum(likely, 1e-12))
     sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
-    ray = si.spawn_ray(si.to_world(wo))
+    ray = starts.ray(si, si.to_world(wo))
     radiance = traced_radiance(scene, sampler, ray, settings.light_paths, settings.depth - 1, before=before, met=met)
     return radiance / settings.proposal.density(si.wi, wo, hits.coat)
 

@@ -261,7 +261,7 @@ class TracedPaths:
             # what goes straight through is still on its way from where it was sent out
             passages = s["passages"] + dr.select(is_bounce, mi.UInt32(0), 1)
             counts = is_bounce | (not self._shadows.lets_through)
-            onward = si.spawn_ray(si.to_world(local))
+            onward = self._shadows.starts.ray(si, si.to_world(local))
             onward.maxt = dr.select(is_bounce, onward.maxt, s["ray"].maxt - si.t)  # the camera's far clipping holds on
             after = {
                 "ray": onward,

@@ -16,6 +16,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from .ray_starts import RayStarts
 from .smooth_facets import shape_number, shape_table
 
 CAMERA_HIDDEN = "camera_hidden"
@@ -27,7 +28,7 @@ class CameraView:
     def __init__(self, scene: mi.Scene) -> None:
         hidden = [shape for shape in scene.shapes() if shape_number(shape, CAMERA_HIDDEN) == 1.0]
         self._scene = scene
-        self.hides = bool(hidden)
+        self.hides, self._starts = bool(hidden), RayStarts(scene)
         self._table = shape_table(hidden, [1] * len(hidden), mi.UInt32) if hidden else None
 
     def met(self, ray: mi.Ray3f, active: Any = True, *, straight: Any = True) -> mi.PreliminaryIntersection3f:
@@ -39,14 +40,14 @@ class CameraView:
     def _seen(
         self, ray: mi.Ray3f, found: mi.PreliminaryIntersection3f, active: mi.Bool
     ) -> mi.PreliminaryIntersection3f:
-        table, start = self._table, mi.Point3f(ray.o)
+        table, starts, start = self._table, self._starts, mi.Point3f(ray.o)
         number = dr.reinterpret_array(mi.UInt32, found.shape)
         known = active & found.is_valid() & (number < dr.opaque(mi.UInt32, dr.width(table)))
         passing = known & (dr.gather(mi.UInt32, table, number, known) == 1)
         passed = mi.Bool(passing)
         while dr.hint(passing, label="hidden from the camera"):
             si = found.compute_surface_interaction(ray, mi.RayFlags.Minimal, passing)
-            onward = si.spawn_ray(ray.d)
+            onward = starts.ray(si, ray.d)
             onward.maxt = ray.maxt - si.t
             ray = dr.select(passing, onward, ray)
             found = dr.select(passing, self._scene.ray_intersect_preliminary(ray, active=passing), found)

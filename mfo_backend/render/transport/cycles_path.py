@@ -105,8 +105,8 @@ class CyclesPath(RBIntegrator):
                 si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=bounce == 0, active=active)
             if dr.hint(hidden, mode="scalar"):
                 skip = active & (bounce == 0) & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711
-                further = self.skip_area_emitters(scene, si.spawn_ray(ray.d), True, skip)
-                behind = further.compute_surface_interaction(si.spawn_ray(ray.d), mi.RayFlags.All, skip)
+                further = self.skip_area_emitters(scene, shadows.starts.ray(si, ray.d), True, skip)
+                behind = further.compute_surface_interaction(shadows.starts.ray(si, ray.d), mi.RayFlags.All, skip)
                 si[skip] = behind
             valid |= (bounce == 0) & si.is_valid()
             last = mi.Bool(shadows.ends(si, passages))  # its own light still counts
@@ -154,7 +154,7 @@ class CyclesPath(RBIntegrator):
             bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
             if dr.hint(terminator.bends, mode="scalar"):
                 ratio *= terminator.bend(si, bs.wo, goes_on)
-            onward = si.spawn_ray(si.to_world(bs.wo))
+            onward = shadows.starts.ray(si, si.to_world(bs.wo))
             is_straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             onward.maxt = dr.select(is_straight, ray.maxt - si.t, onward.maxt)  # the camera's far clipping holds on
             is_through = (bs.sampled_type & TRANSMITS) != 0

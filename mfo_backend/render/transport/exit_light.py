@@ -120,7 +120,7 @@ def exit_light(
     wo = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
     likely = mi.warp.square_to_cosine_hemisphere_pdf(wo)
     valid = (likely > 0.0) & leaves_on(si, wo, False)
-    ray = si.spawn_ray(si.to_world(wo))
+    ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
     emitter = far.emitter(scene, valid)

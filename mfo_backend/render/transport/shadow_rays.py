@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from .ray_starts import RayStarts
 from .smooth_facets import ShadowTerminator, shape_number, shape_table
 
 SHADOW_TRANSMISSION = "shadow_transmission"
@@ -42,7 +43,7 @@ class ShadowRays:
     """The shadow rays of a scene."""
 
     def __init__(self, scene: mi.Scene) -> None:
-        self.terminator = ShadowTerminator.of(scene)
+        self.terminator, self.starts = ShadowTerminator.of(scene), RayStarts(scene)
         self._scene = scene
         self._shadowless = [e for e in scene.emitters() if not getattr(e, "shadow", True)]
         self._uniform = [e for e in scene.emitters() if e.class_name() == UNIFORM]
@@ -55,7 +56,6 @@ class ShadowRays:
         self.lets_through = hasattr(scene.integrator(), "transparent_bounces") and any(
             s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
         )
-        self.plain = not marked and not self.lets_through and not self._shadowless
 
     def passed(
         self,
@@ -72,7 +72,7 @@ class ShadowRays:
         casts = mi.Bool(active)
         for lamp in self._shadowless:
             casts &= ds.emitter != mi.EmitterPtr(lamp)
-        ray = self.terminator.ray(si, ds, casts)
+        ray = self.starts.ray_to(si, ds.p, self.terminator.lift(si, ds.d, casts))
         if not self._marked and not self.lets_through:
             hidden = self._scene.ray_test(ray, casts)
             return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0))
@@ -117,7 +117,7 @@ class ShadowRays:
             share = dr.select(met > most, 0, share)
             through = dr.select(active, through * share, through)
             active &= dr.max(through) > 0
-            ray = si.spawn_ray_to(end)
+            ray = self.starts.ray_to(si, end)
         return Passed(through, alpha, times)
 
 
@@ -134,8 +134,6 @@ def sample_light(
 
     The last is how often the light went through the BSDF `of`, which takes nothing of it here.
     """
-    if shadows.plain and not shadows.terminator.lifts:
-        return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0)
     ds, light = scene.sample_emitter_direction(si, u, False, active)
     passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of, passages)
     ds.pdf = dr.select(dr.max(passed.through) > 0, ds.pdf, 0.0)

@@ -64,14 +64,6 @@ class ShadowTerminator:
             found = kept["shadow_terminator"] = ShadowTerminator(scene)
         return found
 
-    def ray(self, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f, active: mi.Bool) -> mi.Ray3f:
-        """The ray whose obstacles say whether the light of the sample `ds` reaches `si`."""
-        if not self.lifts:
-            return si.spawn_ray_to(ds.p)
-        origin = mi.Interaction3f(si)
-        origin.p = si.p + self._lift(si, ds.d, active)
-        return origin.spawn_ray_to(ds.p)
-
     def bend(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: mi.Bool) -> mi.Float | float:
         """The factor of light from `wo`, in the shading frame, whose side of the surface `si.wi` is on."""
         if not self.bends:
@@ -87,7 +79,10 @@ class ShadowTerminator:
         reflected = active & known & (signed > 0.0) & (frequency > 1.0)
         return dr.select(reflected, bent, 1.0)
 
-    def _lift(self, si: mi.SurfaceInteraction3f, towards: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
+    def lift(self, si: mi.SurfaceInteraction3f, towards: mi.Vector3f, active: mi.Bool) -> mi.Vector3f | float:
+        """How far from `si` the ray starts whose obstacles say whether light from a direction reaches it."""
+        if not self.lifts:
+            return 0.0
         shape, known = _index(si, self._cutoff)
         cutoff = dr.gather(mi.Float, self._cutoff, shape, active & known)
         on = active & known & (cutoff > 0.0)

@@ -63,6 +63,20 @@ def read(report: Any) -> tuple[np.ndarray, ...]:
     return matrices(text), np.array(mesh["vertex_positions"]), camera, seen, other
 
 
+@pytest.mark.parametrize("size", [0.5, 1e-3])
+def test_a_small_target_is_far_from_zero_sooner(size: float, scene: Any, export: Any) -> None:
+    """Mitsuba's floats are as coarse for a ball of a millimetre at a metre as for one of a metre at a kilometre."""
+    target = build(scene, (0.7, -0.3, 0.0))
+    bpy.data.objects["Place"].scale = (size,) * 3
+    scene.camera.data.clip_start = 0.1 * size
+    bpy.context.view_layer.update()
+    generator = export(target, "small", reference=bpy.data.images.new("Any", 32, 32)).request["generator"]
+    if size == 0.5:
+        assert "origin" not in generator
+    else:
+        np.testing.assert_allclose(generator["origin"], (0.7, -0.3, 0.0), atol=size)
+
+
 def test_all_places_count_from_the_target(scene: Any, export: Any) -> None:
     picture = bpy.data.images.new("Any", 32, 32)
     target = build(scene, (0.0, 0.0, 0.0))
