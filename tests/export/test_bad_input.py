@@ -101,6 +101,28 @@ def endless_lamp(scene: Any, target: Any) -> None:
     add_light("SUN").data.energy = float("inf")
 
 
+def holed_picture(scene: Any, target: Any) -> None:
+    """A texture before other nodes: Cycles would evaluate them."""
+    image = bpy.data.images.new("Holed", 4, 4, float_buffer=True)
+    image.pixels[8:11] = (float("nan"),) * 3
+    tree = target.data.materials[0].node_tree
+    texture, gamma = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeGamma")
+    texture.image = image
+    tree.links.new(texture.outputs[0], gamma.inputs[0])
+    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree.links.new(gamma.outputs[0], principled.inputs["Base Color"])
+
+
+def holed_sky(scene: Any, target: Any) -> None:
+    image = bpy.data.images.new("Holed", 4, 2, float_buffer=True)
+    image.pixels.foreach_set([1.0, 1.0, float("inf"), 1.0] * 8)
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    tree.links.new(texture.outputs[0], background.inputs["Color"])
+
+
 def endless_world(scene: Any, target: Any) -> None:
     add_light("SUN")  # without it the scene has no light
     world_color(scene, float("nan"))
@@ -121,6 +143,9 @@ CAMERA = (
 LAMP = (
     "The place or a setting of light 'Light' is NaN or infinite: mend the driver, constraint or keyframe that gives "
     "it, or hide the light in renders."
+)
+HOLED = (
+    "Image 'Holed' has pixels that are NaN, infinite or absurdly bright (1e15): replace them, or choose another image."
 )
 WORLD = "The colour or strength of the world is NaN or infinite: mend the driver or keyframe that gives it."
 VALUE = "A value of material '{}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number."
@@ -146,6 +171,8 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     lamp_nowhere: LAMP,
     endless_lamp: LAMP,
     endless_world: WORLD,
+    holed_picture: HOLED,
+    holed_sky: HOLED,
     no_roughness: VALUE.format("Target"),
     other_without_colour: VALUE.format("Wall"),
     no_faces: "No face of 'Target' uses its active material slot 1: choose another.",

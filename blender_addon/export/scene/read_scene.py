@@ -34,6 +34,7 @@ from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
 from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
+from ..nodes.unfinite_pixels import refuse_unfinite_pixels
 from ..render_state import (
     background_objects,
     instanced_objects,
@@ -120,6 +121,9 @@ def read_scene(
         rendered = rendered_objects(view_layer) | background_objects(scene)
         walk = _Walk(data, fitted, described, depsgraph, rendered, findings, bakes)
         walk.run()
+        owners = [each for each in bpy.data.materials if each.name_full in walk.bsdfs]
+        owners += [scene.world] if view_layer.use_sky and scene.world is not None else []
+        refuse_unfinite_pixels(filter(None, map(node_tree_of, owners)), findings)
         shapes = [data.target_of(number) for number in range(len(fitted))]
         for number, (each, shape) in enumerate(zip(fitted, shapes, strict=True)):
             if shape is None:

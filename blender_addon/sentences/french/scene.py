@@ -212,6 +212,7 @@ SCENE = {
     "{} cannot be written to a scene file; numbers must be finite": "{} ne peut pas être écrit dans un fichier de scène ; les nombres doivent être finis",
     "The place or a setting of the camera is NaN or infinite: mend the driver, constraint or keyframe that gives it.": "La position ou un réglage de la caméra est NaN ou infini : corriger le pilote, la contrainte ou l'image clé qui le donne.",
     "The place or a setting of light '{}' is NaN or infinite: mend the driver, constraint or keyframe that gives it, or hide the light in renders.": "La position ou un réglage de la lumière '{}' est NaN ou infini : corriger le pilote, la contrainte ou l'image clé qui le donne, ou masquer la lumière au rendu.",
+    "Image '{}' has pixels that are NaN, infinite or absurdly bright (1e15): replace them, or choose another image.": "L'image '{}' a des pixels NaN, infinis ou d'une clarté absurde (1e15) : les remplacer, ou choisir une autre image.",
     "The colour or strength of the world is NaN or infinite: mend the driver or keyframe that gives it.": "La couleur ou l'intensité du monde est NaN ou infinie : corriger le pilote ou l'image clé qui la donne, ou définir un nombre.",
     "A value of material '{}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number.": "Une valeur du matériau '{}' est NaN ou infinie : corriger le pilote ou l'image clé qui la donne, ou définir un nombre.",
     "{} cannot be written: choose a folder you may write to.": "{} ne peut pas être écrit : choisir un dossier où vous pouvez écrire.",
