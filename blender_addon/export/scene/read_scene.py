@@ -29,12 +29,12 @@ from ..lights.read_light import read_light
 from ..material_model import Material, grey
 from ..materials.read_context import needs_bake, read_context
 from ..materials.read_material import note_volume, read_target
+from ..materials.unfinite_pixels import refuse_unfinite_pixels
 from ..meshes.coincident import shared_faces
 from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
 from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
-from ..nodes.unfinite_pixels import refuse_unfinite_pixels
 from ..render_state import (
     background_objects,
     instanced_objects,
