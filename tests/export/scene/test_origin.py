@@ -77,6 +77,17 @@ def test_a_small_target_is_far_from_zero_sooner(size: float, scene: Any, export:
         np.testing.assert_allclose(generator["origin"], (0.7, -0.3, 0.0), atol=size)
 
 
+@pytest.mark.parametrize(("weight", "x", "is_named"), [(1.0, 3000.0, True), (1.0, 300.0, False), (0.0, 3000.0, False)])
+def test_subsurface_far_from_zero_is_named(weight: float, x: float, is_named: bool, scene: Any) -> None:
+    """Cycles takes places below a surface in the world's floats."""
+    world_color(scene, 1.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target", Subsurface_Weight=weight))
+    target.location.x = x
+    add_camera("PERSP", (x, 0.0, 4.0))
+    notes = check_export(bpy.context, target)[1]
+    assert any("from the world's zero" in note for note in notes) == is_named
+
+
 def test_all_places_count_from_the_target(scene: Any, export: Any) -> None:
     picture = bpy.data.images.new("Any", 32, 32)
     target = build(scene, (0.0, 0.0, 0.0))
