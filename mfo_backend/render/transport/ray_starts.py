@@ -19,8 +19,9 @@ import numpy as np
 
 from .smooth_facets import shape_table
 
-# mitsuba/core/math.h, RayEpsilon: 1,500 half steps of a float at 1. Triangles of usual forms need 4 of these, two
-# million rays of a ball, of tilted planes and of a ball of 1 mm half a metre away; one 500 times as long as wide 250
+# mitsuba/core/math.h, RayEpsilon: 1,500 half steps of a float at 1. Of two million rays from balls, tilted planes and
+# a ball of 1 mm half a metre away none meets what it left with 4 of these; from triangles 500 and 5,000 times as long
+# as wide none does with 32
 EPSILON = 1500.0 * 2.0**-24
 SHADOW_EPSILON = 10.0 * EPSILON  # of the way to a light, as Mitsuba's
 
