@@ -43,7 +43,7 @@ from ..render_state import (
     rendered_layer,
     rendered_objects,
 )
-from .origin import moved, scene_origin
+from .origin import moved, note_far_scattering, scene_origin
 from .ray_visibility import camera_misses, note_visibility, shadow_transmission
 from .read_light_paths import BOUNCES, read_light_paths
 from .read_world import BLACK, read_world
@@ -56,9 +56,6 @@ SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROB
 DEFAULT_SPP = 64
 # of the target's area; 0.09 on a ball of 12 segments, whose diffuse light is 0.6 % off, 0.02 on one of 24
 MOST_BENT = 0.05
-# Of a target's size: a ball of 2 m with subsurface loses 0.2 % of the picture's light in Cycles at 1 km, 0.7 % at 3 km
-# and 2.5 % at 10 km
-MOST_APART = 500.0
 MOST_OTHERS = 3  # objects beside those that are fitted which are named for it: the worst tell of the kind
 
 
@@ -138,7 +135,7 @@ def read_scene(
             return None
         walk.note_coincident_faces()
         walk.note_bent_normals(there)
-        walk.note_far_scattering(there)
+        note_far_scattering(data, there, findings)
         for number, (each, shape) in enumerate(there):
             of_one = Findings()
             check_visible(data, shape, each.object, each.slot, scene, depsgraph, of_one)
@@ -380,17 +377,6 @@ class _Walk:
                     f"Object '{name}' is smooth over few faces, or has custom normals: on {100 * share:.0f} % of it "
                     "normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all "
                     "light."
-                )
-
-    def note_far_scattering(self, fitted: Sequence[tuple[FittedSlot, Shape]]) -> None:
-        """Report `fitted` objects with subsurface that are far from zero: places there are coarse in Cycles."""
-        apart = float(np.linalg.norm(self.data.origin))
-        for each, shape in fitted:
-            size = float(np.ptp(shape.mesh.positions, axis=0).max())
-            if self.data.materials[shape.bsdf].scattering and apart > MOST_APART * size:
-                self.findings.note(
-                    f"Object '{each.object.name}' is {apart:.3g} m from the world's zero, where Cycles loses light "
-                    "below surfaces and the fit does not: move the scene to the zero."
                 )
 
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
