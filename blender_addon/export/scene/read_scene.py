@@ -56,6 +56,7 @@ SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROB
 DEFAULT_SPP = 64
 # of the target's area; 0.09 on a ball of 12 segments, whose diffuse light is 0.6 % off, 0.02 on one of 24
 MOST_BENT = 0.05
+MOST_BENT_OF_SMOOTH = 0.2  # of other objects without flat faces: a cube, 0.66 of it, was off by blocks of 16 %
 MOST_OTHERS = 3  # objects beside those that are fitted which are named for it: the worst tell of the kind
 
 
@@ -223,7 +224,7 @@ class _Walk:
         self.target_bodies = [0] * len(targets)
         self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
-        self.leaning_normals = set[str]()  # objects with normals that are not those of their faces
+        self.leaning_normals: dict[str, float] = {}  # the share of an object's normals that may turn away unnamed
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
@@ -294,7 +295,8 @@ class _Walk:
         note_visibility(item, self.findings)
         hidden = camera_misses(instance, self.depsgraph.view_layer)
         if item.data.has_custom_normals or item.data.normals_domain != "FACE":
-            self.leaning_normals.add(item.name)
+            is_smooth = item.data.normals_domain == "POINT" and not item.data.has_custom_normals
+            self.leaning_normals[item.name] = MOST_BENT_OF_SMOOTH if is_smooth else MOST_BENT
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
@@ -372,7 +374,7 @@ class _Walk:
         others = sorted((name for name in shares if name not in own), key=lambda name: -shares[name])
         for name in (*own, *others[:MOST_OTHERS]):
             share = shares[name]
-            if share > MOST_BENT:
+            if share > (MOST_BENT if name in own else self.leaning_normals[name]):
                 self.findings.note(
                     f"Object '{name}' is smooth over few faces, or has custom normals: on {100 * share:.0f} % of it "
                     "normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all "
