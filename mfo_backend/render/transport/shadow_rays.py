@@ -56,6 +56,8 @@ class ShadowRays:
         self.lets_through = hasattr(scene.integrator(), "transparent_bounces") and any(
             s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
         )
+        unlit = marked or self.lets_through or self._shadowless
+        self.plain = self.starts.are_usual and not unlit and not self.terminator.lifts
 
     def passed(
         self,
@@ -134,6 +136,8 @@ def sample_light(
 
     The last is how often the light went through the BSDF `of`, which takes nothing of it here.
     """
+    if shadows.plain:
+        return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0)
     ds, light = scene.sample_emitter_direction(si, u, False, active)
     passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of, passages)
     ds.pdf = dr.select(dr.max(passed.through) > 0, ds.pdf, 0.0)

@@ -49,7 +49,8 @@ def test_only_what_light_passes_is_followed_surface_by_surface(bsdf, lets) -> No
     cycles_path.register()
     sheet = {"type": "rectangle", "bsdf": {"type": bsdf}}
     scene = {"type": "scene", "integrator": {"type": "cycles_path"}, "lamp": LAMP, "sheet": sheet}
-    assert ShadowRays(mi.load_dict(scene)).lets_through == lets
+    shadows = ShadowRays(mi.load_dict(scene))
+    assert (shadows.lets_through, shadows.plain) == (lets, not lets)
 
 
 @pytest.mark.parametrize(
