@@ -40,7 +40,7 @@ from ..properties import SOCKET_ITEMS, crossed_limits, node_value_key
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
 from ..versions import overrides_of
-from .ticked_slots import NONE_TICKED, ticked_slots
+from .ticked_slots import NONE_TICKED, left_out, ticked_slots
 
 FINE, IGNORED, TO_CHOOSE, STOPS = "fine", "ignored", "to_choose", "stops"
 REGION_ALONE = "Render Region is on, and the picture shows the region alone."
@@ -85,7 +85,9 @@ def _targets(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Fi
         target = view_layer.objects.active
         return _target(scene, view_layer, target, target.active_material_index if target is not None else 0)
     slots = ticked_slots(scene)
-    found = [] if slots else [Finding(STOPS, NONE_TICKED)]
+    gone = left_out(scene)
+    found = [Finding(IGNORED if slots else STOPS, sentence) for sentence in gone]
+    found += [] if slots or gone else [Finding(STOPS, NONE_TICKED)]
     for each in slots:
         found += [_named(finding, each) for finding in _target(scene, view_layer, each.object, each.slot)]
     return found

@@ -16,6 +16,7 @@ from .findings import ExportError, Findings, NotShownError
 from .fitted_slot import FittedSlot, check_slots
 from .leaves_by_pictures import leaves_by_pictures
 from .materials.wanted_values import fits_of_each, wanted_values
+from .meshes.known_meshes import KnownMeshes
 from .partial_export import MITSUBA, PartialExport, partial_export
 from .reference.picture_setup import PictureSetup, check_setups, named, shown
 from .reference.reference import Picture
@@ -81,17 +82,21 @@ def export_steps(
     upright: bool,
     tell: Callable[[float], None] = lambda _share: None,
     targets: Sequence[FittedSlot] = (),
+    known: KnownMeshes | None = None,
 ) -> Steps[ExportReport]:
     """`export_job` in steps, which need the same context each: it pauses while a second Blender works.
 
     Of one picture the scene has been read when a pause does not hold it. Closing the steps ends the second Blender and
-    leaves `folder` as it was.
+    leaves `folder` as it was. `known` has the meshes of earlier exports of the file.
     """
+    known = known or KnownMeshes()
     if isinstance(reference, Sequence):
-        return (yield from _several(context, obj, folder, reference, fit, reference_view, upright, tell, targets))
+        return (
+            yield from _several(context, obj, folder, reference, fit, reference_view, upright, tell, targets, known)
+        )
     with new_job_folder(Path(folder)) as partial:
         part = yield from partial_export(
-            context, obj, partial, reference, fit, reference_view, upright, tell, targets=targets
+            context, obj, partial, reference, fit, reference_view, upright, tell, targets=targets, known=known
         )
         part.write_request(partial)
     return ExportReport(Path(folder), part.request, tuple(part.findings.notes))
@@ -107,6 +112,7 @@ def _several(
     upright: bool,
     tell: Callable[[float], None],
     targets: Sequence[FittedSlot],
+    known: KnownMeshes,
 ) -> Steps[ExportReport]:
     """One picture after the other; while it pauses the file shows what it did before."""
     check_setups(pictures)
@@ -139,6 +145,7 @@ def _several(
                 is_first=not exported,
                 leaves=leaves,
                 targets=targets,
+                known=known,
             )
             show = functools.partial(shown, context, setup, obj, own_size=count > 1)
             try:
@@ -224,7 +231,7 @@ def export_findings(
     except ExportError as problem:
         findings.error(str(problem))
         return findings
-    data = read_scene(context, obj, findings, targets=targets)
+    data = drained(read_scene(context, obj, findings, targets=targets))
     if data is not None:
         finish_scene(data, findings)
         scene_files(data, findings)

@@ -26,6 +26,7 @@ from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
 from .materials.read_material import with_default_tangent
 from .materials.wanted_values import WantedValues, fits_of_each, wanted_values
+from .meshes.known_meshes import KnownMeshes
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
 from .reference.picture_setup import size_of
@@ -89,11 +90,13 @@ def partial_export(
     is_first: bool = True,
     leaves: Sequence[str | None] | None = None,
     targets: Sequence[FittedSlot] = (),
+    known: KnownMeshes | None = None,
 ) -> Steps[PartialExport]:
     """Write what one picture needs, as the context shows it, into an existing folder; all but request.json.
 
     `several` says that it is one of several pictures, and `is_first` that it is the first of them; `leaves` are the
     fitted ones of mixes where they are known, and `targets` slots whose materials are fitted together.
+    `known` has the meshes of earlier exports.
 
     Raises
     ------
@@ -127,7 +130,9 @@ def partial_export(
             fitted = [replace(each, leaf=own) for each, own in zip(fitted, leaves, strict=True)]
             leaf = leaves[0] if leaves else None
             together = fitted if targets else ()
-            data = read_scene(context, obj, findings, bakes, leaf, together, may_miss=several, picture=size)
+            data = yield from read_scene(
+                context, obj, findings, bakes, leaf, together, may_miss=several, picture=size, known=known
+            )
             findings.raise_first()
             assert data is not None
             assert obj is not None

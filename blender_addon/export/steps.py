@@ -24,12 +24,15 @@ class Pause:
     ----------
     holds_scene
         What is read next must be as it was until then.
+    is_apart
+        The steps up to the next pause do not look at the scene.
     text, share
         What is being done, and how much of all of it has been; empty and None where that is not known.
     """
 
     is_over: Callable[[], bool] = lambda: True
     holds_scene: bool = False
+    is_apart: bool = False
     text: str = ""
     share: float | None = None
 
@@ -78,7 +81,11 @@ def part_of(steps: Steps[Found], number: int, count: int, text: str) -> Steps[Fo
 def held(
     steps: Steps[Found], show: Callable[[], AbstractContextManager[object]], text: str, share: float
 ) -> Steps[Found]:
-    """Steps that each need what `show` shows; it is put back while they pause, and the scene must stay as it is."""
+    """Steps that need what `show` shows, but those apart; it is put back while they pause, and the scene must stay."""
+
+    def as_held(pause: Pause) -> Pause:
+        return replace(pause, holds_scene=True, text=text, share=share)
+
     try:
         while True:
             began = time.monotonic()
@@ -88,6 +95,12 @@ def held(
                     pause = advance(steps, max(STEP_SECONDS, 2.0 * shown))  # as long as to show and to put back
                 except StopIteration as end:
                     return end.value
-            yield replace(pause, holds_scene=True, text=text, share=share)
+            yield as_held(pause)
+            while pause.is_apart:
+                try:
+                    pause = next(steps)
+                except StopIteration as end:
+                    return end.value
+                yield as_held(pause)
     finally:
         steps.close()

@@ -5,6 +5,7 @@
 # Blender reads properties from annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import bpy
@@ -12,8 +13,9 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
-from ..check.ticked_slots import NONE_TICKED, ticked_slots
+from ..check.ticked_slots import NONE_TICKED, left_out, ticked_slots
 from ..export.fitted_slot import FittedSlot
+from ..export.meshes.known_meshes import KnownMeshes
 from ..export.steps import Pause, Steps, drained, part_of
 from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
@@ -33,6 +35,7 @@ from .fit_options import (
 )
 
 EXPORTING = "Object {} of {}"
+RUNS_ALREADY = "Its fit runs already: press Fit when it has ended, to fit it again."
 # what a script gives; buttons start with the defaults every time and the redo panel does not show them
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
@@ -103,17 +106,17 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         self.report({"INFO"}, translated(f"{outcome.sentence} {_error_summary()}".strip()))
         return {"FINISHED"}
 
-    def _targets(self, context: bpy.types.Context) -> tuple[bpy.types.Object, str, list[FittedSlot]]:
-        """The object, the folder, and the ticked slots where several materials are fitted together."""
+    def _targets(self, context: bpy.types.Context) -> tuple[bpy.types.Object, str, list[FittedSlot], list[str]]:
+        """The object, the folder, the ticked slots where several are fitted together, and what is left out of them."""
         if self.object or not context.scene.mfo.targets:
-            return target_of(context, self.object), self.job_folder, []
-        slots = ticked_slots(context.scene)
+            return target_of(context, self.object), self.job_folder, [], []
+        slots, said = ticked_slots(context.scene), left_out(context.scene)
         if not slots:
-            raise FitError(NONE_TICKED)
+            raise FitError(" ".join(said) or NONE_TICKED)
         obj = slots[0].object
         if len(slots) == 1 and obj.active_material_index == slots[0].slot:
-            return obj, self.job_folder, []
-        return obj, self.job_folder, slots
+            return obj, self.job_folder, [], said
+        return obj, self.job_folder, slots, said
 
 
 class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
@@ -144,13 +147,18 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Export one job for each material; the first starts, the others wait, or in background mode all are done."""
-        asked: list[tuple[str, Steps[PreparedFit]]] = []
+        asked: list[_Asked] = []
         refused: list[EndedFit] = []
+        known = KnownMeshes()
         for obj in selected_targets(context):
+            material = obj.active_material
             try:
-                asked.append((obj.active_material.name, self.steps(context, obj, "")))
+                asked.append(_Asked(material.name, material.session_uid, self.steps(context, obj, "", known=known)))
             except FitError as error:
-                refused.append(EndedFit(obj.active_material.name, str(error), "ERROR"))
+                refused.append(EndedFit(material.name, str(error), "ERROR"))
+        again = sum(fit_queue.waits(each.uid) for each in asked)
+        if again:
+            self.report({"INFO"}, translated(f"Fits that waited and are prepared anew: {again}."))
         steps = _one_after_other(asked, self._start_and_wait if self.blocks() else start_or_queue, refused)
         if asked and not bpy.app.background and not self.blocks():  # the first loads while it is exported
             waiting_backend.prepare(python_of(context), idle_seconds(context), own_blender(SERVER, []))
@@ -244,20 +252,36 @@ class MFO_OT_choose_shader(bpy.types.Operator):
         return {"FINISHED"}
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """A material by name and session_uid, and the export for it."""
+
+    name: str
+    uid: int
+    steps: Steps[PreparedFit]
+
+
 def _one_after_other(
-    asked: Sequence[tuple[str, Steps[PreparedFit]]], start: Callable[[PreparedFit], None], refused: list[EndedFit]
+    asked: Sequence[_Asked], start: Callable[[PreparedFit], None], refused: list[EndedFit]
 ) -> Steps[int]:
-    """Export for each material of these names and `start` its fit; returns how many, the others are in `refused`."""
+    """Export for each material and `start` its fit; returns how many, the others are in `refused`.
+
+    A fit of the material that waits gives way, and beside one that runs there is no second.
+    """
     count = 0
-    for number, (name, steps) in enumerate(asked):
+    for number, each in enumerate(asked):
         text = EXPORTING.format(number + 1, len(asked))
         try:
             if number:
                 yield Pause(holds_scene=True, text=text, share=number / len(asked))
-            start((yield from part_of(steps, number, len(asked), text)))
+            if running_job.current is not None and running_job.current.fit.uids == (each.uid,):
+                refused.append(EndedFit(each.name, RUNS_ALREADY, "INFO"))
+                continue
+            fit_queue.give_way(each.uid)
+            start((yield from part_of(each.steps, number, len(asked), text)))
             count += 1
         except FitError as error:
-            refused.append(EndedFit(name, str(error), "ERROR"))
+            refused.append(EndedFit(each.name, str(error), "ERROR"))
     return count
 
 

@@ -15,6 +15,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from ..backend.preferences import chosen_python, new_job_folder
 from ..export.fitted_slot import FittedSlot
 from ..export.job import ExportError, export_steps
+from ..export.meshes.known_meshes import KnownMeshes
 from ..export.nodes.closure_leaves import ClosureError
 from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.chosen_file import absolute
@@ -77,13 +78,20 @@ class FitOptions:
         start_fit(fit, timer=not self.blocks() and not bpy.app.background)
 
     def steps(
-        self, context: bpy.types.Context, obj: bpy.types.Object, job_folder: str, targets: Sequence[FittedSlot] = ()
+        self,
+        context: bpy.types.Context,
+        obj: bpy.types.Object,
+        job_folder: str,
+        targets: Sequence[FittedSlot] = (),
+        notes: Sequence[str] = (),
+        known: KnownMeshes | None = None,
     ) -> Steps[PreparedFit]:
         """Export the job folder of the object's active material, in steps that pause while a second Blender works.
 
         What operator and settings say is read at once, so the operator need not outlive the call. With `targets` the
-        materials of those slots are fitted together instead. The call and the steps raise `FitError` where the job
-        cannot be exported.
+        materials of those slots are fitted together instead. `notes` go before those of the export, and `known`
+        has the meshes of exports before this one. The call and the steps raise `FitError` where the job cannot be
+        exported.
         """
         settings = context.scene.mfo
         materials = [each.material for each in targets if each.material is not None] or [_active_material(obj)]
@@ -110,11 +118,11 @@ class FitOptions:
             is_new = not folder.exists()
             try:
                 report = yield from export_steps(
-                    context, obj, folder, reference, chosen, made, upright=False, targets=targets
+                    context, obj, folder, reference, chosen, made, upright=False, targets=targets, known=known
                 )
             except ExportError as error:
                 raise FitError(str(error)) from error
-            return PreparedFit(python, folder, name, uids, report.notes, is_new)
+            return PreparedFit(python, folder, name, uids, (*notes, *report.notes), is_new)
 
         return exported()
 

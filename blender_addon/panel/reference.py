@@ -9,6 +9,7 @@ import bpy
 
 from ..check import preflight
 from ..check.checks import asks_view
+from ..check.ticked_slots import slot_of
 from ..pictures import overlay
 from ..running import running_job
 from ..sentences.translated import translated, word
@@ -129,9 +130,13 @@ def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     row.operator("mfo.list_materials", text="", icon="FILE_REFRESH")
     row.operator("mfo.clear_materials", text="", icon="X")
     for entry in context.scene.mfo.targets:
-        if entry.object is None or entry.material is None:
-            continue
         row = box.row(align=True)
-        row.prop(entry, "use", text=entry.material.name, translate=False)
-        row.label(text=entry.object.name, icon="OBJECT_DATA", translate=False)
+        is_there = slot_of(context.scene, entry) is not None
+        row.alert = entry.use and not is_there
+        name = entry.material.name if entry.material is not None else word("No material")
+        row.prop(entry, "use", text=name, translate=False)
+        if is_there:
+            row.label(text=entry.object.name, icon="OBJECT_DATA", translate=False)
+        else:
+            row.label(text="Not there", icon="ERROR")
     box.prop(context.scene.mfo, "queue")

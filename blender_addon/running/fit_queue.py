@@ -63,6 +63,17 @@ def take() -> PreparedFit | None:
     return waiting.pop(0)
 
 
+def waits(uid: int) -> bool:
+    """Whether a fit of that material alone waits."""
+    return any(fit.uids == (uid,) for fit in waiting)
+
+
+def give_way(uid: int) -> None:
+    """Drop what waits of that material alone: a newer fit of it is prepared."""
+    for index in reversed([index for index, fit in enumerate(waiting) if fit.uids == (uid,)]):
+        drop(index)
+
+
 def drop(index: int) -> None:
     """Take a waiting fit out and remove the folder that was made for it."""
     fit = waiting.pop(index)

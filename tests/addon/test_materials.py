@@ -143,6 +143,41 @@ def test_what_cannot_be_fitted_together_is_said_first(two: SimpleNamespace) -> N
     assert "targets" not in json.loads((Path(two.job) / "request.json").read_text("utf-8"))
 
 
+@pytest.mark.parametrize("gone", ["object", "unlinked", "slot", "material"])
+def test_a_ticked_material_that_is_not_there_any_more_is_named(two: SimpleNamespace, gone: str) -> None:
+    from blender_addon.check import checks
+
+    bpy = two.bpy
+    floor, wood = bpy.data.objects["Floor"], bpy.data.materials["Wood"]
+    if gone == "object":
+        bpy.data.objects.remove(floor)
+    elif gone == "unlinked":
+        floor.users_collection[0].objects.unlink(floor)
+    elif gone == "slot":
+        floor.data.materials[0] = bpy.data.materials.new("Stone")
+    else:
+        bpy.data.materials.remove(wood)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Väse"]
+    said = {
+        "slot": "Material 'Wood' is left out: 'Floor' does not have it any more.",
+        "material": "A material of the list is left out: it is not in the file any more.",
+    }.get(gone, "Material 'Wood' is left out: its object is not in the scene any more.")
+
+    def found() -> list[tuple[str, str]]:
+        every = checks.quick_check(bpy.context.scene, bpy.context.view_layer)
+        return [(each.level, each.sentence) for each in every if "left out" in each.sentence]
+
+    assert found() == [("ignored", f"{said} List the materials anew.")]
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    assert f"{said} List the materials anew." in [m.name for m in bpy.context.window_manager.mfo_runtime.messages]
+    bpy.context.scene.mfo.targets[1].use = False
+    assert found() == [("stops", f"{said} List the materials anew.")]
+    with pytest.raises(RuntimeError, match="is left out"):
+        bpy.ops.mfo.fit(job_folder=two.job)
+    bpy.context.scene.mfo.targets[0].use = False
+    assert found() == []
+
+
 def test_a_finished_job_is_opened_with_all_its_results(two: SimpleNamespace) -> None:
     bpy, runtime = two.bpy, two.bpy.context.window_manager.mfo_runtime
     assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}

@@ -160,6 +160,36 @@ def test_windows_are_drawn_between_pictures(scene: SimpleNamespace, taken: list[
     assert taken == ["fit"]
 
 
+def test_nothing_is_shown_for_steps_apart() -> None:
+    from contextlib import contextmanager
+
+    from blender_addon.export.steps import Pause, drained, held
+
+    log: list[str] = []
+
+    @contextmanager
+    def show():
+        log.append("shown")
+        yield
+        log.append("back")
+
+    def picture(ends_apart: bool):
+        log.append("read")
+        for number in (1, 2):
+            yield Pause(holds_scene=True, is_apart=True)
+            log.append(f"apart {number}")
+        if not ends_apart:
+            yield Pause()
+            log.append("written")
+        return "fit"
+
+    assert drained(held(picture(ends_apart=False), show, "", 0.0)) == "fit"
+    assert log == ["shown", "read", "back", "apart 1", "apart 2", "shown", "written", "back"]
+    log.clear()
+    assert drained(held(picture(ends_apart=True), show, "", 0.0)) == "fit"
+    assert log == ["shown", "read", "back", "apart 1", "apart 2"]
+
+
 @pytest.mark.parametrize("holds_scene", [True, False])
 @pytest.mark.parametrize("change", ["move", "resolution", "select"])
 def test_a_change_ends_what_is_still_to_be_read(
@@ -277,6 +307,42 @@ def test_cancel_keeps_the_fits_that_have_begun(three: SimpleNamespace, taken: li
     assert running_export.current is None
     assert len(three.started) == 1
     assert sorted(path.name for path in three.folder.iterdir() if "job" in path.name) == ["job_0"]
+
+
+def test_pressed_again_nothing_is_fitted_twice(
+    three: SimpleNamespace, taken: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One runs and one waits when a change ends the export of the third; then all three are asked for again."""
+    from blender_addon.operators import fit
+    from blender_addon.running import fit_queue, running_export, running_job
+
+    prepared: list[fit_queue.PreparedFit] = []
+
+    def start_or_queue(each: fit_queue.PreparedFit) -> None:
+        prepared.append(each)
+        if len(prepared) == 1:
+            monkeypatch.setattr(running_job, "current", SimpleNamespace(fit=each))
+        else:
+            fit_queue.add(each)
+
+    monkeypatch.setattr(fit, "start_or_queue", start_or_queue)
+    three.bpy.ops.mfo.fit_selected(wait=False)
+    while len(prepared) < 2:
+        running_export._tick()
+    running_export.close("The scene was changed.")
+    first, second = prepared
+    three.bpy.ops.mfo.fit_selected(wait=False)
+    while running_export.current is not None:
+        running_export._tick()
+    names = [each.material_name for each in prepared]
+    assert names == [*names[:2], names[1], names[3]]
+    assert sorted({*names}) == ["Clay 1", "Clay 2", "Glaze"]
+    assert fit_queue.waiting == prepared[2:]
+    assert first.folder.exists()
+    assert not second.folder.exists()
+    assert [(each.material_name, each.icon) for each in fit_queue.finished] == [(first.material_name, "INFO")]
+    assert "runs already" in fit_queue.finished[0].sentence
+    monkeypatch.setattr(running_job, "current", None)
 
 
 def test_one_that_cannot_be_exported_stops_no_other(three: SimpleNamespace, taken: list[object]) -> None:

@@ -3,26 +3,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..files.ply_file import TriangleMesh
 
+BLOCK = 1 << 12  # triangles at a time, whose numbers a processor's cache holds
 FARTHEST = 1e18  # metres; the square of a distance must fit into a float32
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, near 2**64 over the golden ratio (Knuth, TAOCP 3, 6.4)
 
 
 @dataclass(frozen=True, eq=False)
 class CornerMesh:
-    """One triangulated mesh in its own space: three corners a triangle and the material slot of each triangle."""
+    """One triangulated mesh in its own space: three corners a triangle and the material slot of each triangle.
+
+    Corners of one vertex need not be the same: `vertices` says where to look for equal ones first.
+    """
 
     positions: NDArray[np.float32]  # (triangles, 3, 3)
     normals: NDArray[np.float32]  # (triangles, 3, 3)
     uvs: NDArray[np.float32]  # (triangles, 3, 2)
     slots: NDArray[np.int32]  # (triangles,)
+    vertices: NDArray[np.int32]  # (triangles, 3), each at least 0
+
+
+def same_mesh(first: CornerMesh, second: CornerMesh) -> bool:
+    """Whether two meshes have equal numbers; those with NaN count as others."""
+    return all(np.array_equal(getattr(first, each.name), getattr(second, each.name)) for each in fields(CornerMesh))
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Some triangles of a mesh, moved into the world."""
+
+    mesh: CornerMesh
+    faces: NDArray[np.bool_]  # (triangles,)
+    matrix: NDArray[np.float64]  # 4x4
+
+    def __len__(self) -> int:
+        return int(np.count_nonzero(self.faces))
+
+    def placed(self) -> TriangleMesh:
+        """Its `world_mesh`."""
+        return world_mesh(self.mesh, self.faces, self.matrix)
+
+    def corners(self) -> Iterator[NDArray[np.float64]]:
+        """Corners (n, 3, 3) in the world of the triangles that `placed` keeps, some at a time."""
+        chosen = np.flatnonzero(self.faces)
+        for start in range(0, len(chosen), BLOCK):
+            places = self.mesh.positions[chosen[start : start + BLOCK]].astype(np.float64)
+            with np.errstate(invalid="ignore", over="ignore"):
+                places = places @ self.matrix[:3, :3].T + self.matrix[:3, 3]
+                yield places[(np.abs(places) < FARTHEST).all(axis=(1, 2))]
+
+    def left_out(self) -> int:
+        """How many triangles `placed` leaves out."""
+        ends = np.array([self.mesh.positions.min(axis=(0, 1)), self.mesh.positions.max(axis=(0, 1))], dtype=np.float64)
+        with np.errstate(invalid="ignore", over="ignore"):
+            reach = np.abs(ends).max(axis=0) @ np.abs(self.matrix[:3, :3]).T + np.abs(self.matrix[:3, 3])
+            if (reach < FARTHEST).all():
+                return 0
+        return len(self) - sum(len(corners) for corners in self.corners())
 
 
 def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:
@@ -33,8 +77,7 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     Cycles.
     """
     # sharing comes first: the corners are six times as many as the vertices of a smooth mesh
-    parts = (mesh.positions, mesh.normals, mesh.uvs)
-    rows, index = _shared(np.concatenate([part[slots].reshape(-1, part.shape[-1]) for part in parts], axis=1))
+    rows, index = _shared_corners(mesh, slots)
     linear = matrix[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0.0)
     # adjugate transpose instead of the inverse: it exists for flat matrices too
@@ -82,6 +125,24 @@ def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
         np.concatenate([mesh.uvs for mesh in meshes]),
         np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]).astype(np.int32),
     )
+
+
+def _shared_corners(mesh: CornerMesh, faces: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """`_shared` of the corners of these faces as rows, of which those like another of their vertex are left out."""
+    parts = [part if faces.all() else part[faces] for part in (mesh.positions, mesh.normals, mesh.uvs)]
+    parts = [part.reshape(-1, part.shape[-1]) for part in parts]
+    vertices = mesh.vertices[faces].reshape(-1)
+    own = np.arange(len(vertices))
+    last = np.zeros(vertices.max(initial=0) + 1, dtype=np.int64)
+    last[vertices] = own
+    twin = last[vertices]
+    is_like = np.all([(part == part[twin]).all(axis=1) for part in parts], axis=0)  # NaN is not, which is only slower
+    twin = np.where(is_like, twin, own)
+    kept = np.flatnonzero(twin == own)
+    rows, index = _shared(np.concatenate([part[kept] for part in parts], axis=1))
+    place = np.empty(len(own), dtype=np.int64)
+    place[kept] = index
+    return rows, place[twin]
 
 
 def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:

@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...bake.baker import BakeError, Baker
 from ...bake.requests import name_of
 from ..findings import Findings
-from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
+from ..meshes.mesh_arrays import CornerMesh, Piece, joined
 from .scene_data import SceneData
 
 OTHER_FACES = "Its object has other faces in the second Blender."
@@ -24,7 +23,7 @@ class DisplacedMeshes:
     def __init__(self, baker: Baker) -> None:
         self._baker = baker
         self._asked: dict[CornerMesh, tuple[str, int | BakeError]] = {}  # with the object's name
-        self._pieces: dict[str, list[tuple[CornerMesh, NDArray[np.bool_], NDArray[np.float64]]]] = {}
+        self._pieces: dict[str, list[Piece]] = {}
         self._moved: dict[CornerMesh, CornerMesh] = {}
 
     def ask(self, instance: bpy.types.DepsgraphObjectInstance, mesh: CornerMesh) -> None:
@@ -36,10 +35,10 @@ class DisplacedMeshes:
             number = problem
         self._asked[mesh] = instance.object.name, number
 
-    def place(self, shape: str, mesh: CornerMesh, faces: NDArray[np.bool_], matrix: NDArray[np.float64]) -> None:
-        """Say that these faces of a mesh, moved by a matrix, are a shape of the scene or a further piece of one."""
-        if mesh in self._asked:
-            self._pieces.setdefault(shape, []).append((mesh, faces, matrix))
+    def place(self, shape: str, piece: Piece) -> None:
+        """Say that a piece of a mesh is a shape of the scene or a further piece of one."""
+        if piece.mesh in self._asked:
+            self._pieces.setdefault(shape, []).append(piece)
 
     def finish(self, data: SceneData, findings: Findings) -> None:
         """Wait, and move the shapes; a mesh that Cycles cannot tell of stays as it is, with a note."""
@@ -56,7 +55,7 @@ class DisplacedMeshes:
                 findings.note(f"The displacement of '{owner}' is left out: {problem}")
         for number, shape in enumerate(data.shapes):
             if shape.identifier in self._pieces:
-                pieces = [world_mesh(self.of(m), faces, matrix) for m, faces, matrix in self._pieces[shape.identifier]]
+                pieces = [replace(p, mesh=self.of(p.mesh)).placed() for p in self._pieces[shape.identifier]]
                 data.shapes[number] = replace(shape, mesh=joined(pieces))
 
     def of(self, mesh: CornerMesh) -> CornerMesh:

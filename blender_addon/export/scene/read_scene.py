@@ -19,7 +19,6 @@ from ...versions import (
 )
 from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
-from ..camera.bent_normals import share_of_bent_normals
 from ..camera.read_camera import read_camera, read_pixel_filter
 from ..camera.render_region import Size
 from ..files.ply_file import TriangleMesh
@@ -30,34 +29,33 @@ from ..material_model import Material, grey
 from ..materials.read_context import needs_bake, read_context
 from ..materials.read_material import note_volume, read_target
 from ..materials.unfinite_pixels import refuse_unfinite_pixels
-from ..meshes.coincident import shared_faces
-from ..meshes.mesh_arrays import CornerMesh, joined, world_mesh
+from ..meshes.face_notes import APART, MANY, MOST_BENT, MOST_BENT_OF_SMOOTH, note_bent_normals, note_coincident_faces
+from ..meshes.known_meshes import KnownMeshes
+from ..meshes.mesh_arrays import CornerMesh, Piece, joined
 from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
 from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
 from ..render_state import (
     background_objects,
-    instanced_objects,
     layer_collections,
     render_state,
     rendered_layer,
     rendered_objects,
 )
+from ..steps import Steps
 from .origin import moved, note_far_scattering, scene_origin
 from .ray_visibility import camera_misses, note_visibility, shadow_transmission
 from .read_light_paths import BOUNCES, read_light_paths
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
 from .scene_data import RenderSettings, SceneData, Shape, Terminator, target_bsdf, target_shape
-from .visibility import check_visible
+from .visibility import check_visible, say_no_faces
 
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
 DEFAULT_SPP = 64
-# of the target's area; 0.09 on a ball of 12 segments, whose diffuse light is 0.6 % off, 0.02 on one of 24
-MOST_BENT = 0.05
-MOST_BENT_OF_SMOOTH = 0.2  # of other objects without flat faces: a cube, 0.66 of it, was off by blocks of 16 %
-MOST_OTHERS = 3  # objects beside those that are fitted which are named for it: the worst tell of the kind
+_NO_POINTS = np.zeros((0, 3), np.float32)
+NOT_PLACED = TriangleMesh(_NO_POINTS, _NO_POINTS, np.zeros((0, 2), np.float32), np.zeros((0, 3), np.int32))
 
 
 def read_scene(
@@ -70,19 +68,44 @@ def read_scene(
     *,
     may_miss: bool = False,
     picture: Size | None = None,
-) -> SceneData | None:
+    known: KnownMeshes | None = None,
+) -> Steps[SceneData | None]:
     """Return the scene as the render would see it, or None with errors in `findings`.
 
     What only Cycles can tell is asked of `bakes`; `finish_scene` puts it in. `leaf` names the shader of the target's
     mix that is fitted, and `targets` are the slots whose materials are fitted together, where these are several. With
     `may_miss` the camera need not see all of these: other pictures may. `picture` is the reference's size, which says
-    whether it shows the Render Region alone.
+    whether it shows the Render Region alone. All but the computing with many triangles is one step; `known` spares that
+    where an earlier reading had the same.
     """
+    found = known or KnownMeshes()
+    walk = _read(context, target, findings, bakes, leaf, targets, found, may_miss=may_miss, picture=picture)
+    if walk is None:
+        return None
+    yield from walk.place()
+    yield from walk.note_faces()
+    return walk.data
+
+
+def _read(
+    context: bpy.types.Context,
+    target: bpy.types.Object,
+    findings: Findings,
+    bakes: SceneBakes | None,
+    leaf: str | None,
+    targets: Sequence[FittedSlot],
+    known: KnownMeshes,
+    *,
+    may_miss: bool,
+    picture: Size | None,
+) -> _Walk | None:
+    """Everything that `read_scene` takes out of Blender; the meshes are not placed yet."""
     layer = rendered_layer(context.scene, context.view_layer)
     if layer != context.view_layer:
         findings.note(f"View layer '{context.view_layer.name}' is not rendered; '{layer.name}' is exported.")
         with context.temp_override(view_layer=layer):
-            return read_scene(bpy.context, target, findings, bakes, leaf, targets, may_miss=may_miss, picture=picture)
+            here = bpy.context
+            return _read(here, target, findings, bakes, leaf, targets, known, may_miss=may_miss, picture=picture)
     scene, view_layer = context.scene, context.view_layer
     others = [each.name for each in scene.view_layers if each.use and each != view_layer]
     if others and view_layer.use:
@@ -120,47 +143,27 @@ def read_scene(
         origin = scene_origin(scene.camera, [each.object for each in fitted], depsgraph)
         data = SceneData(replace(camera, world=moved(camera.world, origin)), settings, world, origin=origin)
         rendered = rendered_objects(view_layer) | background_objects(scene)
-        walk = _Walk(data, fitted, described, depsgraph, rendered, findings, bakes)
+        walk = _Walk(data, fitted, described, depsgraph, rendered, findings, bakes, known)
         walk.run()
         owners = [each for each in bpy.data.materials if each.name_full in walk.bsdfs]
         owners += [scene.world] if view_layer.use_sky and scene.world is not None else []
         refuse_unfinite_pixels(filter(None, map(node_tree_of, owners)), findings)
-        shapes = [data.target_of(number) for number in range(len(fitted))]
-        for number, (each, shape) in enumerate(zip(fitted, shapes, strict=True)):
-            if shape is None:
+        pieces = [walk.pieces_of(target_shape(number)) for number in range(len(fitted))]
+        for number, each in enumerate(fitted):
+            if not pieces[number]:
                 of_one = Findings()
-                _say_no_faces(each, view_layer, walk.targets_left_out[number], of_one)
+                say_no_faces(each, view_layer, walk.targets_left_out[number], of_one)
                 findings.take_over(of_one, (each.object.name, each.slot))
-        there = [(each, shape) for each, shape in zip(fitted, shapes, strict=True) if shape is not None]
-        if len(there) < len(fitted):
+        if not all(pieces):
             return None
-        walk.note_coincident_faces()
-        walk.note_bent_normals(there)
-        note_far_scattering(data, there, findings)
-        for number, (each, shape) in enumerate(there):
+        for number, each in enumerate(fitted):
             of_one = Findings()
-            check_visible(data, shape, each.object, each.slot, scene, depsgraph, of_one)
+            check_visible(data, pieces[number], each.object, each.slot, scene, depsgraph, of_one)
             if of_one.errors:
                 data.unseen[number] = of_one.errors[0]
                 if not may_miss:
                     findings.error(of_one.errors[0], *of_one.fixes[of_one.errors[0]])
-    return data
-
-
-def _say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: int, findings: Findings) -> None:
-    """Report why an object has no faces to fit, of which `left_out` triangles are nowhere."""
-    name = fitted.object.name
-    if fitted.object.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
-        findings.error(f"Object '{name}' is hidden in the render: show it.", Fix("show_in_render"))
-    elif left_out:
-        findings.error(
-            f"All faces of '{name}' with its active material have corners at NaN, infinite or absurdly "
-            "far positions (1e18 m): move or scale the object, or mend its mesh."
-        )
-    elif fitted.slot == fitted.object.active_material_index:
-        findings.error(f"No face of '{name}' uses its active material slot {fitted.slot + 1}: choose another.")
-    else:
-        findings.error(f"No face of '{name}' uses its material slot {fitted.slot + 1}: choose another.")
+    return walk
 
 
 def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None = None) -> None:
@@ -214,12 +217,14 @@ class _Walk:
         rendered: set[str],
         findings: Findings,
         bakes: SceneBakes | None,
+        known: KnownMeshes,
     ) -> None:
+        self.known = known
         self.bakes, self.baked = bakes, set[str]()  # BSDFs that are to be baked for each object
         self.data, self.targets = data, targets
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
-        self.target_pieces: list[list[TriangleMesh]] = [[] for _ in targets]
+        self.pieces: list[tuple[str, str, Piece]] = []  # with names of object and shape
         self.targets_left_out = [0] * len(targets)  # triangles
         self.target_bodies = [0] * len(targets)
         self.bodies = 0
@@ -233,6 +238,8 @@ class _Walk:
             self.bsdfs[each.material.name_full] = target_bsdf(number)
 
     def run(self) -> None:
+        """Read all that there is; the shapes of the scene have no triangles until they are placed."""
+        self.known.begin()
         for instance in self.depsgraph.object_instances:
             item = instance.object
             if not self._is_rendered(instance, item):
@@ -252,14 +259,28 @@ class _Walk:
                 self._add_mesh(instance, matrix, own)
             elif item.type not in (*MESH_TYPES, *SILENT_TYPES):
                 self.findings.note(f"Object '{item.name}' is a {item.type.title()}, which is not exported.")
-        for number, pieces in reversed(list(enumerate(self.target_pieces))):  # the first one comes first
-            if pieces:
-                each = self.targets[number]
+        for number, each in reversed(list(enumerate(self.targets))):  # the first one comes first
+            names = target_shape(number), target_bsdf(number)
+            if self.pieces_of(names[0]):
                 terminator = Terminator(*shadow_terminator(each.object))
                 shadow = shadow_transmission(each.object, each.slot)
-                names = target_shape(number), target_bsdf(number)
                 body = self.target_bodies[number]
-                self.data.shapes.insert(0, Shape(names[0], joined(pieces), names[1], terminator, shadow, body=body))
+                self.data.shapes.insert(0, Shape(names[0], NOT_PLACED, names[1], terminator, shadow, body=body))
+
+    def pieces_of(self, shape: str) -> list[Piece]:
+        """What a shape of the scene consists of."""
+        return [piece for _, name, piece in self.pieces if name == shape]
+
+    def place(self) -> Steps[None]:
+        """Move all triangles into the world."""
+        meshes: dict[str, list[TriangleMesh]] = {}
+        for owner, shape, piece in self.pieces:
+            if len(piece) >= MANY:
+                yield APART
+            mesh = self.known.place(piece)
+            self.places.append((owner, mesh))
+            meshes.setdefault(shape, []).append(mesh)
+        self.data.shapes[:] = [replace(shape, mesh=joined(meshes[shape.identifier])) for shape in self.data.shapes]
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
         if instance.is_instance:
@@ -285,7 +306,8 @@ class _Walk:
         item = instance.object
         key = (item.name_full, item.data.as_pointer())
         if key not in self.meshes:
-            self.meshes[key] = mesh = read_mesh(item, self.depsgraph)
+            mesh = read_mesh(item, self.depsgraph)
+            self.meshes[key] = mesh = None if mesh is None else self.known.mesh(item.name_full, mesh)
             displaces = any(moves_faces(material_of_slot(item, slot)) for slot in range(slot_count(item)))
             if mesh is not None and displaces and self.bakes is not None:
                 self.bakes.displaced.ask(instance, mesh)
@@ -303,8 +325,8 @@ class _Walk:
         fitted = self._fitted(item, bsdfs) if own else {}
         body = self._body(bsdfs)
         for slot, bsdf in bsdfs.items():
-            piece = world_mesh(mesh, slots == slot, matrix)
-            left_out = int((slots == slot).sum()) - len(piece.triangles)
+            piece = Piece(mesh, slots == slot, matrix)
+            left_out = piece.left_out()
             if left_out:
                 self.findings.note(
                     f"Object '{item.name}' has {left_out} triangles with corners at NaN, infinite or absurdly far "
@@ -312,26 +334,23 @@ class _Walk:
                 )
             if slot in fitted:
                 self.targets_left_out[fitted[slot]] += left_out
-            if not len(piece.triangles):
+            if left_out == len(piece):
                 continue
-            self.places.append((item.name, piece))
             name = target_shape(fitted[slot]) if slot in fitted else f"shape_{len(self.data.shapes) + 1:04d}"
+            self.pieces.append((item.name, name, piece))
             if self.bakes is not None:
-                self.bakes.displaced.place(name, mesh, slots == slot, matrix)
+                self.bakes.displaced.place(name, piece)
             if slot in fitted:
-                self.target_pieces[fitted[slot]].append(piece)
                 self.target_bodies[fitted[slot]] = body
                 if hidden:
                     self.findings.error(f"Object '{item.name}' is hidden from camera rays: let the camera see it.")
                 continue
             terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(item, slot)
-            shape = Shape(name, piece, bsdf, terminator, shadow, hidden, body)
             if bsdf in self.baked:
                 self._note_generated(item, slot)
-            if self.bakes is not None and bsdf in self.baked:
-                surface = Surface(instance, slot, mesh, slots == slot, matrix)
-                shape = self.bakes.ask_surface(self.data, shape, surface, self.findings)
-            self.data.shapes.append(shape)
+                if self.bakes is not None:
+                    bsdf = self.bakes.ask_surface(self.data, name, Surface(instance, slot, piece), self.findings)
+            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body))
 
     def _body(self, bsdfs: dict[int, str]) -> int:
         """The number of an object of several shapes that light goes through below the surface, else 0."""
@@ -352,34 +371,15 @@ class _Walk:
                 f"deformed ({', '.join(deforming)}), Cycles before."
             )
 
-    def note_coincident_faces(self) -> None:
-        """Report objects whose faces lie in the same place."""
-        for first, second in shared_faces(self.places):
-            if first == second:
-                self.findings.note(
-                    f"'{first}' has faces twice in the same place, which shadow each other in Cycles and not in the "
-                    "fit: merge them (Merge by Distance), or look for a modifier that copies them."
-                )
-                continue
-            self.findings.note(
-                f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
-                "Cycles and in the fit."
-            )
-
-    def note_bent_normals(self, fitted: Sequence[tuple[FittedSlot, Shape]]) -> None:
-        """Report objects whose normals turn away from the camera, `fitted` ones and others."""
-        meshes = dict(reversed([place for place in self.places if place[0] in self.leaning_normals]))
-        own = {each.object.name: shape.mesh for each, shape in fitted}
-        shares = {name: share_of_bent_normals(mesh, self.data.camera) for name, mesh in (meshes | own).items()}
-        others = sorted((name for name in shares if name not in own), key=lambda name: -shares[name])
-        for name in (*own, *others[:MOST_OTHERS]):
-            share = shares[name]
-            if share > (MOST_BENT if name in own else self.leaning_normals[name]):
-                self.findings.note(
-                    f"Object '{name}' is smooth over few faces, or has custom normals: on {100 * share:.0f} % of it "
-                    "normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all "
-                    "light."
-                )
+    def note_faces(self) -> Steps[None]:
+        """Report faces that lie in the same place, normals that turn away from the camera, and what is far away."""
+        yield from note_coincident_faces(self.places, self.known, self.findings)
+        shapes = [self.data.target_of(number) for number in range(len(self.targets))]
+        there = [(each, shape) for each, shape in zip(self.targets, shapes, strict=True) if shape is not None]
+        own = {each.object.name: shape.mesh for each, shape in there}
+        others = dict(reversed([place for place in self.places if place[0] in self.leaning_normals]))
+        note_bent_normals(own, others, self.leaning_normals, self.data.camera, self.findings)
+        note_far_scattering(self.data, there, self.findings)
 
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
         material = material_of_slot(item, slot)

@@ -22,7 +22,6 @@ from ...probe.client import Probe
 from ...probe.light_path import OF_CAMERA
 from ...versions import node_tree_of
 from ..camera.camera_model import Camera
-from ..files.ply_file import TriangleMesh
 from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..lights.lamp_tables import LampTables
@@ -30,14 +29,14 @@ from ..lights.light_model import Light
 from ..material_model import grey
 from ..materials.baked_material import Baked
 from ..materials.read_context import read_context
-from ..meshes.mesh_arrays import CornerMesh, world_mesh
+from ..meshes.mesh_arrays import Piece
 from ..meshes.read_mesh import material_of_slot
 from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for
 from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
-from .scene_data import SceneData, Shape
+from .scene_data import SceneData
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
 # of one object with bent normals, for instances of other proportions or sizes; what comes later has the first bake
@@ -57,9 +56,7 @@ class Surface:
 
     instance: bpy.types.DepsgraphObjectInstance
     slot: int
-    mesh: CornerMesh
-    faces: NDArray[np.bool_]  # (triangles,)
-    matrix: NDArray[np.float64]
+    piece: Piece
 
     @property
     def material(self) -> bpy.types.Material:
@@ -79,9 +76,7 @@ class _Shown:
     """A shape of the scene that a bake is for."""
 
     shape: str
-    mesh: CornerMesh
-    faces: NDArray[np.bool_]
-    matrix: NDArray[np.float64]
+    piece: Piece
 
 
 @dataclass
@@ -124,8 +119,8 @@ class SceneBakes:
         except BakeError as problem:
             self._failed.append(_of_world(world, problem))
 
-    def ask_surface(self, data: SceneData, shape: Shape, surface: Surface, findings: Findings) -> Shape:
-        """Have a surface baked; returns `shape` with a BSDF that `finish` describes.
+    def ask_surface(self, data: SceneData, shape: str, surface: Surface, findings: Findings) -> str:
+        """Have a surface baked for the shape of that id; returns the id of a BSDF that `finish` describes.
 
         Instances share one, those whose size or proportions bend normals in another way apart.
         """
@@ -146,7 +141,7 @@ class SceneBakes:
                     raise BakeError(f"It would be one of more than {MOST_SURFACES}.")
                 self._baker.start()
                 request = {"instance": name_of(surface.instance), "slot": surface.slot}
-                request["size"] = _texels(data.camera, shape.mesh)
+                request["size"] = _texels(data.camera, surface.piece)
                 data.materials[identifier] = grey(material.name)
                 self._surfaces[identifier] = _Asked(material, item.name, request)
             except BakeError as problem:
@@ -154,9 +149,8 @@ class SceneBakes:
             known[scale] = identifier
         identifier = known[scale]
         if identifier in self._surfaces:
-            shown = _Shown(shape.identifier, surface.mesh, surface.faces, surface.matrix)
-            self._surfaces[identifier].shown.append(shown)
-        return replace(shape, bsdf=identifier)
+            self._surfaces[identifier].shown.append(_Shown(shape, surface.piece))
+        return identifier
 
     def is_ready(self) -> bool:
         """Whether `finish` would not wait; surfaces are asked for with the first call, when all are known."""
@@ -201,10 +195,10 @@ class SceneBakes:
 
     def _put_surface(self, data: SceneData, findings: Findings, identifier: str, asked: _Asked, baked: Baked) -> None:
         corners = baked.corners
-        if any(len(corners) != len(shown.mesh.uvs) for shown in asked.shown):
+        if any(len(corners) != len(shown.piece.mesh.uvs) for shown in asked.shown):
             raise BakeError(OTHER_FACES)
         pieces = {
-            shown.shape: world_mesh(replace(self.displaced.of(shown.mesh), uvs=corners), shown.faces, shown.matrix)
+            shown.shape: replace(shown.piece, mesh=replace(self.displaced.of(shown.piece.mesh), uvs=corners)).placed()
             for shown in asked.shown
         }
         if len(asked.shown) > 1 and baked.place:
@@ -257,7 +251,7 @@ def _scale(surface: Surface) -> Scale:
     by_size = bool(asked_for(tree, OF_SIZE)) or bends_normals(surface.material)
     if not by_size and not asked_for(tree, OF_STRETCH):
         return ()
-    linear = surface.matrix[:3, :3]
+    linear = surface.piece.matrix[:3, :3]
     volume = float(np.linalg.det(linear))
     if volume == 0.0:
         return ()
@@ -267,9 +261,9 @@ def _scale(surface: Surface) -> Scale:
     return (*map(float, proportions), float(step), math.copysign(1.0, volume))
 
 
-def _texels(camera: Camera, mesh: TriangleMesh) -> int:
+def _texels(camera: Camera, piece: Piece) -> int:
     """Texels along each side of a bake: about as fine as the pixels where the surface is nearest to the camera."""
-    triangles = mesh.positions.astype(np.float64)[mesh.triangles]
+    triangles = np.concatenate(list(piece.corners()))
     areas = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     total = float(areas.sum())
     if total <= 0.0:

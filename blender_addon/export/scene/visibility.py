@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import bpy
 import numpy as np
 from mathutils import Vector  # pyright: ignore[reportMissingImports]
@@ -10,7 +12,10 @@ from numpy.typing import NDArray
 
 from ..camera.camera_model import Camera
 from ..findings import Findings, Fix
-from .scene_data import SceneData, Shape
+from ..fitted_slot import FittedSlot
+from ..meshes.mesh_arrays import Piece
+from ..render_state import instanced_objects, rendered_objects
+from .scene_data import SceneData
 
 # rays towards as many points of the target are tried before it counts as hidden
 PROBES = 2000
@@ -19,27 +24,24 @@ OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 
 def check_visible(
     data: SceneData,
-    shape: Shape,
+    pieces: Sequence[Piece],
     target: bpy.types.Object,
     slot: int,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     findings: Findings,
 ) -> None:
-    """Report an error if no part of the target's `shape` lies in the frame, or everything in the frame is hidden."""
-    points = _points(shape.mesh.positions.astype(np.float64)[shape.mesh.triangles])
+    """Report an error if none of the target's `pieces` lies in the frame, or everything in the frame is hidden."""
     camera = data.camera
-    places, depths = camera.project(points)
-    inside = camera.shown(places)
-    inside &= (depths > camera.clip_start) & (depths < camera.clip_end)
-    if not inside.any():
-        corners, corner_depths = camera.project(shape.mesh.positions.astype(np.float64))
+    inside = np.concatenate(list(_points_inside(pieces, camera)))
+    if not len(inside):
+        every = np.concatenate([part.reshape(-1, 3) for piece in pieces for part in piece.corners()])
+        corners, corner_depths = camera.project(every)
         behind = (corner_depths < camera.clip_start).all() or (corner_depths > camera.clip_end).all()
         if behind or camera.beside(corners):
             findings.error(OUTSIDE.format(obj=target.name), *_whole_frame(camera))
         return
-    seen = points[inside]
-    seen = seen[np.linspace(0, len(seen) - 1, min(len(seen), PROBES)).astype(int)]
+    seen = inside[np.linspace(0, len(inside) - 1, min(len(inside), PROBES)).astype(int)]
     blocker = ""
     for point in seen:
         hit, face = _first_hit(point, data, scene, depsgraph)
@@ -49,6 +51,22 @@ def check_visible(
         if _lets_light_through(hit):
             return
     findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
+
+
+def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: int, findings: Findings) -> None:
+    """Report why an object has no faces to fit, of which `left_out` triangles are nowhere."""
+    name = fitted.object.name
+    if fitted.object.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
+        findings.error(f"Object '{name}' is hidden in the render: show it.", Fix("show_in_render"))
+    elif left_out:
+        findings.error(
+            f"All faces of '{name}' with its active material have corners at NaN, infinite or absurdly "
+            "far positions (1e18 m): move or scale the object, or mend its mesh."
+        )
+    elif fitted.slot == fitted.object.active_material_index:
+        findings.error(f"No face of '{name}' uses its active material slot {fitted.slot + 1}: choose another.")
+    else:
+        findings.error(f"No face of '{name}' uses its material slot {fitted.slot + 1}: choose another.")
 
 
 def _whole_frame(camera: Camera) -> list[Fix]:
@@ -63,16 +81,20 @@ def _is_of_slot(item: bpy.types.Object, face: int, slot: int) -> bool:
     return min(item.data.polygons[face].material_index, last) == slot
 
 
-def _points(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points on triangles (n, 3, 3): the middles, and more of each the fewer there are."""
+def _points_inside(pieces: Sequence[Piece], camera: Camera) -> Iterator[NDArray[np.float64]]:
+    """Points (n, 3) on the triangles that lie in the frame: the middles, and more of each the fewer there are."""
     steps = [(1 / 3, 1 / 3)]
-    if len(triangles) < PROBES:
-        count = int(np.ceil(np.sqrt(2 * PROBES / len(triangles))))
+    total = sum(map(len, pieces))
+    if total < PROBES:
+        count = int(np.ceil(np.sqrt(2 * PROBES / total)))
         grid = (np.arange(count) + 0.5) / count
         steps += [(a, b) for a in grid for b in grid if a + b < 1.0]
     a, b = np.array(steps).T[:, None, :, None]
-    first, second, third = triangles[:, 0, None], triangles[:, 1, None], triangles[:, 2, None]
-    return (first + (second - first) * a + (third - first) * b).reshape(-1, 3)
+    for corners in (part for piece in pieces for part in piece.corners()):
+        first, second, third = corners[:, 0, None], corners[:, 1, None], corners[:, 2, None]
+        points = (first + (second - first) * a + (third - first) * b).reshape(-1, 3)
+        places, depths = camera.project(points)
+        yield points[camera.shown(places) & (depths > camera.clip_start) & (depths < camera.clip_end)]
 
 
 def _first_hit(

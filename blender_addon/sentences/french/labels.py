@@ -152,6 +152,7 @@ LABELS = {
     "Model": "Modèle",
     "Most iterations of one stage": "Nombre maximal d'itérations d'une étape",
     "Most": "Au plus",
+    "Not there": "Absent",
     "No material": "Pas de matériau",
     "One of the results this material had": "Un des résultats de ce matériau",
     "Open the folder of a finished fit: show it here and add it to the history of its material": "Ouvrir le dossier d'un ajustement terminé : le montrer ici et l'ajouter à l'historique de son matériau",

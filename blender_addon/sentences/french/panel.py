@@ -184,6 +184,11 @@ PANEL = {
     "There is no result to render; run a fit or show an earlier result": "Il n'y a pas de résultat à rendre ; lancer un ajustement ou montrer un résultat antérieur",
     "There is no result yet; run a fit": "Il n'y a pas encore de résultat ; lancer un ajustement",
     # reports
+    "A material of the list is left out: it is not in the file any more. List the materials anew.": "Un matériau de la liste est laissé de côté : il n'est plus dans le fichier. Lister les matériaux à nouveau.",
+    "Material '{}' is left out: its object is not in the scene any more. List the materials anew.": "Le matériau '{}' est laissé de côté : son objet n'est plus dans la scène. Lister les matériaux à nouveau.",
+    "Material '{}' is left out: '{}' does not have it any more. List the materials anew.": "Le matériau '{}' est laissé de côté : '{}' ne l'a plus. Lister les matériaux à nouveau.",
+    "Fits that waited and are prepared anew: {}.": "Ajustements en attente, préparés à nouveau : {}.",
+    "Its fit runs already: press Fit when it has ended, to fit it again.": "Son ajustement est déjà en cours : appuyer sur Ajuster quand il est terminé, pour l'ajuster encore.",
     "No material of the list is ticked: tick those that are to be fitted, or fit one material.": "Aucun matériau de la liste n'est coché : cocher ceux à ajuster, ou ajuster un seul matériau.",
     "The camera sees no material with a Principled BSDF: set the scene's camera up.": "La caméra ne voit aucun matériau avec un Principled BSDF : placer la caméra de la scène.",
     "The job has several materials, and one is named: leave the name out.": "La tâche a plusieurs matériaux, et un seul est nommé : omettre le nom.",

@@ -152,6 +152,7 @@ LABELS = {
     "Model": "Modell",
     "Most iterations of one stage": "Höchstzahl der Iterationen einer Stufe",
     "Most": "Höchstens",
+    "Not there": "Nicht da",
     "No material": "Kein Material",
     "One of the results this material had": "Eines der Ergebnisse, die dieses Material hatte",
     "Open the folder of a finished fit: show it here and add it to the history of its material": "Den Ordner einer fertigen Anpassung öffnen: hier anzeigen und dem Verlauf ihres Materials hinzufügen",

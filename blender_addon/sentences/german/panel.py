@@ -184,6 +184,11 @@ PANEL = {
     "There is no result to render; run a fit or show an earlier result": "Es gibt kein Ergebnis zum Rendern; eine Anpassung starten oder ein früheres Ergebnis zeigen",
     "There is no result yet; run a fit": "Es gibt noch kein Ergebnis; eine Anpassung starten",
     # reports
+    "A material of the list is left out: it is not in the file any more. List the materials anew.": "Ein Material der Liste bleibt weg: es ist nicht mehr in der Datei. Die Materialien neu auflisten.",
+    "Material '{}' is left out: its object is not in the scene any more. List the materials anew.": "Material '{}' bleibt weg: sein Objekt ist nicht mehr in der Szene. Die Materialien neu auflisten.",
+    "Material '{}' is left out: '{}' does not have it any more. List the materials anew.": "Material '{}' bleibt weg: '{}' hat es nicht mehr. Die Materialien neu auflisten.",
+    "Fits that waited and are prepared anew: {}.": "Anpassungen, die gewartet haben und neu vorbereitet werden: {}.",
+    "Its fit runs already: press Fit when it has ended, to fit it again.": "Seine Anpassung läuft schon: Anpassen drücken, wenn sie beendet ist, um es noch einmal anzupassen.",
     "No material of the list is ticked: tick those that are to be fitted, or fit one material.": "Kein Material der Liste ist angekreuzt: die ankreuzen, die angepasst werden sollen, oder ein einzelnes anpassen.",
     "The camera sees no material with a Principled BSDF: set the scene's camera up.": "Die Kamera sieht kein Material mit einem Principled BSDF: die Kamera der Szene aufstellen.",
     "The job has several materials, and one is named: leave the name out.": "Der Auftrag hat mehrere Materialien, und eines ist genannt: den Namen weglassen.",

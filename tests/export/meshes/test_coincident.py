@@ -32,6 +32,22 @@ def test_a_face_twice_is_found_within_an_object_and_between_two() -> None:
     assert shared_faces([]) == []
 
 
+def test_doubled_faces_among_many_of_several_objects_are_those_that_comparing_all_finds() -> None:
+    random = np.random.default_rng(2)
+    faces = random.random((60, 3, 3)).astype(np.float32)
+    faces[41] = faces[3][[2, 0, 1]]  # B and A
+    faces[55] = faces[50][[1, 0, 2]]  # C by itself
+    faces[30] = faces[29]  # B by itself
+    parts = {"A": slice(0, 20), "B": slice(20, 45), "C": slice(45, 60)}
+    names = [name for name, part in parts.items() for _ in faces[part]]
+    sorted_corners = [sorted(map(tuple, face)) for face in faces.tolist()]
+    wanted = {
+        (names[a], names[b]) for a in range(60) for b in range(a + 1, 60) if sorted_corners[a] == sorted_corners[b]
+    }
+    found = shared_faces([(name, mesh(faces[part])) for name, part in parts.items()])
+    assert set(found) == wanted == {("A", "B"), ("B", "B"), ("C", "C")}
+
+
 def test_small_faces_of_a_large_scene_and_faces_without_area_are_none() -> None:
     small = 1e-4 * FACE
     assert shared_faces([("A", mesh([small, small + 1e-4, 100 * FACE]))]) == []

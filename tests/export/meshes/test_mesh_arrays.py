@@ -50,7 +50,8 @@ def grid(count: int, without_normal: int) -> dict[str, np.ndarray]:
     quads = np.stack([first, first + 1, first + count + 2, first, first + count + 2, first + count + 1], axis=1)
     corners = quads.reshape(-1, 3)
     uvs = (points[:, :2] / 4 + 0.5).astype(np.float32)
-    return {"positions": points[corners], "normals": normals[corners], "uvs": uvs[corners]}
+    each = {"positions": points[corners], "normals": normals[corners], "uvs": uvs[corners]}
+    return {**each, "vertices": corners.astype(np.int32)}
 
 
 @pytest.mark.parametrize("matrix", MATRICES.values(), ids=MATRICES.keys())
@@ -80,6 +81,36 @@ def test_every_corner_is_moved_as_one(arrays: ModuleType, matrix: np.ndarray, wi
     np.testing.assert_allclose(moved.uvs[moved.triangles], uvs[:, order], atol=1e-6)
     if not without_normal and lengths.min() > 1e-20:
         assert len(moved.positions) == len(np.unique(corners["positions"][chosen].reshape(-1, 3), axis=0))
+
+
+@pytest.mark.parametrize("chosen", ["all", "some", "none"])
+def test_sharing_by_vertices_is_that_of_all_corners_bit_by_bit(arrays: ModuleType, chosen: str) -> None:
+    """With seams, NaN, both zeros, and two vertices in one place."""
+    corners = grid(9, 2)
+    random = np.random.default_rng(5)
+    corners["uvs"][random.random(corners["uvs"].shape[:2]) < 0.3] = 0.25
+    corners["positions"][random.random(corners["positions"].shape) < 0.2] = -0.0
+    corners["normals"][7, 1] = np.nan
+    corners["vertices"][corners["vertices"] == 40] = 99
+    faces = {"all": np.ones, "none": np.zeros}.get(chosen, lambda n, _t: np.arange(n) % 3 > 0)(162, bool)
+    mesh = arrays.CornerMesh(**corners, slots=np.zeros(162, np.int32))
+    rows, index = arrays._shared_corners(mesh, faces)
+    parts = [corners[name][faces].reshape(-1, width) for name, width in (("positions", 3), ("normals", 3), ("uvs", 2))]
+    plain_rows, plain_index = arrays._shared(np.concatenate(parts, axis=1))
+    assert rows.tobytes() == plain_rows.tobytes()
+    assert np.array_equal(index, plain_index)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan, np.inf, 1e18])
+def test_a_piece_tells_what_it_leaves_out(arrays: ModuleType, value: float) -> None:
+    corners = grid(4, 0)
+    corners["positions"][3:6, 1, 0] = value
+    faces = np.arange(32) != 4
+    piece = arrays.Piece(arrays.CornerMesh(**corners, slots=np.zeros(32, np.int32)), faces, MATRIX)
+    placed = piece.placed()
+    assert piece.left_out() == len(piece) - len(placed.triangles) == (2 if value else 0)
+    found = np.concatenate(list(piece.corners()))
+    np.testing.assert_allclose(found, placed.positions[placed.triangles], atol=1e-6)
 
 
 def test_two_rows_with_one_hash_stay_two(arrays: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:

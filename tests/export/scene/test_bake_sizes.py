@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blender_addon.export.camera.camera_model import Camera
-from blender_addon.export.files.ply_file import TriangleMesh
+from blender_addon.export.meshes.mesh_arrays import CornerMesh, Piece
 from blender_addon.export.scene.scene_bakes import LEAST_SIZE, MOST_SIZE, TEXELS_A_PIXEL, USED, _texels
 
 ABOVE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5], [0, 0, 0, 1]])
@@ -19,13 +19,20 @@ CAMERA = Camera(
 )  # fmt: skip
 
 
-def square(side: float, x: float = 0.0) -> TriangleMesh:
+def square(side: float, x: float = 0.0) -> Piece:
     """A horizontal square around (x, 0, 0)."""
-    corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32) * side / 2 + (x, 0, 0)
-    up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))
-    return TriangleMesh(
-        corners.astype(np.float32), up, np.zeros((4, 2), np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.int32)
+    corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32) * side / 2
+    index = np.array([(0, 1, 2), (0, 2, 3)], np.int32)
+    mesh = CornerMesh(
+        corners[index].astype(np.float32),
+        np.tile(np.array([0.0, 0.0, 1.0], np.float32), (2, 3, 1)),
+        np.zeros((2, 3, 2), np.float32),
+        np.zeros(2, np.int32),
+        index,
     )
+    matrix = np.eye(4)
+    matrix[0, 3] = x
+    return Piece(mesh, np.ones(2, np.bool_), matrix)
 
 
 @pytest.mark.parametrize(
