@@ -41,7 +41,7 @@ def unregister() -> None:
     atexit.unregister(unregister)
     live.close()
     running_export.close()
-    running_job.close()
+    running_job.close_for_disable()
     notice.close()
     waiting_backend.close()
     backend_state.close()

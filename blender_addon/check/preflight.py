@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -10,6 +13,7 @@ import bpy
 from .checks import IGNORED, STOPS, TO_CHOOSE, Finding, quick_check
 
 _WITH_PANELS = {("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")}  # areas and their regions
+FILES_LAST = 2.0  # seconds after which chosen files are looked at again: they may be on a drive that answers slowly
 DELAY = 0.25  # seconds between a change and its check, so that a drag costs four checks a second at most
 
 findings: tuple[Finding, ...] = ()  # what the panel lists
@@ -19,12 +23,41 @@ _before: tuple[Finding, ...] = ()  # the list that the first of those buttons wa
 _quick: tuple[Finding, ...] = ()  # the last quick check, without what an export said
 _seen: Any = None  # what the scene looked like then
 _checked = False
+_files: Any = None  # states of the chosen files then
+_files_looked = -math.inf  # when they were looked at last, on the monotonic clock
 
 
 def watch(context: bpy.types.Context) -> None:
     """Called while drawing: have a check made soon if there was none, or something it looks at has changed."""
     if not _checked or _seen != look(context.scene, context.view_layer):
         request()
+    is_old = time.monotonic() - _files_looked > FILES_LAST
+    if is_old and not bpy.app.background and not bpy.app.timers.is_registered(look_at_files):
+        bpy.app.timers.register(look_at_files, first_interval=0.0)
+
+
+def look_at_files() -> None:
+    """Have a check made soon if a chosen picture was written anew, moved or removed since the last one."""
+    global _files_looked
+    _files_looked = time.monotonic()
+    if _checked and _files != _chosen_files(bpy.context.scene):
+        request()
+
+
+def _chosen_files(scene: bpy.types.Scene) -> dict[str, tuple[int, int] | None]:
+    """The states of the pictures that a scene has chosen."""
+    settings = scene.mfo
+    paths = (settings.reference_path, *(one.path for one in settings.pictures))
+    return {path: _state_of(path) for path in paths if path}
+
+
+def _state_of(given: str) -> tuple[int, int] | None:
+    """Time and size of a file, None where there is none."""
+    try:
+        found = Path(bpy.path.abspath(given)).stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_mtime_ns, found.st_size
 
 
 def request() -> None:
@@ -35,7 +68,8 @@ def request() -> None:
 
 def check_now(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     """Make the quick check; what an export said stays as long as the quick check says the same as before."""
-    global findings, is_thorough, mended, _before, _quick, _seen, _checked
+    global findings, is_thorough, mended, _before, _quick, _seen, _checked, _files
+    _files = _chosen_files(scene)  # before they are read: what is written meanwhile is seen by the next look
     found = quick_check(scene, view_layer)
     _seen, _checked = look(scene, view_layer), True
     if found != _quick:
@@ -90,10 +124,12 @@ def summary() -> tuple[str, str]:
 
 def reset() -> None:
     """Forget everything and stop the timer."""
-    global findings, is_thorough, mended, _before, _quick, _seen, _checked
+    global findings, is_thorough, mended, _before, _quick, _seen, _checked, _files, _files_looked
     findings, is_thorough, mended, _before, _quick, _seen, _checked = (), False, (), (), (), None, False
-    if bpy.app.timers.is_registered(_run):
-        bpy.app.timers.unregister(_run)
+    _files, _files_looked = None, -math.inf
+    for timer in (_run, look_at_files):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
 
 
 def _run() -> None:

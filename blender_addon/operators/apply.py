@@ -28,7 +28,14 @@ from ..sentences.translated import translated
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
 
+ON_NOTHING = "Material {!r} is on no object any more: give it to one, else it may not be saved."
 PRESS_AGAIN = "Press Apply again to apply it anyway."
+
+
+def _is_used(material: bpy.types.Material) -> bool:
+    """Whether an object or nodes have it; what nothing uses is not written into the file."""
+    owners = bpy.data.user_map(subset={material})[material]
+    return any(owner.users and not isinstance(owner, bpy.types.Scene) for owner in owners)
 
 
 def was_asked(context: bpy.types.Context, folder: str) -> bool:
@@ -107,13 +114,14 @@ class MFO_OT_apply(bpy.types.Operator):
         return {"FINISHED"}
 
     def _put(self, context: bpy.types.Context, result: JobResult, material: bpy.types.Material) -> list[str]:
-        return apply_values(
+        notes = apply_values(
             material,
             result_to_sockets(result),
             result.folder,
             animated=self.animated or context.scene.mfo.animated,
             leaf=result.leaf or None,
         )
+        return notes if _is_used(material) else [*notes, ON_NOTHING.format(material.name)]
 
     def _results(self) -> list[tuple[JobResult, int]]:
         """The results with their materials' session_uid, 0 where that is not known; several were fitted together."""

@@ -24,8 +24,10 @@ class Compare:
     def draw(self, context: bpy.types.Context) -> None:
         """Draw pictures and buttons."""
         layout, runtime = self.layout, context.window_manager.mfo_runtime  # type: ignore[attr-defined]  # from Panel
-        if context.object is None or runtime.material != getattr(context.object.active_material, "name", ""):
-            draw_sentence(layout, context, f"Of material {runtime.material}", "MATERIAL")
+        fitted = shown_result.material()
+        name = fitted.name if fitted is not None else runtime.material  # it may have another name by now
+        if context.object is None or name != getattr(context.object.active_material, "name", ""):
+            draw_sentence(layout, context, f"Of material {name}", "MATERIAL")
         if previews.icon("result"):
             _draw_result(layout, context, runtime)
         elif previews.icon("current"):

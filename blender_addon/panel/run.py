@@ -115,9 +115,10 @@ def _draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     column = layout.column()
     _draw_bar(column, context, runtime.fraction, translated(runtime.progress_text), fit_alone=True)
     own = context.object.active_material if context.object else None
-    is_one = runtime.material in bpy.data.materials  # several that are fitted together have no name of one
-    if is_one and (own is None or runtime.material != own.name):
-        draw_sentence(column, context, f"Of material {runtime.material}", "MATERIAL")
+    uids = running_job.current.fit.uids if running_job.current is not None else ()
+    fitted = shown_result.material_of(uids[0]) if len(uids) == 1 else None
+    if fitted is not None and fitted != own:
+        draw_sentence(column, context, f"Of material {fitted.name}", "MATERIAL")
     shown = tuple(name for name in ("reference", "current", "difference") if previews.icon(name))
     if "current" not in shown:
         return

@@ -35,7 +35,9 @@ def forget(job: Path) -> None:
 
 def saved(running: Sequence[Path]) -> None:
     """The open file was written: what its materials have in their histories is in it; `running` jobs are its own."""
-    kept = [Path(entry.job_folder) for material in bpy.data.materials for entry in material.mfo.history]
+    kept = [
+        Path(entry.job_folder) for material in bpy.data.materials if material.users for entry in material.mfo.history
+    ]
     for shelved in shelf.of(shelf_folder(), bpy.data.filepath):
         if any(folder.is_relative_to(shelved.job) for folder in kept):  # of several materials it holds one for each
             forget(shelved.job)

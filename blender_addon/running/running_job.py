@@ -137,11 +137,23 @@ def close() -> None:
 
 def close_for_load() -> str:
     """`close` before another file is opened; returns what is to be said of the fits that end with it."""
-    job, waiting, blend = current, len(fit_queue.waiting), bpy.data.filepath
+    return _close_and_say("The fit of {} was ended as another file was opened.", bpy.data.filepath)
+
+
+def close_for_disable() -> None:
+    """`close` before the add-on is switched off; when it is on again, the panel says so."""
+    said = _close_and_say("The fit of {} was ended as the add-on was switched off.", "")
+    if said:
+        reset(said)
+
+
+def _close_and_say(why: str, blend: str) -> str:
+    """`close`; what is to be said of the fits that end with it, whose values come back with the file `blend`."""
+    job, waiting = current, len(fit_queue.waiting)
     close()
     if job is None:
         return ""
-    said = [f"The fit of {job.fit.material_name} was ended as another file was opened."]
+    said = [why.format(job.fit.material_name)]
     if not (job.process.folder / "result.json").is_file():
         said.append("It had found no values yet.")
     elif blend:

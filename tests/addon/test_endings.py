@@ -6,10 +6,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from .fake_backend import RECOVERED
+from .fake_backend import RECOVERED, write_result
 from .test_operators import FLOAT32, fit, plain, runtime, sockets, step_until
 
 
@@ -60,6 +61,25 @@ def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeyp
     monkeypatch.setenv("MFO_FAKE", "{}")
     assert fit(scene) == {"FINISHED"}  # a folder with one is still taken for a job, and is emptied
     assert not Path(scene.job, "partial.json").exists()
+
+
+def test_an_addon_that_is_switched_off_says_what_became_of_its_fit(
+    scene: SimpleNamespace, addon: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 60}))
+    fit(scene, wait=False)
+    step_until(scene, lambda: runtime(scene).fraction > 0)
+    request = json.loads(Path(scene.job, "request.json").read_text("utf-8"))
+    write_result(Path(scene.job), "partial", "failed", "The fit ended by itself.", request, partial=True)
+    addon.unregister()
+    addon.register()
+    assert runtime(scene).state == "IDLE"
+    assert runtime(scene).sentence == (
+        "The fit of Glaze was ended as the add-on was switched off. Load Result shows its best values so far, from its "
+        f"folder: {scene.job}"
+    )
+    assert scene.bpy.ops.mfo.open_job(directory=scene.job) == {"FINISHED"}
+    assert len(scene.bpy.data.materials["Glaze"].mfo.history) == 1
 
 
 def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

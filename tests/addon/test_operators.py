@@ -87,6 +87,28 @@ def test_apply_says_when_the_material_is_gone(scene: SimpleNamespace) -> None:
         scene.bpy.ops.mfo.apply()
 
 
+@pytest.mark.parametrize("change", ["nothing", "deleted", "replaced", "listed", "node group"])
+def test_values_on_a_material_that_nothing_has_any_more_are_named(
+    scene: SimpleNamespace, change: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bpy = scene.bpy
+    assert bpy.ops.mfo.fit(reference=scene.reference, job_folder=scene.job) == {"FINISHED"}
+    vase, glaze = bpy.data.objects["Väse"], bpy.data.materials["Glaze"]
+    if change in ("deleted", "node group"):
+        bpy.data.objects.remove(vase)  # its mesh stays, and has the material
+    elif change != "nothing":
+        vase.material_slots[0].material = bpy.data.materials.new("Stone")
+    if change == "listed":
+        bpy.context.scene.mfo.targets.add().material = glaze
+    elif change == "node group":
+        group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+        group.use_fake_user = True
+        group.nodes.new("GeometryNodeSetMaterial").inputs["Material"].default_value = glaze
+    assert bpy.ops.mfo.apply() == {"FINISHED"}
+    is_said = "Material 'Glaze' is on no object any more" in capfd.readouterr().out
+    assert is_said == (change in ("deleted", "replaced", "listed"))
+
+
 def test_apply_in_a_later_session(scene: SimpleNamespace, tmp_path: Path) -> None:
     bpy = scene.bpy
     path = str(tmp_path / "saved.blend")

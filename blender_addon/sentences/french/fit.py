@@ -257,6 +257,7 @@ FIT = {
     "Cycles looks at picture {}": "Cycles regarde l'image {}",
     "Object {} of {}": "Objet {} sur {}",
     "Picture {} of {}": "Image {} sur {}",
+    "The fit of {} was ended as the add-on was switched off.": "L'ajustement de {} a pris fin quand l'extension a été désactivée.",
     "The fit of {} was ended as another file was opened.": "L'ajustement de {} a été arrêté à l'ouverture d'un autre fichier.",
     "It had found no values yet.": "Il n'avait pas encore trouvé de valeurs.",
     "Its best values so far are in the history when {} is opened again.": "Ses meilleures valeurs jusque-là seront dans l'historique quand {} sera rouvert.",

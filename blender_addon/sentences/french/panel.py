@@ -189,6 +189,7 @@ PANEL = {
     "Material '{}' is left out: '{}' does not have it any more. List the materials anew.": "Le matériau '{}' est laissé de côté : '{}' ne l'a plus. Lister les matériaux à nouveau.",
     "Fits that waited and are prepared anew: {}.": "Ajustements en attente, préparés à nouveau : {}.",
     "Its fit runs already: press Fit when it has ended, to fit it again.": "Son ajustement est déjà en cours : appuyer sur Ajuster quand il est terminé, pour l'ajuster encore.",
+    "Material {} is on no object any more: give it to one, else it may not be saved.": "Le matériau {} n'est plus sur aucun objet : le donner à un objet, sinon il risque de ne pas être enregistré.",
     "No material of the list is ticked: tick those that are to be fitted, or fit one material.": "Aucun matériau de la liste n'est coché : cocher ceux à ajuster, ou ajuster un seul matériau.",
     "The camera sees no material with a Principled BSDF: set the scene's camera up.": "La caméra ne voit aucun matériau avec un Principled BSDF : placer la caméra de la scène.",
     "The job has several materials, and one is named: leave the name out.": "La tâche a plusieurs matériaux, et un seul est nommé : omettre le nom.",

@@ -257,6 +257,7 @@ FIT = {
     "Cycles looks at picture {}": "Cycles sieht Bild {} an",
     "Object {} of {}": "Objekt {} von {}",
     "Picture {} of {}": "Bild {} von {}",
+    "The fit of {} was ended as the add-on was switched off.": "Die Anpassung von {} wurde beendet, als das Add-on ausgeschaltet wurde.",
     "The fit of {} was ended as another file was opened.": "Die Anpassung von {} wurde beendet, als eine andere Datei geöffnet wurde.",
     "It had found no values yet.": "Sie hatte noch keine Werte gefunden.",
     "Its best values so far are in the history when {} is opened again.": "Ihre bisher besten Werte sind im Verlauf, wenn {} wieder geöffnet wird.",

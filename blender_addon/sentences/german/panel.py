@@ -189,6 +189,7 @@ PANEL = {
     "Material '{}' is left out: '{}' does not have it any more. List the materials anew.": "Material '{}' bleibt weg: '{}' hat es nicht mehr. Die Materialien neu auflisten.",
     "Fits that waited and are prepared anew: {}.": "Anpassungen, die gewartet haben und neu vorbereitet werden: {}.",
     "Its fit runs already: press Fit when it has ended, to fit it again.": "Seine Anpassung läuft schon: Anpassen drücken, wenn sie beendet ist, um es noch einmal anzupassen.",
+    "Material {} is on no object any more: give it to one, else it may not be saved.": "Material {} ist an keinem Objekt mehr: es einem geben, sonst wird es vielleicht nicht gespeichert.",
     "No material of the list is ticked: tick those that are to be fitted, or fit one material.": "Kein Material der Liste ist angekreuzt: die ankreuzen, die angepasst werden sollen, oder ein einzelnes anpassen.",
     "The camera sees no material with a Principled BSDF: set the scene's camera up.": "Die Kamera sieht kein Material mit einem Principled BSDF: die Kamera der Szene aufstellen.",
     "The job has several materials, and one is named: leave the name out.": "Der Auftrag hat mehrere Materialien, und eines ist genannt: den Namen weglassen.",

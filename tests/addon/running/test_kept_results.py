@@ -45,6 +45,22 @@ def test_a_result_that_was_not_saved_comes_back_until_the_file_is_saved(scene: S
     assert (len(history(scene)), kept.restore()) == (1, [])
 
 
+def test_a_result_in_a_material_that_is_not_saved_waits_on(scene: SimpleNamespace, kept) -> None:
+    """A material that nothing uses is not written, and its history with it."""
+    kept.keep(Path(scene.job))
+    mesh = scene.bpy.data.objects["Väse"].data
+    scene.bpy.data.objects.remove(scene.bpy.data.objects["Väse"])
+    scene.bpy.data.meshes.remove(mesh)
+    assert len(history(scene)) == 1
+    scene.bpy.ops.wm.save_mainfile()
+    kept.saved([])
+    scene.bpy.ops.wm.open_mainfile(filepath=scene.blend)
+    assert "Glaze" not in scene.bpy.data.materials
+    assert kept.restore() == [
+        f"A result that was not saved is of Glaze, which this file does not have: {scene.job}",
+    ]
+
+
 def test_another_file_gets_nothing(scene: SimpleNamespace, kept, tmp_path: Path) -> None:
     kept.keep(Path(scene.job))
     other = str(tmp_path / "other.blend")
