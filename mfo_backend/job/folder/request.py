@@ -223,7 +223,7 @@ def _folder_of(folder: JobFolder, path: str, key: str) -> JobFolder:
 
 def request_to_json(request: Request) -> dict[str, Any]:
     """The JSON form of a request; `request_from_json` is its inverse."""
-    materials = asdict(request)["materials"]
+    materials = {name: asdict(material) for name, material in request.materials.items()}
     for material in materials.values():
         without_nothing(material)
     view = asdict(request.view) if request.view is not None else None

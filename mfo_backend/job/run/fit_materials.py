@@ -165,9 +165,11 @@ def _own_materials(picture: JobPicture) -> dict[str, tuple[dict[str, Any], bool]
     """The picture's fitted materials by BSDF, and whether it has what nodes give them: that is in their own folders."""
     found = {}
     for path, each in picture.request.targets:
-        materials = request_materials(JobFolder.open(picture.folder.root / path), each)
-        if each.target.bsdf_id in materials:
-            found[each.target.bsdf_id] = materials[each.target.bsdf_id], each.graph is not None
+        bsdf = each.target.bsdf_id
+        if bsdf in each.materials:
+            alone = replace(each, materials={bsdf: each.materials[bsdf]})
+            materials = request_materials(JobFolder.open(picture.folder.root / path), alone)
+            found[bsdf] = materials[bsdf], each.graph is not None
     return found
 
 
