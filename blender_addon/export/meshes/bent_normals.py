@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..files.ply_file import TriangleMesh
 from ..camera.camera_model import Camera
+from ..files.ply_file import TriangleMesh
 
 # Cycles bends a normal where the mirrored view would be lower than this cosine above the face, or 0.9 of the view's
 LOWEST = 0.01
