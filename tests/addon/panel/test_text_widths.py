@@ -244,6 +244,8 @@ def with_several_pictures(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> 
     tree.links.new(ramp.outputs[0], shader.inputs["Base Color"])
     settings.parameter_set = "chosen"  # below the name of each material
     yield
+    settings.targets[0].object = None  # as when it was deleted
+    yield
 
 
 def with_the_backend(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
