@@ -95,6 +95,11 @@ def with_problems(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterato
     yield
 
 
+def fit_of_glaze(scene: SimpleNamespace) -> SimpleNamespace:
+    """What the panel looks at of a running fit."""
+    return SimpleNamespace(fit=SimpleNamespace(uids=(scene.bpy.data.materials["Glaze"].session_uid,)))
+
+
 def while_it_exports(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
     from blender_addon.running import running_export
 
@@ -112,7 +117,7 @@ def while_it_runs(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator
     from blender_addon.pictures import previews
     from blender_addon.running import running_job
 
-    patch.setattr(running_job, "current", object())
+    patch.setattr(running_job, "current", fit_of_glaze(scene))
     patch.setattr(previews, "icon", lambda name: 1)
     runtime(scene).material = "Glaze"
     said = ["Starting", "Cancelling", "Checking the values"]
@@ -200,7 +205,7 @@ def with_a_queue(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[
     yield
     fit(scene)
     patch.setattr(cycles_check, "is_running", lambda: True)
-    patch.setattr(running_job, "current", object())
+    patch.setattr(running_job, "current", fit_of_glaze(scene))
     for step in ("Rendering in Cycles", "Rendering in Eevee Next", "Rendering the reference", "Comparing"):
         runtime(scene).cycles_text = f"{step}, sample 4095 of 4096"
         yield
