@@ -164,9 +164,8 @@ def refracted(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     wi, alpha = layers.wi, layers.glass_alpha
     h, jacobian, possible = refraction_normal(layers, wo)
     c = dr.abs(dr.dot(wi, h))
-    facets = layers.facets
-    lobe = facets.density(h, alpha, alpha) * facets.seen(wi, wo, h, alpha, alpha)
-    lobe *= c * jacobian / dr.maximum(wi.z, 1e-7)
+    seen = layers.facets.seen(wi, wo, h, alpha, alpha)
+    lobe = layers.facets.density(h, alpha, alpha) * seen * c * jacobian / dr.maximum(wi.z, 1e-7)
     counted = (wo.z < 0) & (wi.z > 0)
     return dr.select(
         counted & possible if reachable_only else counted,
