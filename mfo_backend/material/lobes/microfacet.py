@@ -96,7 +96,8 @@ MICROFACETS = {
 
 def reflection(wi: Any, wo: Any, h: Any, ax: Any, ay: Any, facets: Microfacets = GGX) -> Any:
     """D G2 / (4 mu): f_r |cos| of a white single-scattering lobe, both directions above the surface."""
-    return facets.density(h, ax, ay) * facets.seen(wi, wo, h, ax, ay) / (4 * dr.maximum(wi.z, 1e-7))
+    seen = facets.seen(wi, wo, h, ax, ay)
+    return facets.density(h, ax, ay) * seen / (4 * dr.maximum(wi.z, 1e-7))
 
 
 def visible_pdf(wi: Any, h: Any, ax: Any, ay: Any) -> Any:
