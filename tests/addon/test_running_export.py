@@ -160,36 +160,6 @@ def test_windows_are_drawn_between_pictures(scene: SimpleNamespace, taken: list[
     assert taken == ["fit"]
 
 
-def test_nothing_is_shown_for_steps_apart() -> None:
-    from contextlib import contextmanager
-
-    from blender_addon.export.steps import Pause, drained, held
-
-    log: list[str] = []
-
-    @contextmanager
-    def show():
-        log.append("shown")
-        yield
-        log.append("back")
-
-    def picture(ends_apart: bool):
-        log.append("read")
-        for number in (1, 2):
-            yield Pause(holds_scene=True, is_apart=True)
-            log.append(f"apart {number}")
-        if not ends_apart:
-            yield Pause()
-            log.append("written")
-        return "fit"
-
-    assert drained(held(picture(ends_apart=False), show, "", 0.0)) == "fit"
-    assert log == ["shown", "read", "back", "apart 1", "apart 2", "shown", "written", "back"]
-    log.clear()
-    assert drained(held(picture(ends_apart=True), show, "", 0.0)) == "fit"
-    assert log == ["shown", "read", "back", "apart 1", "apart 2"]
-
-
 @pytest.mark.parametrize("holds_scene", [True, False])
 @pytest.mark.parametrize("change", ["move", "resolution", "select"])
 def test_a_change_ends_what_is_still_to_be_read(

@@ -76,15 +76,28 @@ def read_encoded(image: bpy.types.Image) -> NDArray[np.float32]:
     if _only_looking:
         return np.full((1, 1, 4), 0.5, dtype=np.float32)
     channels = image.channels
-    raw = np.empty(width * height * channels, dtype=np.float32)
-    image.pixels.foreach_get(raw)
-    raw = raw.reshape(height, width, channels)[::-1]
+    raw = _raw(image).reshape(height, width, channels)[::-1]
     pixels = np.ones((height, width, 4), dtype=np.float32)
     if channels < 3:
         pixels[:, :, :3] = raw[:, :, :1]
     else:
         pixels[:, :, :channels] = raw
     return pixels
+
+
+def are_usual(image: bpy.types.Image, largest: float) -> bool:
+    """Whether no number of an image is NaN or beyond `largest` either way; one whose pixels cannot be had passes."""
+    if not image.is_float or not (image.has_data or len(image.pixels)):
+        return True
+    raw = _raw(image)
+    with np.errstate(invalid="ignore"):
+        return not raw.size or bool(raw.min() >= -largest and raw.max() <= largest)
+
+
+def _raw(image: bpy.types.Image) -> NDArray[np.float32]:
+    raw = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
+    image.pixels.foreach_get(raw)
+    return raw
 
 
 def _refuse_colour_space(image: bpy.types.Image) -> None:

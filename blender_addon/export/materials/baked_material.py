@@ -15,7 +15,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..material_model import Material, Part, Socket, Texture
 from ..nodes.leaf_kinds import KINDS, TRANSPARENT
-from .leaf_sockets import BELOW, conductor_colors
+from .leaf_sockets import BELOW, GLOSSY, conductor_colors, stretched
 
 EMISSION = ("Emission Color", "Emission Strength")
 TURNED = ("Anisotropic", "Anisotropy")  # sockets that turn highlights along a tangent
@@ -83,6 +83,12 @@ class Baked:
         sockets = {ours: Socket(value) for ours, value in kind.held.items()}
         names = {ours: ours for ours in given} if kind.names is None else kind.names
         sockets |= {ours: self._socket(given[theirs]) for ours, theirs in names.items() if theirs in given}
+        if leaf["kind"] == GLOSSY:
+            turned = [given.get(own, 0.0) for own in ("Anisotropy", "Rotation")]
+            if any(isinstance(value, str) for value in turned):
+                findings.note(f"Material '{name}': what is linked to Anisotropy of '{leaf['label']}' is left out.")
+            else:
+                sockets |= stretched(*map(float, turned))
         if leaf["kind"] == BELOW:
             sockets |= {f"Subsurface {own}": self._socket(given[own]) for own in ("IOR", "Anisotropy") if own in given}
         if "Extinction" in given:

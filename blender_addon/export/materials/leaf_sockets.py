@@ -39,21 +39,27 @@ def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> di
 
 
 def _stretched(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
-    """Anisotropy of a Glossy BSDF as that of a Principled BSDF.
-
-    Cycles divides and multiplies alpha by 1 - a there (a > 0 widens across the tangent), and by sqrt(1 - 0.9 A) here:
-    A goes beyond 1, which a Glossy BSDF of the backend takes.
-    """
+    """Anisotropy of a Glossy BSDF; what is linked to it is left out, with a note."""
     anisotropy, rotation = (node.inputs.get(name) for name in ("Anisotropy", "Rotation"))
     if anisotropy is None or rotation is None:
         return {}
     if anisotropy.is_linked or rotation.is_linked:
         findings.note(f"Material '{material}': what is linked to Anisotropy of '{node.name}' is left out.")
-    amount = float(anisotropy.default_value)
-    if anisotropy.is_linked or amount == 0.0:
+    if anisotropy.is_linked:
+        return {}
+    return stretched(float(anisotropy.default_value), float(rotation.default_value))
+
+
+def stretched(amount: float, rotation: float) -> dict[str, Socket]:
+    """Anisotropy and Rotation of a Glossy BSDF as those of a Principled BSDF; nothing of none.
+
+    Cycles divides and multiplies alpha by 1 - a there (a > 0 widens across the tangent), and by sqrt(1 - 0.9 A) here:
+    A goes beyond 1, which a Glossy BSDF of the backend takes.
+    """
+    if amount == 0.0:
         return {}
     wide = (1.0 - (1.0 - min(abs(amount), 0.99)) ** 2) / 0.9
-    turn = float(rotation.default_value) + (0.25 if amount > 0.0 else 0.0)
+    turn = rotation + (0.25 if amount > 0.0 else 0.0)
     return {"Anisotropic": Socket(wide, True), "Anisotropic Rotation": Socket(turn % 1.0, True)}
 
 

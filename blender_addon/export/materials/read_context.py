@@ -87,7 +87,7 @@ def _read_other(
         material.name, "principled", sockets, distribution_of(node), walks_of(node), shader=kind.shader,
         transparent_shadows=material.use_transparent_shadow,
     )  # fmt: skip
-    _note_default_tangent(found, node, findings)
+    _note_directions(found, node, findings)
     return found
 
 
@@ -120,23 +120,24 @@ def _read_principled(material: bpy.types.Material, node: bpy.types.Node, finding
         if socket.name in SKIPPED_SOCKETS:
             continue
         if socket.name in DIRECTIONS:
-            source = source_of(socket)
-            sockets[socket.name] = Socket(plain_value(socket), source is not None)
-            if source is not None and not (socket.name == "Tangent" and is_uv_tangent(source.node)):
-                findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+            sockets[socket.name] = Socket(plain_value(socket), source_of(socket) is not None)
             continue
         sockets[socket.name] = read_value(socket.name, Place(socket, ()), material.name, False, findings)
     found = Material(material.name, "principled", sockets, node.distribution, walks_of(node))
     found.transparent_shadows = material.use_transparent_shadow
-    _note_default_tangent(found, node, findings)
+    _note_directions(found, node, findings)
     return found
 
 
-def _note_default_tangent(material: Material, node: bpy.types.Node, findings: Findings) -> None:
-    """Without a link Blender's tangent circles the object's Z axis, and that of the fit follows the UV map."""
-    tangent = node.inputs.get("Tangent")
-    if tangent is not None and source_of(tangent) is None and material.value("Anisotropic", 0.0) != 0.0:
-        findings.note(
-            f"Material '{material.name}': Tangent has no link, so that Cycles turns the anisotropy about the object's "
-            "Z axis, and the fit along the UV map: link a Tangent node of direction UV Map."
-        )
+def _note_directions(material: Material, node: bpy.types.Node, findings: Findings) -> None:
+    """Name directions that the fit does not have; without a link Blender's tangent circles the object's Z axis."""
+    turns = material.value("Anisotropic", 0.0) != 0.0
+    for socket in (node.inputs[name] for name in DIRECTIONS if name in node.inputs):
+        source, is_tangent = source_of(socket), socket.name == "Tangent"
+        if source is not None and not (is_tangent and is_uv_tangent(source.node)):
+            findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+        elif source is None and is_tangent and turns:
+            findings.note(
+                f"Material '{material.name}': Tangent has no link, so that Cycles turns the anisotropy about the "
+                "object's Z axis, and the fit along the UV map: link a Tangent node of direction UV Map."
+            )

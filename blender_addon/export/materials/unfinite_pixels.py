@@ -10,17 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import bpy
-import numpy as np
 
 from ...probe.graph_copy import nodes_of
 from ..findings import Findings
-from ..images.image_pixels import UnreadableImageError, read_encoded
+from ..images.image_pixels import are_usual
 
 LARGEST = 1e15  # six pixels of a world with this were as in Cycles; with 1e30 a ball was 13 % too bright
 
 
 def refuse_unfinite_pixels(trees: Iterable[bpy.types.NodeTree], findings: Findings) -> None:
-    """Report pictures with such pixels whose nodes are linked; those that are not read are left to their readers."""
+    """Report pictures with such pixels whose nodes are linked; those that cannot be read are left to their readers."""
     images = {
         node.image.name: node.image
         for tree in trees
@@ -28,11 +27,7 @@ def refuse_unfinite_pixels(trees: Iterable[bpy.types.NodeTree], findings: Findin
         if getattr(node, "image", None) is not None and any(output.is_linked for output in node.outputs)
     }
     for name, image in images.items():
-        try:
-            is_usual = not image.is_float or (np.abs(read_encoded(image)) <= LARGEST).all()
-        except UnreadableImageError:
-            continue
-        if not is_usual:
+        if not are_usual(image, LARGEST):
             findings.error(
                 f"Image '{name}' has pixels that are NaN, infinite or absurdly bright (1e15): replace them, or choose "
                 "another image."

@@ -22,7 +22,7 @@ from ..random_numbers.path_random import PathRandom
 from .bodies import bodies_of, met_inside
 
 AXES = (0.5, 0.25, 0.25)  # probabilities of the normal and of two directions across it
-MOST_HITS = 16  # of one line; Cycles takes four of them by chance
+MOST_HITS = 16  # of one line, the last of which ends the loop; Cycles takes four of them by chance. No measurement
 
 
 def probed(
@@ -54,10 +54,7 @@ def probed(
     frame = mi.Frame3f(mi.Vector3f(si.n))
     by_n, by_s = v.y < AXES[0], v.y < AXES[0] + AXES[1]  # the second with the first
     axis = dr.select(by_n, frame.n, dr.select(by_s, frame.s, frame.t))
-    first, second = (
-        dr.select(by_n, frame.s, frame.n),
-        dr.select(by_s & ~by_n, frame.t, dr.select(by_n, frame.t, frame.s)),
-    )
+    first, second = dr.select(by_n, frame.s, frame.n), dr.select(by_s, frame.t, frame.s)
     sine, cosine = dr.sincos(2.0 * dr.pi * u.y)
     reach = dr.safe_sqrt(dr.square(END * widest) - dr.square(on_disk))
     start = si.p + axis * reach + (first * cosine + second * sine) * on_disk
@@ -65,11 +62,8 @@ def probed(
 
     bodies, shape, prim = bodies_of(scene), mi.ShapePtr(si.shape), mi.UInt32(si.prim_index)
     passed, total, held_bright = (dr.zeros(mi.Float, count) for _ in range(3))
-    kept, kept_distance, kept_share = (
-        dr.zeros(mi.PreliminaryIntersection3f, count),
-        dr.zeros(mi.Float, count),
-        mi.Float(1.0),
-    )
+    kept, kept_distance = dr.zeros(mi.PreliminaryIntersection3f, count), dr.zeros(mi.Float, count)
+    kept_share = mi.Float(1.0)
     for number in range(MOST_HITS):
         rest = mi.Ray3f(start - axis * passed, -axis, line.maxt - passed, 0.0, mi.Color0f())
         found = met_inside(scene, bodies, rest, shape, prim, mi.Bool(False), active)

@@ -60,7 +60,9 @@ def walked(
     """
     medium = below.medium
     if isinstance(medium, DiskProfile):
-        return _probed(scene, si, medium, random, active, spread, choice)
+        exits, out, found = probed(scene, si, medium, random, active, spread=spread, choice=choice)
+        nothing = dr.zeros(mi.Float, dr.width(si.p))
+        return Walks(exits, out, (*found[:2], nothing, nothing, found[2]))
     extinctions = [medium.extinction[k] * factor for k in range(3) for factor in spread]
     d, h, entry_density, enters = _entered(si, below, random, alphas)
     width = dr.width(si.p)
@@ -113,23 +115,6 @@ def walked(
     density = sum(dr.exp(each - largest) for each in logs) / len(logs)
     log_density = largest + dr.log(density) + passed + dr.log(entry_density)
     return Walks(exits, out, (count, length, h.x, h.y, log_density))
-
-
-def _probed(
-    scene: mi.Scene,
-    si: mi.SurfaceInteraction3f,
-    profile: DiskProfile,
-    random: PathRandom,
-    active: mi.Bool,
-    spread: Sequence[float],
-    choice: mi.Float | None,
-) -> Walks:
-    """The same of a profile, as walks without collisions."""
-    exits, out, (on_disk, distance, log_density) = probed(
-        scene, si, profile, random, active, spread=spread, choice=choice
-    )
-    nothing = dr.zeros(mi.Float, dr.width(si.p))
-    return Walks(exits, out, (on_disk, distance, nothing, nothing, log_density))
 
 
 def _entered(

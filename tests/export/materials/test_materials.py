@@ -348,6 +348,12 @@ def test_tangents_that_the_fit_does_not_have_are_said(scene: Any) -> None:
     add_quad("Beside", 0.2, -0.5, other)
     said = [note for note in check_export(bpy.context, target)[1] if "Tangent has no link" in note]
     assert [note.startswith("Material 'Other'") for note in said] == [True]  # the target's Cycles evaluates
+    shader = other.node_tree.nodes.new("ShaderNodeBsdfAnisotropic")
+    turned = other.node_tree.nodes.new("ShaderNodeTangent")
+    turned.axis = "X"
+    other.node_tree.links.new(turned.outputs[0], shader.inputs["Tangent"])
+    other.node_tree.links.new(shader.outputs[0], other.node_tree.get_output_node("CYCLES").inputs["Surface"])
+    assert "Material 'Other': what is linked to Tangent is left out." in check_export(bpy.context, target)[1]
     bpy.data.objects["Beside"].active_material = None
     node = material.node_tree.nodes.new("ShaderNodeTangent")
     node.direction_type = "UV_MAP"
