@@ -96,7 +96,7 @@ def record_paths(
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
-        si = _facing(shape, settings, si)
+        si = _facing(scene, shape, settings, si)
         held = ()
         if settings.held:
             plugin: Any = shape.bsdf()
@@ -169,7 +169,7 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
         hit = view.met(ray)
         on_target = hit.is_valid() & (hit.shape == target)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
-        return _turned(shape, settings, _facing(shape, settings, si)), on_target
+        return _turned(shape, settings, _facing(scene, shape, settings, si)), on_target
 
     cells = PixelCells.grid((per_axis + 1) // 2)
     return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
@@ -184,9 +184,11 @@ def _without_parametrisation(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteracti
     return bare
 
 
-def _facing(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+def _facing(
+    scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f
+) -> mi.SurfaceInteraction3f:
     if settings.two_sided:
-        return _face_camera(seen_side(si))
+        return _face_camera(seen_side(scene, si))
     return _face_camera(si) if shape.bsdf().class_name() == "TwoSidedBRDF" else si
 
 
@@ -279,7 +281,7 @@ def _sampled_lights(
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat)
     density = proposal.density(si.wi, wo, hits.coat)
-    valid = front & (wo.z > 0.0) & (density > 0.0) & leaves_on(si, wo, False)
+    valid = front & (wo.z > 0.0) & (density > 0.0) & leaves_on(scene, si, wo, False)
     ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)

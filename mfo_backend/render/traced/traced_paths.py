@@ -170,9 +170,9 @@ class TracedPaths:
             straight = depth == s["passages"]
             if self._view.hides:
                 first = self._view.met(ray, active, straight=straight)
-                si = seen_side(first.compute_surface_interaction(ray, mi.RayFlags.All, active))
+                si = seen_side(scene, first.compute_surface_interaction(ray, mi.RayFlags.All, active))
             else:
-                si = seen_side(scene.ray_intersect(ray, active))
+                si = seen_side(scene, scene.ray_intersect(ray, active))
             last = mi.Bool(self._shadows.ends(si, s["passages"]))  # its own light still counts
             blur = self._blur(s)
             if blur is not None:
@@ -250,7 +250,7 @@ class TracedPaths:
                     total[1 + k] += beta[0] * f_light[0] * weight * slope
             is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
             usable = active & (pdf_next > 0.0)
-            usable &= ~is_bounce | (scatters & leaves_on(si, local, (kind & TRANSMITS) != 0))
+            usable &= ~is_bounce | (scatters & leaves_on(scene, si, local, (kind & TRANSMITS) != 0))
             inverse = dr.select(usable, dr.rcp(dr.maximum(pdf_next, 1e-30)), 0.0)
             new = [beta[0] * f_next[0] * inverse]
             for k in range(directions):

@@ -28,7 +28,7 @@ def seen_from_below(
     if not materials:
         return mi.Color3f(0)
     met = CameraView(scene).met(ray)
-    si = seen_side(met.compute_surface_interaction(ray, mi.RayFlags.All, met.is_valid()))
+    si = seen_side(scene, met.compute_surface_interaction(ray, mi.RayFlags.All, met.is_valid()))
     return light_from_below(scene, materials, si, si.is_valid(), sampler, light_paths, depth)
 
 

@@ -110,7 +110,7 @@ class CyclesPath(RBIntegrator):
                 si[skip] = behind
             valid |= (bounce == 0) & si.is_valid()
             last = mi.Bool(shadows.ends(si, passages))  # its own light still counts
-            si = seen_side(si)
+            si = seen_side(scene, si)
             without = dr.select(bounce == int(before is not None), float(walked), 0.0)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
             bsdf = si.bsdf(ray)
@@ -159,7 +159,7 @@ class CyclesPath(RBIntegrator):
             onward.maxt = dr.select(is_straight, ray.maxt - si.t, onward.maxt)  # the camera's far clipping holds on
             is_through = (bs.sampled_type & TRANSMITS) != 0
             goes_on &= dr.any(throughput * ratio != 0)
-            goes_on &= is_straight | (scatters & leaves_on(si, bs.wo, is_through))
+            goes_on &= is_straight | (scatters & leaves_on(scene, si, bs.wo, is_through))
 
             if dr.hint(primal, mode="scalar"):
                 radiance += shown + direct

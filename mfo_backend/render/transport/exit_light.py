@@ -119,7 +119,7 @@ def exit_light(
 
     wo = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
     likely = mi.warp.square_to_cosine_hemisphere_pdf(wo)
-    valid = (likely > 0.0) & leaves_on(si, wo, False)
+    valid = (likely > 0.0) & leaves_on(scene, si, wo, False)
     ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
@@ -135,7 +135,7 @@ def exit_light(
         further = {"before": before, "met": met, "walked": bool(again)}
         seen += traced_radiance(scene, sampler, ray, light_paths, depth - 1, **further)
         if again:
-            far = seen_side(far)
+            far = seen_side(scene, far)
             seen += light_from_below(scene, again, far, valid, sampler, light_paths, depth - 1, walks + 1)
     total += dr.select(valid, seen * shadows.terminator.bend(si, wo, valid), 0.0)
     return dr.select(dr.all(dr.isfinite(total)), total, 0.0)

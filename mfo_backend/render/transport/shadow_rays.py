@@ -23,7 +23,7 @@ import numpy as np
 
 from ...material.arrays.own_memory import own_memory
 from .ray_starts import RayStarts
-from .smooth_facets import ShadowTerminator, shape_number, shape_table
+from .smooth_facets import ShadowTerminator, follows_cycles, shape_number, shape_table
 
 SHADOW_TRANSMISSION = "shadow_transmission"
 UNIFORM = "ConstantBackgroundEmitter"  # Mitsuba's class of the plugin `constant`
@@ -53,7 +53,7 @@ class ShadowRays:
         self._marks = shape_table(marked, values, mi.Float) if marked else own_memory(np.zeros(1, np.float32), mi.Float)
         # surfaces that light goes straight through; Mitsuba's integrators block all light
         self.most = int(getattr(scene.integrator(), "transparent_bounces", 0))
-        self.lets_through = hasattr(scene.integrator(), "transparent_bounces") and any(
+        self.lets_through = follows_cycles(scene) and any(
             s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
         )
         unlit = marked or self.lets_through or self._shadowless

@@ -107,13 +107,21 @@ class ShadowTerminator:
         return dr.select(on, normal * (height * amount), 0.0)
 
 
-def seen_side(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
+def follows_cycles(scene: mi.Scene) -> bool:
+    """Whether pictures of a scene are as Cycles makes them, and not as Mitsuba's own integrators do."""
+    return hasattr(scene.integrator(), "transparent_bounces")
+
+
+def seen_side(scene: mi.Scene, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
     """Bend shading normals towards the triangle's own where a mirror would reflect the view into the surface.
 
     That is Cycles' rule for glossy lobes (kernel/closure/bsdf_util.h, ensure_valid_specular_reflection): the mirrored
     view is lifted to a cosine of 0.01, or 0.9 of the view's own. It matters near the outline of a coarse mesh and for
-    custom normals. Cycles leaves diffuse lobes at the normal they had; a frame here is that of all lobes.
+    custom normals. Cycles leaves diffuse lobes at the normal they had; a frame here is that of all lobes. Mitsuba's
+    integrators bend nothing: the light that a smooth metal of 9,500 triangles sends to itself is a seventh darker.
     """
+    if not follows_cycles(scene):
+        return si
     view = si.to_world(si.wi)
     side = dr.select(dr.dot(si.n, view) < 0.0, mi.Float(-1.0), mi.Float(1.0))
     facet, normal = side * mi.Vector3f(si.n), side * mi.Vector3f(si.sh_frame.n)
@@ -146,12 +154,14 @@ def met_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, it: mi.Interaction3f
     return ds
 
 
-def leaves_on(si: mi.SurfaceInteraction3f, wo: mi.Vector3f, through: mi.Bool | bool) -> mi.Bool:
+def leaves_on(scene: mi.Scene, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, through: mi.Bool | bool) -> mi.Bool:
     """Whether a sampled direction `wo` (shading frame) is on the side of the facet that its lobe sends light to.
 
     Cycles drops samples that bent normals send to the other side, and evaluates light samples there all the same
-    (kernel/closure/bsdf_microfacet.h).
+    (kernel/closure/bsdf_microfacet.h). Mitsuba's integrators follow them.
     """
+    if not follows_cycles(scene):
+        return mi.Bool(True)
     seen, sent = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, si.to_world(wo))
     return ((seen * sent) < 0.0) == through
 

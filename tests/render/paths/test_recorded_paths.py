@@ -264,3 +264,40 @@ def test_a_mask_is_widened_as_by_scipy():
     mask = np.random.default_rng(3).random((17, 23)) < 0.03
     for reach in (1, 3):
         np.testing.assert_array_equal(widened(mask, reach), binary_dilation(mask, np.ones((3, 3), bool), reach))
+
+
+OPEN_BOX = """ply
+format ascii 1.0
+element vertex 8
+property float x
+property float y
+property float z
+property float nx
+property float ny
+property float nz
+element face 10
+property list uchar int vertex_indices
+end_header
+"""
+
+
+def test_normals_stay_as_mitsubas_integrators_have_them(tmp_path):
+    """Faces of an open box share their corners' normals, which Cycles would bend and Mitsuba does not."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    quads = [(0, 1, 3, 2), (5, 4, 6, 7), (4, 5, 1, 0), (2, 3, 7, 6), (4, 0, 2, 6)]
+    rows = [f"{x} {y} {z} {x} {y} {z}" for x, y, z in corners]
+    rows += [f"3 {a} {b} {c}\n3 {a} {c} {d}" for a, b, c, d in quads]
+    (tmp_path / "box.ply").write_text(OPEN_BOX + "\n".join(rows) + "\n")
+    text = write_scene(tmp_path, SKY, depth=3).read_text().replace("0, -4, 1", "1, 1.5, 5")
+    text = text.replace('<shape type="sphere" id="target">', '<shape type="ply" id="target"><string name="filename" '
+                        'value="box.ply"/>')  # fmt: skip
+    (tmp_path / "scene.xml").write_text(text)
+    renderer = load_renderer(tmp_path / "scene.xml", "target", model="mitsuba_principled", parameters=NAMES)
+    from mfo_backend.render.paths.recorded_scene import RecordedScene  # needs the variant that the renderer sets
+
+    x = renderer.table.pack({**VALUES, "base_color": (0.9, 0.9, 0.9), "metallic": 1.0})
+    scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    paths = scene.record(x, grid=16, seed=3, near=True)
+    groups = paths.tile_groups()
+    got = scene.evaluator(paths, groups)(x)[:, :, 0].sum(axis=0)
+    np.testing.assert_allclose(got, groups.average(renderer.image(x, seed=7, spp=1024)).sum(axis=0), rtol=0.005)

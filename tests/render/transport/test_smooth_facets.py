@@ -6,6 +6,8 @@ Directions that leave on their own side of a triangle: by signs.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -14,6 +16,8 @@ import pytest
 from mfo_backend.render.machine.variant import load_variant
 
 VARIANT, COUNT = load_variant(), 2000
+# all that the rules ask a scene for
+OF_CYCLES = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8))
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +43,7 @@ def test_the_mirrored_view_is_above_the_triangle(side: float) -> None:
     si.sh_frame = mi.Frame3f(mi.Vector3f(*normal))
     before = np.array(si.sh_frame.s)
     si.wi = si.to_local(mi.Vector3f(*view))
-    found = seen_side(si)
+    found = seen_side(OF_CYCLES, si)
     s, t, n = (np.array(axis) for axis in (found.sh_frame.s, found.sh_frame.t, found.sh_frame.n))
     least = np.minimum(0.9 * np.abs(view[2]), 0.01)
     facing = side * normal
@@ -71,4 +75,4 @@ def test_a_direction_leaves_on_the_side_of_the_facet(degrees, through, leaves, f
     si.sh_frame = mi.Frame3f(mi.Vector3f(float(np.sin(bend)), 0.0, float(np.cos(bend))))
     si.wi = si.to_local(mi.Vector3f(0.0, 0.0, 1.0))
     about_shading = mi.Vector3f(float(np.sin(angle + bend)), 0.0, float(np.cos(angle + bend)))  # in the world
-    assert np.array(leaves_on(si, si.to_local(about_shading), through)).item() == leaves
+    assert np.array(leaves_on(OF_CYCLES, si, si.to_local(about_shading), through)).item() == leaves
