@@ -53,7 +53,8 @@ _SOCKETS = (
     *("Anisotropic", "Anisotropic Rotation", "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR"),
     *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
     *("Thin Film IOR", "Emission Color"),
-    *("Subsurface Radius", "Subsurface Scale"),  # last: a file keeps what is chosen by its place
+    # last: a file keeps what is chosen by its place
+    *("Subsurface Radius", "Subsurface Scale", "Absorption Density", "Absorption Color"),
 )
 SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
 SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}

@@ -34,6 +34,7 @@ UNMATCHED = {
     "Thin Film Thickness": 0.0,
     "Anisotropic Rotation": 0.0,
     "Thin Wall": False,
+    "Absorption Density": 0.0,
 }
 
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
 from ...versions import DIFFUSE, PRINCIPLED, default_surface_is_principled, node_tree_of
@@ -14,8 +16,9 @@ from ..nodes.displacement import bends_normals
 from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, distribution_of, inputs_of, only_nearest, walks_of
 from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 from ..nodes.target_shader import DIRECTIONS, Place
+from ..nodes.volumes import has_volume
 from .leaf_sockets import is_uv_tangent, other_sockets, read_value
-from .read_material import SKIPPED_SOCKETS, note_volume
+from .read_material import SKIPPED_SOCKETS, name_material_settings, volume_sockets
 
 # what Cycles' own default surface sets of a Principled BSDF; everything else has no effect
 DEFAULT_SOCKETS = {
@@ -36,10 +39,18 @@ def read_context(material: bpy.types.Material | None, owner: str, findings: Find
     if tree is None:
         color = [float(value) for value in to_rec709(list(material.diffuse_color)[:3])]
         return Material(material.name, "diffuse", {"Base Color": Socket(color)})
-    note_volume(material, findings)
+    name_material_settings(material, findings)
+    found = _read_surface(material, tree, owner, findings)
+    inside = volume_sockets(material, found, findings) if found.passes_light else {}
+    return replace(found, sockets=found.sockets | inside)
+
+
+def _read_surface(material: bpy.types.Material, tree: bpy.types.NodeTree, owner: str, findings: Findings) -> Material:
+    """The shader at the output's Surface. Without one a volume has nothing around it, and all else is black."""
     node = surface_of(tree)
     if node is None:
-        return Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
+        black = Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
+        return Material(material.name, "null") if has_volume(material) else black
     if node.bl_idname == PRINCIPLED:
         return _read_principled(material, node, findings)
     if node.bl_idname == TRANSPARENT:

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...probe.graph_copy import GROUP
-from ...versions import PRINCIPLED, active_output, cycles_settings, node_tree_of
+from ...versions import PRINCIPLED, cycles_settings, node_tree_of
 from ..audit.rules import name_settings
 from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from ..findings import Findings, Fix
@@ -39,6 +39,7 @@ from ..nodes.target_shader import (
     target_shader,
     why_no_target,
 )
+from ..nodes.volumes import COLOR, DENSITY, absorbing_volume, has_volume
 from .leaf_sockets import is_uv_tangent, note_black, other_sockets, read_value, refuse_link
 
 SKIPPED_SOCKETS = ("Weight",)
@@ -56,7 +57,7 @@ def read_target(
     if target is None:
         findings.error(why_no_target(material), Fix("principled"))
         return None
-    note_volume(material, findings)
+    name_material_settings(material, findings)
     note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
     shared = target.shared_group([name for name, place in target.places.items() if not place.socket.is_linked])
     if shared is not None:
@@ -74,7 +75,9 @@ def read_target(
     displacement = displacement_of(material)
     if displacement is not None:
         _read_displacement(material, displacement, found, findings)
-    return found
+    inside = volume_sockets(material, found, findings) if found.passes_light else {}
+    held = {name: replace(socket, linked=True) for name, socket in inside.items() if name not in target.places}
+    return replace(found, sockets=found.sockets | inside | held)
 
 
 def _read_displacement(
@@ -230,12 +233,18 @@ def _maker(source: bpy.types.NodeSocket) -> bpy.types.Node:
     return node if inner is None or inner.node.bl_idname == "NodeGroupInput" else _maker(inner)
 
 
-def note_volume(material: bpy.types.Material, findings: Findings) -> None:
-    """Name what lies below a surface, which is not exported."""
+def name_material_settings(material: bpy.types.Material, findings: Findings) -> None:
+    """Name settings of a material that are not exported."""
     name_settings(MATERIAL, material, material.name, findings)
     name_settings(MATERIAL_CYCLES, cycles_settings(material), material.name, findings)
-    output = active_output(node_tree_of(material))
-    if output is None:
-        return
-    if source_of(output.inputs["Volume"]) is not None:
+
+
+def volume_sockets(material: bpy.types.Material, surface: Material, findings: Findings) -> dict[str, Socket]:
+    """What a volume absorbs inside of a surface that light gets through; one that the fit does not have is named."""
+    if not has_volume(material):
+        return {}
+    found = absorbing_volume(material)
+    if found is None or surface.model != "principled":
         findings.note(f"Material '{material.name}': its volume is left out.")
+        return {}
+    return {DENSITY: Socket(found.density), COLOR: Socket(found.color)}

@@ -74,8 +74,9 @@ class ClosureLeaf:
         return total
 
 
-def closure_leaves(material: bpy.types.Material | None) -> list[ClosureLeaf]:
-    """The leaves of a material that count, in the order of its tree; none where its output has no surface.
+def closure_leaves(material: bpy.types.Material | None, socket: str = "Surface") -> list[ClosureLeaf]:
+    """The leaves of a material that count, in the order of its tree, at this `socket` of its output; none without a
+    link there.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def closure_leaves(material: bpy.types.Material | None) -> list[ClosureLeaf]:
     if output is None:
         return []
     found: dict[tuple[int, ...], ClosureLeaf] = {}
-    for count, leaf in enumerate(_walk(output.inputs["Surface"], (), (), ())):
+    for count, leaf in enumerate(_walk(output.inputs[socket], (), (), ())):
         if count == MOST_WAYS:
             raise ClosureError(f"mixes shaders in more than {MOST_WAYS} ways: simplify it")
         place = tuple(node.as_pointer() for node in (*leaf.groups, leaf.node))

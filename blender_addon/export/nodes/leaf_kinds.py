@@ -94,6 +94,8 @@ _WHERE_PRESENT = {
     "Anisotropic Rotation": "Anisotropic",
     "Thin Film Thickness": "Thin Film Thickness",
     "Thin Film IOR": "Thin Film Thickness",
+    "Absorption Density": "Absorption Density",
+    "Absorption Color": "Absorption Density",
 }
 
 

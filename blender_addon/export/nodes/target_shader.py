@@ -16,6 +16,7 @@ from .displacement import displacement_in
 from .graph_findings import GROUP_INPUT
 from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, is_shader, why_not_fitted
 from .shader_graph import Links
+from .volumes import AbsorbingVolume, absorbing_volume, lets_light_in
 
 ALL_LEAVES = "*"  # what a material keeps where all shaders of its mix are fitted
 ALL = "all"  # and what a user calls it
@@ -33,11 +34,13 @@ class Place:
 @dataclass(frozen=True)
 class TargetShader:
     """The leaf of a material's shaders that is fitted, a Principled BSDF or another of `leaf_kinds`, and the others, of
-    which so many come `before` it in the tree."""
+    which so many come `before` it in the tree. With a `volume` inside that light gets into, its values are this one's,
+    too."""
 
     leaf: ClosureLeaf
     others: tuple[ClosureLeaf, ...] = ()
     before: int = 0
+    volume: AbsorbingVolume | None = None
 
     @property
     def node(self) -> bpy.types.Node:
@@ -90,7 +93,13 @@ class TargetShader:
 
         That is the node's own socket, or the input of a group that leads to it alone.
         """
-        return {name: self._place(name, socket) for name, socket in inputs_of(self.node).items()}
+        volume, inside, below = self.volume, {}, ()
+        if volume is not None and volume.leaf.groups in ((), self.groups):
+            inside, below = volume.own_sockets, volume.leaf.groups
+        return {
+            **{name: self._place(name, socket, self.groups) for name, socket in inputs_of(self.node).items()},
+            **{name: self._place(name, socket, below) for name, socket in inside.items()},
+        }
 
     @property
     def sockets(self) -> dict[str, bpy.types.NodeSocket]:
@@ -106,8 +115,7 @@ class TargetShader:
         trees = [group.node_tree for group in self.groups[: self.depth_of(names)]]
         return next((tree for tree in trees if is_shared(tree)), None)
 
-    def _place(self, name: str, socket: bpy.types.NodeSocket) -> Place:
-        groups = self.groups
+    def _place(self, name: str, socket: bpy.types.NodeSocket, groups: Groups) -> Place:
         while groups and name not in DIRECTIONS:
             outer = _sole_input(socket, groups[-1])
             if outer is None or outer.type != socket.type:
@@ -135,7 +143,9 @@ def target_shader(material: bpy.types.Material | None, leaf: str | None = None) 
     if named is None and leaf:
         return None
     chosen = named or max(fitted, key=lambda each: each.share)
-    return TargetShader(chosen, tuple(each for each in leaves if each is not chosen), leaves.index(chosen))
+    others = tuple(each for each in leaves if each is not chosen)
+    volume = absorbing_volume(material) if any(map(lets_light_in, leaves)) else None
+    return TargetShader(chosen, others, leaves.index(chosen), volume)
 
 
 def chosen_leaf(material: bpy.types.Material | None) -> str:

@@ -27,7 +27,7 @@ from ..fitted_slot import FittedSlot
 from ..lights.read_light import read_light
 from ..material_model import Material, grey
 from ..materials.read_context import needs_bake, read_context
-from ..materials.read_material import note_volume, read_target
+from ..materials.read_material import name_material_settings, read_target
 from ..materials.unfinite_pixels import refuse_unfinite_pixels
 from ..meshes.face_notes import APART, MANY, MOST_BENT, MOST_BENT_OF_SMOOTH, note_bent_normals, note_coincident_faces
 from ..meshes.known_meshes import KnownMeshes
@@ -390,7 +390,7 @@ class _Walk:
             if needs_bake(original):
                 assert original is not None
                 self.findings.note(f"Material '{original.name}' of '{item.name}' is baked into textures by Cycles.")
-                note_volume(original, self.findings)
+                name_material_settings(original, self.findings)
                 self.baked.add(self.bsdfs[key])
                 if self.bakes is None:
                     self.data.materials[self.bsdfs[key]] = grey(original.name)

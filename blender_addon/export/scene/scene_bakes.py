@@ -29,6 +29,7 @@ from ..lights.light_model import Light
 from ..material_model import grey
 from ..materials.baked_material import Baked
 from ..materials.read_context import read_context
+from ..materials.read_material import volume_sockets
 from ..meshes.mesh_arrays import Piece
 from ..meshes.read_mesh import material_of_slot
 from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for
@@ -206,7 +207,12 @@ class SceneBakes:
                 f"Material '{asked.material.name}': {', '.join(baked.place)} may differ between the {len(asked.shown)} "
                 f"instances of '{asked.owner}'; all have the bake of the first."
             )
-        data.materials |= baked.materials(identifier, asked.material.name, findings)
+        found = baked.materials(identifier, asked.material.name, findings)
+        if any(each.passes_light for each in found.values()):
+            key = next(key for key in (f"{identifier}_flat", identifier) if key in found)
+            inside = volume_sockets(asked.material, found[key], findings)
+            found[key] = replace(found[key], sockets=found[key].sockets | inside)
+        data.materials |= found
         data.shapes[:] = [
             replace(shape, mesh=pieces[shape.identifier]) if shape.identifier in pieces else shape
             for shape in data.shapes

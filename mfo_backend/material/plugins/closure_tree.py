@@ -137,7 +137,13 @@ class ClosureTree(mi.BSDF):
 
         A held material lets light through if it is glass, cut out or translucent.
         """
-        return not self.clear and not any(_passes(leaf.material) for leaf in self.held)
+        return not self.clear and not any(leaf.material.lets_in for leaf in self.held)
+
+    @property
+    def absorbing(self) -> BlenderPrincipled | None:
+        """The fitted material, which has the values of the volume, if that takes of the light inside."""
+        absorbs = self.fitted.material.absorbs and not (self.is_opaque and not self.fitted.material.lets_in)
+        return self.fitted.material if absorbs else None
 
     @property
     def has_below(self) -> bool:
@@ -334,10 +340,6 @@ class ClosureTree(mi.BSDF):
 def _within(u1: Any, start: Any, length: Any) -> Any:
     """A number of an interval as one of 0 to 1."""
     return dr.clip((u1 - start) / dr.maximum(length, 1e-12), 0, dr.one_minus_epsilon(mi.Float))
-
-
-def _passes(material: BlenderPrincipled) -> bool:
-    return material.lobes.transmission or material.lobes.alpha or material.model.shader == "translucent"
 
 
 def _counted(props: mi.Properties, prefix: str) -> Iterator[int]:

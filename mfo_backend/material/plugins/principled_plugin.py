@@ -148,6 +148,21 @@ class BlenderPrincipled(mi.BSDF):
         return mi.Color3f(self._layers(si, active, **own).layers.emission)
 
     @property
+    def absorbing(self) -> BlenderPrincipled | None:
+        """Itself, if it takes of the light inside of its objects."""
+        return self if self.absorbs and self.lets_in else None
+
+    @property
+    def absorbs(self) -> bool:
+        """Whether there is an absorbing volume, or may be one."""
+        return self.fixed["absorption_density"] != 0.0 or "absorption_density" in self.free
+
+    @property
+    def lets_in(self) -> bool:
+        """Whether light gets to the other side of the surface."""
+        return self.lobes.transmission or self.lobes.alpha or self.model.shader == "translucent"
+
+    @property
     def has_below(self) -> bool:
         """Whether light walks below the surface."""
         return self.lobes.dielectric and self.lobes.subsurface

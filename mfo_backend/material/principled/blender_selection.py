@@ -20,6 +20,7 @@ _WITH = {
     "thin_film_thickness": ("thin_film_thickness", "thin_film_ior"),
     "diffuse_roughness": ("diffuse_roughness",),
     "subsurface_weight": ("subsurface_radius",),
+    "absorption_density": ("absorption_density", "absorption_color"),
 }
 # Without an amount of the second the first has no effect
 AMOUNT_OF = {
@@ -33,6 +34,7 @@ AMOUNT_OF = {
     "emission_color": "emission_strength",
     "subsurface_radius": "subsurface_weight",
     "subsurface_scale": "subsurface_weight",
+    "absorption_color": "absorption_density",
 }
 # Why what no fit changes is held
 FIXED = {

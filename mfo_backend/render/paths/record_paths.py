@@ -228,7 +228,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[Tec
         ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
         wo = si.to_local(ds.d)
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
-        value *= shadows.passed(si, ds, lit).through
+        value *= shadows.left(shadows.passed(si, ds, lit))
         started.append(_lit(hits, wo, value * (hits.share * terminator.bend(si, wo, lit)), lit & (dr.max(value) > 0.0)))
     return [kept() for kept in started]
 
@@ -270,7 +270,7 @@ def _sampled_lights(
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
         passed = shadows.passed(si, ds, lit)
-        value *= passed.through
+        value *= shadows.left(passed)
         lit &= dr.max(value) > 0.0
         light_density = ds.pdf * choice
         mis = light_density / (light_density + proposal.density(si.wi, wo, hits.coat))

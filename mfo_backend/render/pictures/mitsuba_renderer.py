@@ -309,8 +309,10 @@ def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) 
     cycles_path.register()
     lamp_plugins.register()
     has_lamps = any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter"))
-    if light_paths is None and (has_lamps or _camera_world(document) is not None):
-        light_paths = LightPaths()  # changes nothing but what Mitsuba's own integrators have not: lamps, a second world
+    absorbs = any(e.get("name") == "absorption_density" for e in document.iter("float"))
+    if light_paths is None and (has_lamps or absorbs or _camera_world(document) is not None):
+        # changes nothing but what Mitsuba's own integrators have not: lamps, a second world, light lost on its way
+        light_paths = LightPaths()
     if light_paths is not None:
         _use_cycles_path(document, cycles_path.PLUGIN_NAME, cycles_path.light_path_properties(light_paths))
     with two_threads():

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from ...types.parameter import ParameterTable
 
+APART = ("base_color", "absorption_color")  # colours of which no channel of the picture looks at another
+
 
 @dataclass(frozen=True)
 class Tangents:
-    """The directions in which derivatives are taken: one for each free value, but one for all of the base colour.
-
-    A channel of the picture depends on no other channel of the base colour, so that its three derivatives need one
-    pass.
-    """
+    """The directions in which derivatives are taken: one for each free value, but one for all of a colour whose
+    channels each show in their own channel of the picture alone."""
 
     table: ParameterTable
     entries: tuple[tuple[int, ...], ...]
@@ -28,7 +27,7 @@ class Tangents:
         entries: list[tuple[int, ...]] = []
         for p in table:
             at = range(*table.slice_of(p.name).indices(table.length))
-            entries += [tuple(at)] if p.name == "base_color" else [(k,) for k in at]
+            entries += [tuple(at)] if p.name in APART else [(k,) for k in at]
         return Tangents(table, tuple(entries))
 
     def expand(self, columns: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -67,7 +67,7 @@ class TracedPaths:
             raise UnrecordableError("The target emits light and the integrator hides what does.")
         self._light_paths = renderer.light_paths
         self._lamps, self._shadows, self._view = SceneLamps(scene), ShadowRays(scene), CameraView(scene)
-        self._terminator = self._shadows.terminator
+        self._terminator, self._absorption = self._shadows.terminator, self._shadows.absorption
         self._camera_world = getattr(integrator, "camera_world", None)
         # a mix tells by its other leaves what goes through it; of those this one's alpha is taken as it is
         names = () if target.tree is not None else self.table.names
@@ -149,6 +149,7 @@ class TracedPaths:
         scene = self.renderer.scene
         directions = len(self._tangents.entries) if jacobian else 0
         alpha = None if self._alpha_entry is None else dr.gather(mi.Float, theta, offset + self._alpha_entry[0])
+        sigma = self._target.absorbs(theta, offset, directions)
         state = {
             "ray": mi.Ray3f(ray),
             "beta": [mi.Color3f(1.0)] + [mi.Color3f(0.0) for _ in range(directions)],
@@ -159,6 +160,7 @@ class TracedPaths:
             "depth": mi.UInt32(0),
             "left": mi.UInt32(self._depth),
             "passages": mi.UInt32(0),
+            "inside": self._absorption.outside(),
             "active": mi.Bool(True),
         }
         if self._light_paths is not None:
@@ -174,6 +176,8 @@ class TracedPaths:
             else:
                 si = seen_side(scene, scene.ray_intersect(ray, active))
             last = mi.Bool(self._shadows.ends(si, s["passages"]))  # its own light still counts
+            if self._absorption:
+                beta = self._dimmed(beta, self._absorption.lengths(s["inside"], si.t), sigma)
             blur = self._blur(s)
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
@@ -204,9 +208,9 @@ class TracedPaths:
             # behind its last bounce a path still goes straight on
             active = active if self._shadows.lets_through else scatters
             # light sampled from here
-            ds, value, times = sample_light(
+            ds, value, times, ways = sample_light(
                 scene, self._shadows, si, rng.pair(2 + 3 * depth), scatters,
-                None if alpha is None else self._bsdf, s["passages"],
+                None if alpha is None else self._bsdf, s["passages"], s["inside"],
             )  # fmt: skip
             wo = si.to_local(ds.d)
             lit = scatters & (ds.pdf > 0.0)
@@ -242,12 +246,16 @@ class TracedPaths:
             weight = value * dr.select(alone(ds), 1.0, self._share(ds.pdf, pdf_light))
             weight = dr.select(lit, weight, 0.0)
             left_over, slope = left_of(alpha, times)
-            weight *= self._clamp(beta[0] * f_light[0] * weight * left_over, depth >= 1)
-            total[0] += beta[0] * f_light[0] * weight * left_over
+            sent = [beta[0] * f_light[0]]
             for k in range(directions):
-                total[1 + k] += (beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k]) * weight * left_over
-                if self._tangents.entries[k] == self._alpha_entry:
-                    total[1 + k] += beta[0] * f_light[0] * weight * slope
+                sent.append(beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k])
+            if self._absorption:
+                sent = self._dimmed(sent, ways, sigma)
+            weight *= self._clamp(sent[0] * weight * left_over, depth >= 1)
+            for k, light in enumerate(sent):
+                total[k] += light * weight * left_over
+                if k and self._tangents.entries[k - 1] == self._alpha_entry:
+                    total[k] += sent[0] * weight * slope
             is_bounce = ~mi.has_flag(kind, mi.BSDFFlags.Null)
             usable = active & (pdf_next > 0.0)
             usable &= ~is_bounce | (scatters & leaves_on(scene, si, local, (kind & TRANSMITS) != 0))
@@ -273,12 +281,26 @@ class TracedPaths:
                 "depth": depth + 1,
                 "left": s["left"] - dr.select(counts, mi.UInt32(1), 0),
                 "passages": passages,
+                "inside": self._absorption.beyond(s["inside"], si, local, active),
                 "active": active,
             }
             return after | self._counted(s, kind, pdf_next, after["left"])
 
         (state,) = dr.while_loop((state,), lambda s: s["active"], lambda s: (body(s),), label="traced paths")
         return state["total"]
+
+    def _dimmed(self, columns: list[Any], lengths: list[mi.Float], sigma: list[mi.Color3f]) -> list[Any]:
+        """Light and its derivatives behind so much way through each absorbing material; `sigma` is the target's."""
+        depth, own = mi.Color3f(0.0), mi.Float(0.0)
+        known = zip(self._absorption.materials, self._absorption.coefficients(), lengths, strict=True)
+        for material, coefficient, length in known:
+            own = length if material is self._bsdf else own
+            depth += (sigma[0] if material is self._bsdf else coefficient) * length
+        share, (light, *changes) = dr.exp(-depth), columns
+        return [
+            light * share,
+            *((c - light * own * slope) * share for c, slope in zip(changes, sigma[1:], strict=True)),
+        ]
 
     def _blur(self, state: dict[str, Any]) -> mi.Float | None:
         """The least alpha of the microfacet lobes by Filter Glossy."""

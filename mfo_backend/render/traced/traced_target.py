@@ -23,6 +23,7 @@ from ...material.principled.lobe_sampling import NAMES, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
 from ..models.prepared_material import EMISSION
 from ..pictures.mitsuba_renderer import MitsubaRenderer
+from ..transport.absorption import COLOR, DENSITY, coefficient
 from .tangents import Tangents
 
 LEAST_DIFFUSE = 0.02  # probability, under glass: more takes paths from the glass
@@ -67,6 +68,19 @@ class TracedTarget:
         self.unit_emission = renderer.factors.get(EMISSION)
         emitter = renderer.shape.emitter() if renderer.shape.is_emitter() and self.tree is None else None
         self.glow: Any = emitter if getattr(emitter, "layered", False) else None
+
+    def absorbs(self, theta, offset, directions) -> list[Any]:
+        """Absorption inside per scene unit (RGB) and its derivatives, of the vectors that begin at `offset`."""
+        values = {name: mi.Color3f(getattr(self.plugin, name)) for name in (DENSITY, COLOR)}
+        slopes = {name: [mi.Color3f(0.0)] * directions for name in (DENSITY, COLOR)}
+        for name in values:
+            if name in self.table.names:
+                entries = range(*self.table.slice_of(name).indices(self.table.length))
+                values[name] = mi.Color3f(*(dr.gather(mi.Float, theta, offset + k) for k in entries))
+                slopes[name] = [mi.Color3f(float(entry[0] in entries)) for entry in self.tangents.entries[:directions]]
+        density, rest = values[DENSITY], 1.0 - values[COLOR]
+        moved = zip(slopes[DENSITY], slopes[COLOR], strict=True)
+        return [coefficient(*values.values()), *(a * rest - b * density for a, b in moved)]
 
     def at(self, si, wo, u1, u2, met, on, theta, offset, directions) -> Scattering:
         """What it does with light from `wo`, and in a direction drawn by `u1` and `u2`, where paths go `on`; its own

@@ -22,6 +22,7 @@ from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[report
 
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
+from .absorption import Inside
 from .camera_view import CameraView
 from .shadow_rays import ShadowRays, sample_light
 from .smooth_facets import leaves_on, met_light, seen_side
@@ -72,7 +73,7 @@ class CyclesPath(RBIntegrator):
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
-        terminator, view = shadows.terminator, CameraView(scene)
+        terminator, view, absorption = shadows.terminator, CameraView(scene), shadows.absorption
         context = mi.BSDFContext()
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
@@ -90,6 +91,7 @@ class CyclesPath(RBIntegrator):
             # what such a ray meets straight behind a surface is found by the light samples of where it was sent out
             density, delta = mi.Float(0), mi.Bool(False)
         passages = mi.UInt32(0)
+        inside, dimmed = absorption.outside(), mi.Color3f(1)
         active = mi.Bool(active)
         valid = mi.Bool(False)
         known = met is not None
@@ -114,6 +116,10 @@ class CyclesPath(RBIntegrator):
             without = dr.select(bounce == int(before is not None), float(walked), 0.0)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
             bsdf = si.bsdf(ray)
+            if dr.hint(absorption, mode="scalar"):
+                with dr.resume_grad(when=not primal):
+                    dimmed = absorption.left(absorption.lengths(inside, si.t))
+                throughput *= dr.detach(dimmed)
 
             # light that the last direction meets
             ds = met_light(scene, si, previous)
@@ -138,14 +144,16 @@ class CyclesPath(RBIntegrator):
             goes_on = goes_on if shadows.lets_through else scatters
             on_light = sampler.next_2d()
             if dr.hint(every_lamp, mode="scalar"):
-                direct = throughput * of_lamps(scene, shadows, si, on_light, scatters, bounce == 0, passages)
+                direct = throughput * of_lamps(scene, shadows, si, on_light, scatters, bounce == 0, passages, inside)
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
             else:
-                ds, light, _ = sample_light(scene, shadows, si, on_light, scatters, None, passages)
+                ds, light, _, ways = sample_light(scene, shadows, si, on_light, scatters, None, passages, inside)
                 lit = scatters & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 if dr.hint(terminator.bends, mode="scalar"):
                     light *= terminator.bend(si, si.to_local(ds.d), lit)
                 with dr.resume_grad(when=not primal):
+                    if dr.hint(absorption, mode="scalar"):
+                        light *= absorption.left(ways)
                     value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
                     weight = dr.detach(share(alone(ds), ds.pdf, chance))
                     direct = dr.select(lit, throughput * value * light * weight, 0)
@@ -164,10 +172,13 @@ class CyclesPath(RBIntegrator):
             if dr.hint(primal, mode="scalar"):
                 radiance += shown + direct
             else:
+                onwards = mi.Spectrum(radiance)
                 radiance -= shown + dr.detach(direct)
                 with dr.resume_grad():
                     again = bsdf.eval(context, si, si.to_local(onward.d), goes_on)
                     out = shown + direct + radiance * dr.relative_grad(again)
+                    if dr.hint(absorption, mode="scalar"):
+                        out += onwards * dr.relative_grad(dimmed)
                     if dr.hint(mode == dr.ADMode.Backward, mode="scalar"):
                         dr.backward_from(change * out)
                     else:
@@ -188,6 +199,7 @@ class CyclesPath(RBIntegrator):
             least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
             bounce[sent] += 1
             throughput *= ratio
+            inside = absorption.beyond(inside, si, bs.wo, goes_on)
             density = dr.select(sent, bs.pdf, density)
             delta = dr.select(sent, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), delta)
             previous = dr.select(sent, mi.Interaction3f(si), previous)
@@ -208,6 +220,7 @@ def of_lamps(
     active: mi.Bool,
     of_all: mi.Bool,
     passages: mi.UInt32,
+    inside: Inside,
 ) -> mi.Color3f:
     """Light that a surface sends back, of lamps without extent: of all of them, or elsewhere of one that is drawn."""
     lamps, context, bsdf = scene.emitters_dr(), mi.BSDFContext(), si.bsdf()
@@ -220,7 +233,7 @@ def of_lamps(
         lamp = dr.gather(mi.EmitterPtr, lamps, number, active)
         ds, light = lamp.sample_direction(si, on_light, active)
         lit = active & (ds.pdf > 0)
-        light *= weight * shadows.passed(si, ds, lit, None, passages).through
+        light *= weight * shadows.left(shadows.passed(si, ds, lit, None, passages, inside))
         if dr.hint(shadows.terminator.bends, mode="scalar"):
             light *= shadows.terminator.bend(si, si.to_local(ds.d), lit)
         value, _ = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)

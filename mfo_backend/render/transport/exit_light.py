@@ -101,7 +101,7 @@ def exit_light(
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
         likely = mi.warp.square_to_cosine_hemisphere_pdf(wo)
         passed = shadows.passed(si, ds, lit)
-        value = value * passed.through * (likely * shadows.terminator.bend(si, wo, lit))
+        value = value * shadows.left(passed) * (likely * shadows.terminator.bend(si, wo, lit))
         # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it
         return dr.select(lit, value, 0.0), dr.select(passed.alpha, 0.0, likely)
 

@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from .absorption import Absorption, Inside
 from .ray_starts import RayStarts
 from .smooth_facets import ShadowTerminator, follows_cycles, shape_number, shape_table
 
@@ -31,12 +32,13 @@ UNIFORM = "ConstantBackgroundEmitter"  # Mitsuba's class of the plugin `constant
 
 @dataclass(frozen=True)
 class Passed:
-    """What is left of light: its share `through` (RGB), whether `alpha` took some, and how often it went through the
-    surface `of` which was asked."""
+    """What surfaces leave of light: its share `through` (RGB), whether `alpha` took some, and how often it went through
+    the surface `of` which was asked. Its `lengths` are those inside of each absorbing material."""
 
     through: Any
     alpha: Any
     times: Any
+    lengths: Any
 
 
 class ShadowRays:
@@ -44,7 +46,7 @@ class ShadowRays:
 
     def __init__(self, scene: mi.Scene) -> None:
         self.terminator, self.starts = ShadowTerminator.of(scene), RayStarts(scene)
-        self._scene = scene
+        self._scene, self.absorption = scene, Absorption(scene)
         self._shadowless = [e for e in scene.emitters() if not getattr(e, "shadow", True)]
         self._uniform = [e for e in scene.emitters() if e.class_name() == UNIFORM]
         self._marked = marked = [s for s in scene.shapes() if np.any(s.has_attribute(SHADOW_TRANSMISSION))]
@@ -56,7 +58,7 @@ class ShadowRays:
         self.lets_through = follows_cycles(scene) and any(
             s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
         )
-        unlit = marked or self.lets_through or self._shadowless
+        unlit = marked or self.lets_through or self._shadowless or self.absorption
         self.plain = self.starts.are_usual and not unlit and not self.terminator.lifts
 
     def passed(
@@ -66,24 +68,32 @@ class ShadowRays:
         active: Any,
         of: Any = None,
         passages: mi.UInt32 | int = 0,
+        inside: Inside | None = None,
     ) -> Passed:
         """What is left of the light of the sample `ds` at `si`; passages through the BSDF `of` are only counted.
 
-        The path to `si` has made as many `passages` itself.
+        The path to `si` has made as many `passages` itself, and is `inside` of so many objects, of none without it.
         """
         casts = mi.Bool(active)
         for lamp in self._shadowless:
             casts &= ds.emitter != mi.EmitterPtr(lamp)
         ray = self.starts.ray_to(si, ds.p, self.terminator.lift(si, ds.d, casts))
+        begin = self.absorption.outside() if inside is None else inside
+        begin = self.absorption.beyond(begin, si, si.to_local(ds.d), casts)
         if not self._marked and not self.lets_through:
             hidden = self._scene.ray_test(ray, casts)
-            return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0))
+            lengths = self.absorption.lengths(begin, ds.dist)
+            return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0), lengths)
         made, limit = mi.UInt32(passages), dr.opaque(mi.UInt32, self.most)
         most = dr.select(limit > made, limit - made, 0)
         asked = mi.Bool(True)
         for world in self._uniform:
             asked &= ds.emitter != mi.EmitterPtr(world)
-        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most, asked)
+        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most, asked, begin)
+
+    def left(self, passed: Passed) -> mi.Color3f:
+        """The share of light (RGB) that surfaces and volumes leave."""
+        return passed.through * self.absorption.left(passed.lengths) if self.absorption else passed.through
 
     def ends(self, si: mi.SurfaceInteraction3f, passages: mi.UInt32) -> mi.Bool | bool:
         """Whether a path that has gone straight through as many surfaces as it may has met a further one.
@@ -96,13 +106,23 @@ class ShadowRays:
 
     @dr.syntax
     def _followed(
-        self, ray: mi.Ray3f, end: mi.Point3f, active: mi.Bool, of: mi.BSDFPtr, most: mi.UInt32, asked: mi.Bool
+        self,
+        ray: mi.Ray3f,
+        end: mi.Point3f,
+        active: mi.Bool,
+        of: mi.BSDFPtr,
+        most: mi.UInt32,
+        asked: mi.Bool,
+        inside: Inside,
     ) -> Passed:
         """What is left behind all surfaces on a ray; they are `asked` for marks or are as materials say."""
-        scene, marks = self._scene, self._marks
+        scene, marks, absorption = self._scene, self._marks, self.absorption
+        inside, lengths = list(inside), absorption.lengths(inside, mi.Float(0))
         through, alpha, times, met = mi.Color3f(1), mi.Bool(False), mi.UInt32(0), mi.UInt32(0)
         while dr.hint(active, label="shadow rays"):
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=False, active=active)
+            segment = dr.select(active, dr.select(si.is_valid(), si.t, ray.maxt), 0)
+            lengths = absorption.further(lengths, inside, segment)
             active &= si.is_valid()
             bsdf = si.bsdf()
             share = mi.Color3f(bsdf.eval_null_transmission(si, active))
@@ -119,8 +139,9 @@ class ShadowRays:
             share = dr.select(met > most, 0, share)
             through = dr.select(active, through * share, through)
             active &= dr.max(through) > 0
+            inside = absorption.crossed(inside, si, active & ~marked)
             ray = self.starts.ray_to(si, end)
-        return Passed(through, alpha, times)
+        return Passed(through, alpha, times, lengths)
 
 
 def sample_light(
@@ -131,17 +152,19 @@ def sample_light(
     active: mi.Bool,
     of: Any = None,
     passages: mi.UInt32 | int = 0,
-) -> tuple[mi.DirectionSample3f, mi.Color3f, mi.UInt32]:
+    inside: Inside | None = None,
+) -> tuple[mi.DirectionSample3f, mi.Color3f, mi.UInt32, list[mi.Float]]:
     """As `scene.sample_emitter_direction` with its test for obstacles, as Cycles tests for them.
 
-    The last is how often the light went through the BSDF `of`, which takes nothing of it here.
+    Further how often the light went through the BSDF `of`, and how far inside of each absorbing material; both take
+    nothing of it here. What `inside` means is said at `passed`.
     """
     if shadows.plain:
-        return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0)
+        return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0), []
     ds, light = scene.sample_emitter_direction(si, u, False, active)
-    passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of, passages)
+    passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of, passages, inside)
     ds.pdf = dr.select(dr.max(passed.through) > 0, ds.pdf, 0.0)
-    return ds, light * passed.through, passed.times
+    return ds, light * passed.through, passed.times, passed.lengths
 
 
 def left_of(alpha: mi.Float | None, times: mi.UInt32) -> tuple[mi.Float | float, mi.Float | float]:

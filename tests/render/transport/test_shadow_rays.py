@@ -35,7 +35,7 @@ def passed(*keeps: float | None) -> np.ndarray:
     }
     scene = mi.load_dict({"type": "scene", "lamp": LAMP, "floor": {"type": "rectangle"}, **sheets}, optimize=False)
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0.1, 0.2, 0.5), mi.Vector3f(0.0, 0.0, -1.0)))
-    _, light, _ = sample_light(scene, ShadowRays(scene), si, mi.Point2f(0.5, 0.5), mi.Bool(True))
+    _, light, *_ = sample_light(scene, ShadowRays(scene), si, mi.Point2f(0.5, 0.5), mi.Bool(True))
     free = scene.sample_emitter_direction(si, mi.Point2f(0.5, 0.5), False)[1]
     dr.eval(light, free)
     return np.array(light).ravel() / np.array(free).ravel()
