@@ -211,7 +211,22 @@ def _certainty(ends: Sequence[Polished], table: ParameterTable) -> dict[str, Cer
     variance = np.zeros(table.length)
     doubted = np.any(ends[-1].kept & table.mask_of(CORE))
     for end in ends:
-        found = np.maximum(variance, np.diag(end.covariance)) if doubted else np.diag(end.covariance)
+        spread = end.covariance + _of_one_absorption(end, table)
+        found = np.maximum(variance, np.diag(spread)) if doubted else np.diag(spread)
         variance = np.where(end.kept, variance, found)
     least = np.where(ends[-1].unseen, WEAK_BELOW * (table.upper - table.lower), 0.0)
-    return certainties(np.maximum(np.sqrt(variance), least), table, ends[-1].covariance)
+    spread = ends[-1].covariance + _of_one_absorption(ends[-1], table)
+    return certainties(np.maximum(np.sqrt(variance), least), table, spread)
+
+
+def _of_one_absorption(end: Polished, table: ParameterTable) -> Vector:
+    """Covariance of density and colour of a volume that absorbs the same: density (1 - colour) alone is seen.
+
+    The equations hold that way of no effect at all as far as their noise goes, which is too sure of it.
+    """
+    away = np.zeros(table.length)
+    both = ("absorption_density", "absorption_color")
+    if set(both) <= set(table.names) and not end.kept[table.mask_of(both)].any():
+        density, color = map(table.slice_of, both)
+        away[density], away[color] = end.x[density], 1.0 - end.x[color]
+    return np.outer(away, away)

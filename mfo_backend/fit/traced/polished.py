@@ -17,7 +17,7 @@ from ..tolerances import SIGNIFICANT, WEAK_BELOW
 
 Vector = NDArray[np.float64]
 
-CORE = ("base_color", "transmission_weight", "roughness", "ior")
+CORE = ("base_color", "transmission_weight", "roughness", "ior", "absorption_density", "absorption_color")
 AMOUNTS = ("metallic", "coat_weight", "sheen_weight")
 
 

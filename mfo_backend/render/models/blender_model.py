@@ -32,6 +32,8 @@ from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMateri
 # scene, for walks that were made for that tell of it. From four times too small a red radius was found
 # (docs/notebook/subsurface.md). Larger: not tried
 WALKS_NEAR = 5.0
+# Density of a volume: at most so many times that of the scene, for sizes of a scene differ by any factor
+DENSITY = "absorption_density"
 WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
@@ -121,6 +123,8 @@ def _near_walks(table: ParameterTable, values: Mapping[str, Value], sizes: Colle
     """With bounds of these `sizes` around those in the scene: light below the surface is recorded for them."""
     near = []
     for p in table:
+        if p.name == DENSITY and values.get(DENSITY):
+            p = replace(p, upper=float(np.ravel(values[DENSITY])[0]) * WALKS_NEAR)
         if p.name in sizes:
             present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
             begin = tuple(float(v) for v in present) if p.size == 3 else float(present[0])
