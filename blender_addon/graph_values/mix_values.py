@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import EMISSION, KINDS, UNUSED_SOCKETS, inputs_of, is_fitted
+from ..export.nodes.leaf_kinds import KINDS, UNUSED_SOCKETS, inputs_of, is_fitted, shines
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
@@ -81,7 +81,7 @@ def why_no_mix_values(target: TargetShader) -> str | None:
     if target.displacement is not None:
         return "its Displacement has a link"
     for leaf in (target.leaf, *target.others):
-        if leaf.node.bl_idname == EMISSION:
+        if shines(leaf.node):
             continue
         if leaf.node.bl_idname in KINDS and KINDS[leaf.node.bl_idname].shader not in OPAQUE_SHADERS:
             return f"'{leaf_name(leaf)}' lets light through"
@@ -104,7 +104,7 @@ def mix_values(target: TargetShader) -> list[MixValue]:
         place = Place((*(group.name for group in factor.groups), node.name), INPUT, factor.socket.identifier)
         found.append(_value(node, factor.socket.name, place, not _is_in_colors(target, factor), factor=factor))
     for number, leaf in enumerate(target.others):
-        if leaf.node.bl_idname == EMISSION or not is_fitted(leaf.node):
+        if shines(leaf.node) or not is_fitted(leaf.node):
             continue
         shader = TargetShader(leaf)
         default = _default_names(shader)
@@ -149,7 +149,7 @@ def _factors(target: TargetShader) -> list[Factor]:
     held = {
         _place(factor)
         for leaf in leaves
-        if leaf.node.bl_idname == EMISSION or (leaf.is_linked and len(leaf.ways) > 1)
+        if shines(leaf.node) or (leaf.is_linked and len(leaf.ways) > 1)
         for way in leaf.ways
         for factor in way
     }

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..export.camera.camera_model import Region
 from ..export.images.color_space import to_rec709
+from ..export.nodes.closure_leaves import OUTPUT
 from ..export.nodes.displacement import SHADING_NORMAL, displacement_in
 from ..export.nodes.shader_graph import source_of
 from ..versions import active_output, bumps_look_at_pixels
@@ -296,6 +297,11 @@ def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[st
         if name == SHADING_NORMAL:
             kinds[name] = "VECTOR"
             _output(inner, output, inner.nodes.new("ShaderNodeNewGeometry").outputs["Normal"], True)
+            continue
+        if name.startswith(OUTPUT):
+            kinds[name] = "RGBA"
+            given = next(s for s in shader.outputs if s.identifier == name.removeprefix(OUTPUT))
+            _output(inner, output, given, True)
             continue
         socket = shader.inputs[name]
         source = source_of(socket)

@@ -13,7 +13,7 @@ from ...versions import DIFFUSE, has_diffuse_roughness
 from ..findings import Findings, Fix
 from ..material_model import Socket
 from ..nodes.graph_findings import graph_problem
-from ..nodes.leaf_kinds import is_shader, sockets_of
+from ..nodes.leaf_kinds import sockets_of
 from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket
 from ..nodes.target_shader import Place
 
@@ -93,13 +93,7 @@ def _conductor_fresnel(c: float, n: NDArray[np.float64], k: NDArray[np.float64])
 
 def note_black(material: str, name: str, node: bpy.types.Node, findings: Findings) -> None:
     """Say that a part of a mix, of this name, has no model."""
-    if is_shader(node):
-        findings.note(f"Material '{material}': '{name}' ({node.bl_label}) is held as black.")
-        return
-    findings.note(
-        f"Material '{material}': '{name}' ({node.bl_label}) is a colour in the place of a shader, which shines in "
-        "Cycles and is held as black: link an Emission between them."
-    )
+    findings.note(f"Material '{material}': '{name}' ({node.bl_label}) is held as black.")
 
 
 def is_uv_tangent(node: bpy.types.Node) -> bool:

@@ -15,7 +15,7 @@ from ..audit.rules import name_settings
 from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from ..findings import Findings, Fix
 from ..material_model import Material, Socket
-from ..nodes.closure_leaves import UNKNOWN, ClosureLeaf
+from ..nodes.closure_leaves import OUTPUT, UNKNOWN, ClosureLeaf
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
 from ..nodes.leaf_kinds import (
@@ -26,6 +26,7 @@ from ..nodes.leaf_kinds import (
     WITHOUT_SPECULAR,
     distribution_of,
     inputs_of,
+    is_shader,
     only_nearest,
     walks_of,
 )
@@ -141,6 +142,8 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
     if node.bl_idname == TRANSPARENT:
         named = {"Base Color": node.inputs["Color"]}
         return Material(name, "null", read(named), weight=weight, node=tuple(leaf.path), labels=_labels(named))
+    if not is_shader(node):
+        return _read_colour(material, leaf, weight, findings)
     kind = KINDS.get(node.bl_idname)
     if kind is None:
         note_black(material.name, name, node, findings)
@@ -160,6 +163,15 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
         name, "principled", sockets, distribution_of(node), walks_of(node), shader=kind.shader, weight=weight,
         node=tuple(leaf.path), labels=_labels(inputs_of(node)), is_nearest=only_nearest(node),
     )  # fmt: skip
+
+
+def _read_colour(material: bpy.types.Material, leaf: ClosureLeaf, weight: Socket, findings: Findings) -> Material:
+    """A colour in the place of a shader, which shines (ShaderGraph::connect); Cycles evaluates it."""
+    for socket in leaf.node.inputs:
+        refuse_link(socket.name, Place(socket, leaf.groups), material.name, findings, is_copied=True)
+    sockets = {"Emission Color": Socket([1.0, 1.0, 1.0], True, by_graph=True), "Emission Strength": Socket(1.0, True)}
+    labels = {"Emission Color": f"{OUTPUT}{leaf.output}"}
+    return Material(leaf_name(leaf), "emission", sockets, weight=weight, node=tuple(leaf.path), labels=labels)
 
 
 def _read_at(node: bpy.types.Node, place: Place, material: str, findings: Findings) -> Socket:

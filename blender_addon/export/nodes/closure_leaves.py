@@ -20,6 +20,7 @@ Groups = tuple[bpy.types.Node, ...]  # group nodes, outermost first
 MIX, ADD = "ShaderNodeMixShader", "ShaderNodeAddShader"
 DEEPEST = 64  # groups and mixes within each other; more is a circle
 MOST_WAYS = 256  # to leaves: nodes that are linked to several mixes multiply
+OUTPUT = "Output "  # before the identifier of a node's output, where that is asked and no socket
 UNKNOWN = 0.5  # what a linked factor is taken for where no picture of it is at hand
 
 
@@ -46,11 +47,12 @@ class Factor:
 
 @dataclass(frozen=True)
 class ClosureLeaf:
-    """A shader node, the groups it lies in, and the factors on each way to it."""
+    """A shader node, the groups it lies in, the factors on each way to it, and the identifier of its output."""
 
     node: bpy.types.Node
     groups: Groups
     ways: tuple[tuple[Factor, ...], ...]
+    output: str = ""
 
     @property
     def path(self) -> list[str]:
@@ -86,14 +88,14 @@ def closure_leaves(material: bpy.types.Material | None, socket: str = "Surface")
     output = active_output(node_tree_of(material)) if material is not None else None
     if output is None:
         return []
-    found: dict[tuple[int, ...], ClosureLeaf] = {}
+    found: dict[tuple[int | str, ...], ClosureLeaf] = {}
     for count, leaf in enumerate(_walk(output.inputs[socket], (), (), ())):
         if count == MOST_WAYS:
             raise ClosureError(f"mixes shaders in more than {MOST_WAYS} ways: simplify it")
-        place = tuple(node.as_pointer() for node in (*leaf.groups, leaf.node))
+        place = (*(node.as_pointer() for node in (*leaf.groups, leaf.node)), leaf.output)
         before = found.get(place)
         ways = leaf.ways if before is None else before.ways + leaf.ways
-        found[place] = ClosureLeaf(leaf.node, leaf.groups, ways)
+        found[place] = ClosureLeaf(leaf.node, leaf.groups, ways, leaf.output)
     return list(found.values())
 
 
@@ -127,7 +129,7 @@ def _walk(
         for side in node.inputs:
             yield from _walk(side, groups, factors, above)
     else:
-        yield ClosureLeaf(node, groups, (factors,))
+        yield ClosureLeaf(node, groups, (factors,), source.identifier)
 
 
 def by_identifier(sockets: Collection[bpy.types.NodeSocket], identifier: str) -> bpy.types.NodeSocket | None:

@@ -104,6 +104,11 @@ def is_shader(node: bpy.types.Node) -> bool:
     return any(output.type == "SHADER" for output in node.outputs)
 
 
+def shines(node: bpy.types.Node) -> bool:
+    """Whether a node at the end of a surface gives light alone."""
+    return node.bl_idname == EMISSION or not is_shader(node)
+
+
 def is_fitted(node: bpy.types.Node) -> bool:
     """Whether the values of a node can be fitted: its model is exact."""
     return node.bl_idname in KINDS and why_not_fitted(node) is None

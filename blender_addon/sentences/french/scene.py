@@ -147,7 +147,6 @@ SCENE = {
     "Material '{}' shows {}, which no model of the fit has: link a Principled BSDF or another shader of its kind.": "Le matériau '{}' montre {}, dont l'ajustement n'a pas de modèle : lier un Principled BSDF ou un autre shader de sa sorte.",
     "Material '{}' {}.": "Le matériau '{}' {}.",
     "Material '{}': '{}' ({}) is held as black.": "Matériau '{}' : '{}' ({}) est gardé noir.",
-    "Material '{}': '{}' ({}) is a colour in the place of a shader, which shines in Cycles and is held as black: link an Emission between them.": "Matériau '{}' : '{}' ({}) est une couleur à la place d'un shader, qui brille dans Cycles et reste noire : lier une Émission entre les deux.",
     "Material '{}': '{}' ({}) is held as its nearest model.": "Matériau '{}' : '{}' ({}) est gardé comme son modèle le plus proche.",
     "Material '{}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.": "Matériau '{}' : la rugosité d'un Diffuse BSDF est prise pour 0 dans ce Blender.",
     "Material '{}': Tangent has no link, so that Cycles turns the anisotropy about the object's Z axis, and the fit along the UV map: link a Tangent node of direction UV Map.": "Matériau '{}' : Tangent n'a pas de lien, donc Cycles tourne l'anisotropie autour de l'axe Z de l'objet, et l'ajustement le long de la carte UV : lier un nœud Tangent de direction UV Map.",

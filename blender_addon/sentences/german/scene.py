@@ -148,7 +148,6 @@ SCENE = {
     "Material '{}' shows {}, which no model of the fit has: link a Principled BSDF or another shader of its kind.": "Material '{}' zeigt {}, was kein Modell der Anpassung hat: einen Principled BSDF oder einen anderen Shader seiner Art verbinden.",
     "Material '{}' {}.": "Material '{}': {}.",
     "Material '{}': '{}' ({}) is held as black.": "Material '{}': '{}' ({}) wird als Schwarz gehalten.",
-    "Material '{}': '{}' ({}) is a colour in the place of a shader, which shines in Cycles and is held as black: link an Emission between them.": "Material '{}': '{}' ({}) ist eine Farbe an der Stelle eines Shaders, die in Cycles leuchtet und schwarz gehalten wird: eine Emission dazwischen verbinden.",
     "Material '{}': '{}' ({}) is held as its nearest model.": "Material '{}': '{}' ({}) wird als sein nächstes Modell gehalten.",
     "Material '{}': Roughness of a Diffuse BSDF is taken for 0 in this Blender.": "Material '{}': die Rauheit eines Diffuse BSDF gilt in diesem Blender als 0.",
     "Material '{}': Tangent has no link, so that Cycles turns the anisotropy about the object's Z axis, and the fit along the UV map: link a Tangent node of direction UV Map.": "Material '{}': Tangent hat keine Verbindung, sodass Cycles die Anisotropie um die Z-Achse des Objekts dreht und die Anpassung entlang der UV-Map: einen Tangent-Node der Richtung UV-Map verbinden.",

@@ -45,6 +45,14 @@ def noise(tree: Any) -> Any:
     return ramp.outputs[0]
 
 
+def occlusion(tree: Any) -> Any:
+    """A colour, which shines in the place of a shader."""
+    node = tree.nodes.new("ShaderNodeAmbientOcclusion")
+    node.inputs["Color"].default_value = (*BLUE, 1.0)
+    node.inputs["Distance"].default_value = 2.0
+    return node.outputs["Color"]
+
+
 def mix(factor: float | Callable[[Any], Any], first: Build | None, second: Build | None) -> Build:
     def build(tree: Any) -> Any:
         node = tree.nodes.new("ShaderNodeMixShader")
@@ -100,6 +108,7 @@ CASES = {
     "beyond the ends": mix(1.7, DIFFUSE, GLOSSY),
     "half black": mix(0.4, DIFFUSE, None),
     "added": add(DIFFUSE, shader("BsdfAnisotropic", Color=(0.2, 0.2, 0.2), Roughness=0.3)),
+    "a colour that shines": mix(0.4, DIFFUSE, occlusion),
     "three and a glow": add(mix(noise, DIFFUSE, mix(0.5, GLOSSY, SHEEN)), mix(noise, GLOW, None)),
 }
 
