@@ -55,6 +55,7 @@ _SOCKETS = (
     *("Thin Film IOR", "Emission Color"),
     # last: a file keeps what is chosen by its place
     *("Subsurface Radius", "Subsurface Scale", "Absorption Density", "Absorption Color"),
+    *("Metal IOR", "Metal Extinction"),
 )
 SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
 SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}

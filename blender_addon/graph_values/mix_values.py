@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import KINDS, UNUSED_SOCKETS, inputs_of, is_fitted, shines
+from ..export.nodes.leaf_kinds import UNUSED_SOCKETS, inputs_of, is_fitted, kind_of, shines
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
@@ -18,7 +18,7 @@ from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word
 
 # what a leaf has to have so that light only returns from it, and none is its own
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
-OPAQUE_SHADERS = ("principled", "glossy", "subsurface")
+OPAQUE_SHADERS = ("principled", "glossy", "conductor", "subsurface")
 NOT_FITTED = (
     *("Weight", "Alpha", "Transmission Weight", "Emission Color", "Emission Strength", "Subsurface Weight"),
     *(*DIRECTIONS, *UNUSED_SOCKETS),
@@ -83,10 +83,11 @@ def why_no_mix_values(target: TargetShader) -> str | None:
     for leaf in (target.leaf, *target.others):
         if shines(leaf.node):
             continue
-        if leaf.node.bl_idname in KINDS and KINDS[leaf.node.bl_idname].shader not in OPAQUE_SHADERS:
-            return f"'{leaf_name(leaf)}' lets light through"
-        if leaf.node.bl_idname not in KINDS:
+        kind = kind_of(leaf.node)
+        if kind is None:
             return f"'{leaf_name(leaf)}' has no model in the fit"
+        if kind.shader not in OPAQUE_SHADERS:
+            return f"'{leaf_name(leaf)}' lets light through"
     for leaf in (target.leaf, *target.others):
         problem = _not_plain(leaf)
         if problem is not None:

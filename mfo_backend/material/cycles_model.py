@@ -11,7 +11,7 @@ from ..types.errors import BadInputError
 # of microfacets, Blender's words; the last is that of the fibres of a Sheen BSDF
 DISTRIBUTIONS = ("MULTI_GGX", "GGX", "BECKMANN", "ASHIKHMIN_SHIRLEY", "ASHIKHMIN")
 # nodes whose lobes are those of the Principled BSDF but for their Fresnel terms and tints
-SHADERS = ("principled", "glossy", "glass", "refraction", "translucent", "subsurface")
+SHADERS = ("principled", "glossy", "conductor", "glass", "refraction", "translucent", "subsurface")
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,8 @@ class CyclesModel:
         What nodes bend of a diffuse lobe's normal shades light as bumps of a microfacet surface would (from 4.5);
         before, the light fades towards the plane of the mesh.
     shader
-        The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "glass" tints what it reflects
+        The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "conductor"
+        one by index and extinction, "glass" tints what it reflects
         and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
         lobe on the other side times the base colour. Light enters below "subsurface" with an index of its own.
     skin

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..material_model import Material, Part, Socket, Texture
-from ..nodes.leaf_kinds import KINDS, TRANSPARENT
+from ..nodes.leaf_kinds import CONDUCTOR, KINDS, TRANSPARENT
 from .leaf_sockets import BELOW, GLOSSY, conductor_colors, stretched
 
 EMISSION = ("Emission Color", "Emission Strength")
@@ -74,7 +74,7 @@ class Baked:
             if np.min(self._socket(given["Color"]).value) < WHITE:
                 findings.note(f"Material '{name}': Transparent BSDF is taken for white.")
             return Material(name, "null")
-        kind = KINDS.get(leaf["kind"])
+        kind = CONDUCTOR if "Extinction" in given else KINDS.get(leaf["kind"])
         if kind is None:
             findings.note(f"Material '{name}': {leaf['label']} is shown as black.")
             return Material(name, "diffuse", {"Base Color": BLACK})
@@ -94,7 +94,8 @@ class Baked:
         if "Extinction" in given:
             index, extinction = (self._array(given[own]) for own in ("IOR", "Extinction"))
             colours = zip(("Base Color", "Specular Tint"), conductor_colors(index, extinction), strict=True)
-            sockets |= {ours: Socket(c.mean(axis=(0, 1)).tolist(), True, _picture(c)) for ours, c in colours}
+            own = (("Metal IOR", index), ("Metal Extinction", extinction))
+            sockets |= {ours: Socket(c.mean(axis=(0, 1)).tolist(), True, _picture(c)) for ours, c in (*own, *colours)}
         if "Emission Strength" in sockets:
             sockets["Emission Strength"] = Socket(0.0)
         normal = None

@@ -13,7 +13,16 @@ from ..images.color_space import to_rec709
 from ..images.image_pixels import without_pixels
 from ..material_model import Material, Socket, grey
 from ..nodes.displacement import bends_normals
-from ..nodes.leaf_kinds import EMISSION, KINDS, TRANSPARENT, distribution_of, inputs_of, only_nearest, walks_of
+from ..nodes.leaf_kinds import (
+    EMISSION,
+    KINDS,
+    TRANSPARENT,
+    distribution_of,
+    inputs_of,
+    kind_of,
+    only_nearest,
+    walks_of,
+)
 from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
 from ..nodes.target_shader import DIRECTIONS, Place
 from ..nodes.volumes import has_volume
@@ -90,7 +99,8 @@ def _read_other(
     rough = sockets.get("Diffuse Roughness", Socket(0.0))
     if node.bl_idname == DIFFUSE and not (rough.varies or rough.value):
         return Material(material.name, "diffuse", {"Base Color": sockets["Base Color"]})
-    kind = KINDS[node.bl_idname]
+    kind = kind_of(node)
+    assert kind is not None  # `_context_inputs` has none of others
     if only_nearest(node):
         findings.note(f"Material '{material.name}': {node.bl_label} is approximated by its nearest model.")
     sockets = {name: Socket(value) for name, value in kind.held.items()} | sockets

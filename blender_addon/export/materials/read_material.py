@@ -20,13 +20,13 @@ from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
 from ..nodes.graph_findings import graph_problem, note_missing_pictures
 from ..nodes.leaf_kinds import (
     EMISSION,
-    KINDS,
     TRANSPARENT,
     UNUSED_SOCKETS,
     WITHOUT_SPECULAR,
     distribution_of,
     inputs_of,
     is_shader,
+    kind_of,
     only_nearest,
     walks_of,
 )
@@ -144,7 +144,7 @@ def _read_held(material: bpy.types.Material, leaf: ClosureLeaf, findings: Findin
         return Material(name, "null", read(named), weight=weight, node=tuple(leaf.path), labels=_labels(named))
     if not is_shader(node):
         return _read_colour(material, leaf, weight, findings)
-    kind = KINDS.get(node.bl_idname)
+    kind = kind_of(node)
     if kind is None:
         note_black(material.name, name, node, findings)
         sockets = {key: Socket(value, True) for key, value in {**WITHOUT_SPECULAR, "Base Color": [0.0] * 3}.items()}

@@ -37,24 +37,22 @@ class LeafKind:
         Values of the Principled BSDF that make it this node.
     shader
         The backend's word for its lobes.
-    settings
-        Settings of the node that the model holds, by their name; others are shown as the first.
     nearest
-        Whether the model is only the nearest, whatever the settings.
+        Whether the model is only the nearest.
     """
 
     names: Mapping[str, str] | None = None
     held: Mapping[str, Any] = field(default_factory=dict)
     shader: str = "principled"
-    settings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     nearest: bool = False
 
 
+METALLIC = "ShaderNodeBsdfMetallic"
 KINDS: dict[str, LeafKind] = {
     PRINCIPLED: LeafKind(),
     DIFFUSE: LeafKind({"Base Color": "Color", "Diffuse Roughness": "Roughness"}, WITHOUT_SPECULAR),
     "ShaderNodeBsdfAnisotropic": LeafKind({"Base Color": "Color", "Roughness": "Roughness"}, _METAL, "glossy"),
-    "ShaderNodeBsdfMetallic": LeafKind(
+    METALLIC: LeafKind(
         {
             "Base Color": "Base Color",
             "Roughness": "Roughness",
@@ -64,7 +62,6 @@ KINDS: dict[str, LeafKind] = {
             **_FILM,
         },
         _METAL,
-        settings={"fresnel_type": ("F82",)},
     ),
     "ShaderNodeBsdfSheen": LeafKind(
         {"Sheen Tint": "Color", "Sheen Roughness": "Roughness"},
@@ -86,6 +83,18 @@ KINDS: dict[str, LeafKind] = {
     "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHairPrincipled": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
 }
+# a Metallic BSDF by index and extinction, which its setting makes of it
+CONDUCTOR = LeafKind(
+    {
+        "Metal IOR": "IOR",
+        "Metal Extinction": "Extinction",
+        "Roughness": "Roughness",
+        "Anisotropic": "Anisotropy",
+        "Anisotropic Rotation": "Rotation",
+    },
+    _METAL,
+    "conductor",
+)
 UNUSED_SOCKETS = ("Thin Wall",)  # of a Principled BSDF those that no model has, whatever is linked to them
 EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
 # values of `all` that join only where the node has some of them already
@@ -104,6 +113,12 @@ def is_shader(node: bpy.types.Node) -> bool:
     return any(output.type == "SHADER" for output in node.outputs)
 
 
+def kind_of(node: bpy.types.Node) -> LeafKind | None:
+    """How a node is fitted, or held; None of one without a model."""
+    by_index = node.bl_idname == METALLIC and node.fresnel_type == "PHYSICAL_CONDUCTOR"
+    return CONDUCTOR if by_index else KINDS.get(node.bl_idname)
+
+
 def shines(node: bpy.types.Node) -> bool:
     """Whether a node at the end of a surface gives light alone."""
     return node.bl_idname == EMISSION or not is_shader(node)
@@ -111,26 +126,21 @@ def shines(node: bpy.types.Node) -> bool:
 
 def is_fitted(node: bpy.types.Node) -> bool:
     """Whether the values of a node can be fitted: its model is exact."""
-    return node.bl_idname in KINDS and why_not_fitted(node) is None
+    return kind_of(node) is not None and why_not_fitted(node) is None
 
 
 def why_not_fitted(node: bpy.types.Node) -> str | None:
     """What keeps a shader node of a known kind from being fitted, as the end of a sentence; None if nothing does."""
-    kind = KINDS[node.bl_idname]
-    if kind.nearest:
+    if _known(node).nearest:
         return "has lobes that the fit does not have"
-    wrong = _unknown_setting(node, kind)
-    if wrong is None:
-        return None
-    name, allowed = wrong
-    choices = " or ".join(_label(node, name, value) for value in allowed)
-    return f"is set to {_label(node, name, getattr(node, name))}, which the fit does not have: choose {choices}"
+    if _is_filmed_metal(node):
+        return "has a thin film on a metal by index, which the fit does not have: set its thickness to 0"
+    return None
 
 
 def only_nearest(node: bpy.types.Node) -> bool:
     """Whether a node of a known kind is held as a model that is only the nearest."""
-    kind = KINDS[node.bl_idname]
-    return kind.nearest or _unknown_setting(node, kind) is not None
+    return _known(node).nearest or _is_filmed_metal(node)
 
 
 def distribution_of(node: bpy.types.Node) -> str:
@@ -154,7 +164,7 @@ def inputs_of(node: bpy.types.Node) -> dict[str, bpy.types.NodeSocket]:
     own = sockets_of(node)
     if node.bl_idname == DIFFUSE and not has_diffuse_roughness():
         own.pop("Roughness")
-    names = KINDS[node.bl_idname].names
+    names = _known(node).names
     return own if names is None else {ours: own[theirs] for ours, theirs in names.items() if theirs in own}
 
 
@@ -170,13 +180,12 @@ def default_names(values: Mapping[str, Any]) -> list[str]:
     return [name for name in values if is_present(name)]
 
 
-def _unknown_setting(node: bpy.types.Node, kind: LeafKind) -> tuple[str, tuple[str, ...]] | None:
-    for name, allowed in kind.settings.items():
-        if getattr(node, name, allowed[0]) not in allowed:
-            return name, allowed
-    return None
+def _known(node: bpy.types.Node) -> LeafKind:
+    kind = kind_of(node)
+    assert kind is not None  # asked of known kinds alone
+    return kind
 
 
-def _label(node: bpy.types.Node, name: str, value: str) -> str:
-    items = node.bl_rna.properties[name].enum_items
-    return items[value].name if value in items else value
+def _is_filmed_metal(node: bpy.types.Node) -> bool:
+    film = sockets_of(node).get("Thin Film Thickness")
+    return kind_of(node) is CONDUCTOR and film is not None and bool(film.is_linked or film.default_value > 0.0)

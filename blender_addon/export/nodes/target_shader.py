@@ -14,7 +14,17 @@ from ...versions import PRINCIPLED, node_tree_of
 from .closure_leaves import ClosureError, ClosureLeaf, Groups, by_identifier, closure_leaves
 from .displacement import displacement_in
 from .graph_findings import GROUP_INPUT
-from .leaf_kinds import EMISSION, KINDS, TRANSPARENT, LeafKind, inputs_of, is_fitted, is_shader, why_not_fitted
+from .leaf_kinds import (
+    EMISSION,
+    KINDS,
+    TRANSPARENT,
+    LeafKind,
+    inputs_of,
+    is_fitted,
+    is_shader,
+    kind_of,
+    why_not_fitted,
+)
 from .shader_graph import Links
 from .volumes import AbsorbingVolume, absorbing_volume, lets_light_in
 
@@ -55,7 +65,9 @@ class TargetShader:
     @property
     def kind(self) -> LeafKind:
         """How the node is fitted."""
-        return KINDS[self.node.bl_idname]
+        kind = kind_of(self.node)
+        assert kind is not None  # of other nodes it has no values
+        return kind
 
     @property
     def is_mixed(self) -> bool:

@@ -59,6 +59,26 @@ def f82(c: Any, f0: Any, slope: Any) -> Any:
     return saturate(value)
 
 
+def conductor(c: Any, n: Any, k: Any) -> Any:
+    """Unpolarised reflectance of a conductor of complex index n + i k (Born and Wolf 1999, section 14.4.1)."""
+    difference, product = dr.square(n) - dr.square(k), 2 * n * k
+    t = difference - (1 - dr.square(c))
+    length = root(dr.square(t) + dr.square(product))
+    u_squared, v_squared = (at_least(0.5 * (length + sign * t), 0) for sign in (1, -1))
+    u, v = root(u_squared), root(v_squared)
+    s = (dr.square(c - u) + v_squared) / (dr.square(c + u) + v_squared)
+    across, along = difference * c, product * c
+    p = (dr.square(across - u) + dr.square(along - v)) / (dr.square(across + u) + dr.square(along + v))
+    return 0.5 * (s + p)
+
+
+def average_conductor(n: Any, k: Any) -> Any:
+    """Cosine average of `conductor` as Cycles has it: that of the F82 tint which equals it at c = 1 and 1 / 7."""
+    f0, edge = conductor(1.0, n, k), conductor(1 / 7, n, k)
+    f = 6 / 7
+    return saturate(average_f82(f0, (f0 + (1 - f0) * f**5 - edge) * (7 / f**6)))
+
+
 def average_dielectric(n: Any) -> Any:
     """Cosine average of the dielectric reflectance: the rational fit Cycles uses (0.0895 at 1.5; exact 0.0918)."""
     outside = (n - 1) / (4.08567 + 1.00071 * n)

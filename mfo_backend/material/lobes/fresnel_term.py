@@ -8,7 +8,7 @@ from typing import Any
 
 from ..arrays import dual as dr
 from ..arrays.clamp import saturate
-from .fresnel import f82, normal_incidence, schlick_blend
+from .fresnel import conductor, f82, normal_incidence, schlick_blend
 from .thin_film import ThinFilm
 
 
@@ -28,6 +28,18 @@ class MetalTerm:
             if self.film is None
             else dr.select(self.film.present, self.film.on_metal(c, self.f0, self.slope), plain)
         )
+
+
+@dataclass(frozen=True)
+class ConductorTerm:
+    """Reflectance of a metal of index `n` and extinction `k` (RGB)."""
+
+    n: Any
+    k: Any
+
+    def __call__(self, c: Any) -> Any:
+        """Reflectance for the cosine `c` of view and half vector, RGB."""
+        return conductor(c, self.n, self.k)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from ..arrays.clamp import at_least, largest, root, saturate
 from ..cycles_model import CyclesModel
 from ..lobes.energy import NO_COMPENSATION, Compensation, compensation, glass_albedo, reflection_albedo, schlick_albedo
 from ..lobes.fresnel import (
+    average_conductor,
     average_dielectric,
     average_f82,
     average_schlick,
@@ -25,7 +26,7 @@ from ..lobes.fresnel import (
     index_from_normal_incidence,
     normal_incidence,
 )
-from ..lobes.fresnel_term import ConstantTerm, DielectricTerm, MetalTerm
+from ..lobes.fresnel_term import ConductorTerm, ConstantTerm, DielectricTerm, MetalTerm
 from ..lobes.microfacet import GGX, MICROFACETS, Microfacets
 from ..lobes.sheen import SheenLobe, VelvetLobe, sheen_lobe
 from ..lobes.thin_film import ThinFilm
@@ -63,7 +64,7 @@ class Layers:
     coat_alpha: Any = None
     coat_ior: Any = None
     metal: Any = None
-    metal_fresnel: MetalTerm | ConstantTerm | None = None
+    metal_fresnel: MetalTerm | ConductorTerm | ConstantTerm | None = None
     glass: Any = None
     glass_alpha: Any = None
     glass_ior: Any = None
@@ -148,6 +149,11 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
         colour_of_all = at_least(p["base_color"], 0)
         gain = _compensation(white, colour_of_all)
         stack |= {"metal": w * metallic * gain.scale, "metal_fresnel": ConstantTerm(colour_of_all)}
+        w = w * (1 - metallic)
+    elif lobes.metal and model.shader == "conductor":
+        index, extinction = at_least(p["metal_ior"], 0), at_least(p["metal_extinction"], 0)
+        gain = _compensation(white, average_conductor(index, extinction))
+        stack |= {"metal": w * metallic * gain.scale, "metal_fresnel": ConductorTerm(index, extinction)}
         w = w * (1 - metallic)
     elif lobes.metal:
         slope = f82_slope(clamped_base, dr.minimum(at_least(p["specular_tint"], 0), 1)) if lobes.edge_tint else None

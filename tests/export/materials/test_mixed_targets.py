@@ -101,6 +101,13 @@ CASES = {
     "Ashikhmin-Shirley": shader("BsdfAnisotropic", {"distribution": "ASHIKHMIN_SHIRLEY"}, Color=GOLD, Roughness=0.5),
     "velvet": shader("BsdfSheen", {"distribution": "ASHIKHMIN"}, Color=RED, Roughness=0.7),
     "metallic": shader("BsdfMetallic", Base_Color=GOLD, Edge_Tint=RED, Roughness=0.35),
+    "metal by its index": shader(
+        "BsdfMetallic",
+        {"fresnel_type": "PHYSICAL_CONDUCTOR"},
+        IOR=(0.2, 0.5, 1.4),
+        Extinction=(3.9, 2.3, 1.8),
+        Roughness=0.35,
+    ),
     "sheen": SHEEN,
     "diffuse under a fresnel": mix(fresnel, DIFFUSE, GLOSSY),
     "two by a mask": mix(noise, PLASTIC, METAL),
@@ -115,7 +122,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_recorded_picture_is_cycles(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str) -> None:
-    if name == "metallic" and not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
+    if name.startswith("metal") and not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
         pytest.skip("Blender 4.2 has no Metallic BSDF")
     lit_scene(scene)
     found, truth = recorded_and_cycles(export, render_cycles, ball(material_of(CASES[name])))
@@ -136,7 +143,7 @@ TURNED = {
 def test_a_tangent_without_a_link_circles_the_objects_axis(
     scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str
 ) -> None:
-    if name == "metallic" and not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
+    if name.startswith("metal") and not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
         pytest.skip("Blender 4.2 has no Metallic BSDF")
     lit_scene(scene)
     target = ball(material_of(TURNED[name]))
