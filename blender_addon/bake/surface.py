@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_PLACE, OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for
 from ..export.nodes.displacement import bends_normals, unbent
-from ..export.nodes.leaf_kinds import EMISSION, KINDS, distribution_of, is_shader, only_nearest, walks_of
+from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
 from ..probe.closure_tree import ClosureTree, Leaf, Value
 from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
 from ..versions import active_output
@@ -87,7 +87,9 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     for leaf in reflecting:
         found: dict[str, Any] = {"kind": leaf.node.bl_idname, "label": leaf.node.bl_label, "sockets": {}}
         found |= {"distribution": distribution_of(leaf.node), "walks": walks_of(leaf.node)}
-        found["nearest"] = leaf.node.bl_idname in KINDS and only_nearest(leaf.node)
+        kind = kind_of(leaf.node)
+        if kind is not None:
+            found |= {"nearest": only_nearest(leaf.node), "shader": kind.shader}
         asked.append((found, "weight", leaf.weight, False))
         for socket in leaf.node.inputs:
             if socket.name not in SKIPPED and socket.type != "SHADER" and socket.enabled:

@@ -18,7 +18,7 @@ from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word
 
 # what a leaf has to have so that light only returns from it, and none is its own
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
-OPAQUE_SHADERS = ("principled", "glossy", "conductor", "subsurface")
+OPAQUE_SHADERS = ("principled", "glossy", "conductor", "toon", "toon_glossy", "subsurface")
 NOT_FITTED = (
     *("Weight", "Alpha", "Transmission Weight", "Emission Color", "Emission Strength", "Subsurface Weight"),
     *(*DIRECTIONS, *UNUSED_SOCKETS),

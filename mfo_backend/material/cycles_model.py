@@ -11,7 +11,17 @@ from ..types.errors import BadInputError
 # of microfacets, Blender's words; the last is that of the fibres of a Sheen BSDF
 DISTRIBUTIONS = ("MULTI_GGX", "GGX", "BECKMANN", "ASHIKHMIN_SHIRLEY", "ASHIKHMIN")
 # nodes whose lobes are those of the Principled BSDF but for their Fresnel terms and tints
-SHADERS = ("principled", "glossy", "conductor", "glass", "refraction", "translucent", "subsurface")
+SHADERS = (
+    "principled",
+    "glossy",
+    "conductor",
+    "toon",
+    "toon_glossy",
+    "glass",
+    "refraction",
+    "translucent",
+    "subsurface",
+)
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,8 @@ class CyclesModel:
         The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "conductor"
         one by index and extinction, "glass" tints what it reflects
         and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
-        lobe on the other side times the base colour. Light enters below "subsurface" with an index of its own.
+        lobe on the other side times the base colour. The sheen of "toon" is a cone about the normal, that of
+        "toon_glossy" one about the mirrored view. Light enters below "subsurface" with an index of its own.
     skin
         How light enters below the surface and how far it goes there, the node's "Random Walk (Skin)".
     disk

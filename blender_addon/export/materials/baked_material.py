@@ -15,7 +15,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..material_model import Material, Part, Socket, Texture
 from ..nodes.leaf_kinds import CONDUCTOR, KINDS, TRANSPARENT
-from .leaf_sockets import BELOW, GLOSSY, conductor_colors, stretched
+from .leaf_sockets import GLOSSY, HELD, conductor_colors, stretched
 
 EMISSION = ("Emission Color", "Emission Strength")
 TURNED = ("Anisotropic", "Anisotropy")  # sockets that turn highlights along a tangent
@@ -89,8 +89,8 @@ class Baked:
                 findings.note(f"Material '{name}': what is linked to Anisotropy of '{leaf['label']}' is left out.")
             else:
                 sockets |= stretched(*map(float, turned))
-        if leaf["kind"] == BELOW:
-            sockets |= {f"Subsurface {own}": self._socket(given[own]) for own in ("IOR", "Anisotropy") if own in given}
+        before, held = HELD.get(leaf["kind"], ("", ()))
+        sockets |= {f"{before} {own}": self._socket(given[own]) for own in held if own in given}
         if "Extinction" in given:
             index, extinction = (self._array(given[own]) for own in ("IOR", "Extinction"))
             colours = zip(("Base Color", "Specular Tint"), conductor_colors(index, extinction), strict=True)
@@ -109,7 +109,7 @@ class Baked:
             leaf["walks"],
             normal=normal,
             displaced=normal is not None and bool(leaf["displaced"]),
-            shader=kind.shader,
+            shader=leaf.get("shader", kind.shader),
         )
 
     def _emission(self) -> dict[str, Socket]:

@@ -13,11 +13,13 @@ from ...versions import DIFFUSE, has_diffuse_roughness
 from ..findings import Findings, Fix
 from ..material_model import Socket
 from ..nodes.graph_findings import graph_problem
-from ..nodes.leaf_kinds import sockets_of
+from ..nodes.leaf_kinds import TOON, sockets_of
 from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket
 from ..nodes.target_shader import Place
 
 GLOSSY, BELOW = "ShaderNodeBsdfAnisotropic", "ShaderNodeSubsurfaceScattering"
+# sockets of nodes that are held, and what is before their names in those of a material's values
+HELD = {BELOW: ("Subsurface", ("IOR", "Anisotropy")), TOON: ("Toon", ("Size", "Smooth"))}
 
 
 def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
@@ -29,12 +31,14 @@ def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> di
         return {"Diffuse Roughness": Socket(0.0, True)}
     if node.bl_idname == GLOSSY:
         return _stretched(material, node, findings)
-    if node.bl_idname == BELOW:
-        own = {name: sockets_of(node)[name] for name in ("IOR", "Anisotropy")}
+    held = HELD.get(node.bl_idname)
+    if held is not None:
+        before, names = held
+        own = {name: sockets_of(node)[name] for name in names}
         for name, socket in own.items():
             if socket.enabled and socket.is_linked:
                 findings.note(f"Material '{material}': what is linked to {name} of '{node.name}' is left out.")
-        return {f"Subsurface {name}": Socket(plain_value(socket), True) for name, socket in own.items()}
+        return {f"{before} {name}": Socket(plain_value(socket), True) for name, socket in own.items()}
     return conductor_sockets(node)
 
 

@@ -23,6 +23,7 @@ _CLEAR = {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"}
 _FILM = {"Thin Film Thickness": "Thin Film Thickness", "Thin Film IOR": "Thin Film IOR"}
 _MATTE = {"Base Color": "Color"}
 _METAL = {"Metallic": 1.0, "IOR": 1.5, "Specular IOR Level": 0.5, **_OPAQUE}
+_SHEEN = {"Base Color": [0.0, 0.0, 0.0], "Sheen Weight": 1.0, **WITHOUT_SPECULAR}
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class LeafKind:
     nearest: bool = False
 
 
-METALLIC = "ShaderNodeBsdfMetallic"
+METALLIC, TOON = "ShaderNodeBsdfMetallic", "ShaderNodeBsdfToon"
 KINDS: dict[str, LeafKind] = {
     PRINCIPLED: LeafKind(),
     DIFFUSE: LeafKind({"Base Color": "Color", "Diffuse Roughness": "Roughness"}, WITHOUT_SPECULAR),
@@ -65,7 +66,7 @@ KINDS: dict[str, LeafKind] = {
     ),
     "ShaderNodeBsdfSheen": LeafKind(
         {"Sheen Tint": "Color", "Sheen Roughness": "Roughness"},
-        {"Base Color": [0.0, 0.0, 0.0], "Sheen Weight": 1.0, **WITHOUT_SPECULAR},
+        _SHEEN,
     ),
     "ShaderNodeBsdfGlass": LeafKind({**_CLEAR, **_FILM}, _GLASS, "glass"),
     "ShaderNodeBsdfRefraction": LeafKind(_CLEAR, _GLASS, "refraction"),
@@ -79,7 +80,7 @@ KINDS: dict[str, LeafKind] = {
         {**WITHOUT_SPECULAR, "Subsurface Weight": 1.0},
         "subsurface",
     ),
-    "ShaderNodeBsdfToon": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
+    TOON: LeafKind({"Sheen Tint": "Color"}, _SHEEN, "toon"),
     "ShaderNodeBsdfHair": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
     "ShaderNodeBsdfHairPrincipled": LeafKind(_MATTE, WITHOUT_SPECULAR, nearest=True),
 }
@@ -95,6 +96,7 @@ CONDUCTOR = LeafKind(
     _METAL,
     "conductor",
 )
+GLOSSY_TOON = LeafKind({"Sheen Tint": "Color"}, _SHEEN, "toon_glossy")
 UNUSED_SOCKETS = ("Thin Wall",)  # of a Principled BSDF those that no model has, whatever is linked to them
 EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
 # values of `all` that join only where the node has some of them already
@@ -115,8 +117,11 @@ def is_shader(node: bpy.types.Node) -> bool:
 
 def kind_of(node: bpy.types.Node) -> LeafKind | None:
     """How a node is fitted, or held; None of one without a model."""
-    by_index = node.bl_idname == METALLIC and node.fresnel_type == "PHYSICAL_CONDUCTOR"
-    return CONDUCTOR if by_index else KINDS.get(node.bl_idname)
+    if node.bl_idname == METALLIC and node.fresnel_type == "PHYSICAL_CONDUCTOR":
+        return CONDUCTOR
+    if node.bl_idname == TOON and node.component == "GLOSSY":
+        return GLOSSY_TOON
+    return KINDS.get(node.bl_idname)
 
 
 def shines(node: bpy.types.Node) -> bool:

@@ -295,7 +295,9 @@ class BlenderPrincipled(mi.BSDF):
         weight = self._value(layers, local) / dr.maximum(density, 1e-30)
         weight = dr.select(density > 0, weight, 0)
         glass = lobe == NAMES.index("glass")
-        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        diffuse = lobe == NAMES.index("diffuse")
+        if self.model.shader != "toon_glossy":
+            diffuse |= lobe == NAMES.index("sheen")
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         kind = dr.select(glass & (local.z < 0), mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
         through = lobe == NAMES.index("translucent")

@@ -39,6 +39,8 @@ AMOUNT_OF = {
 # Why what no fit changes is held
 FIXED = {
     "emission_strength": "it multiplies 'emission_color', fit that",
+    "toon_size": "the edge of a cone has no slope",
+    "toon_smooth": "the edge of a cone has no slope",
     "subsurface_ior": "it only bends what enters the skin",
     "subsurface_anisotropy": "'subsurface_radius' has nearly the same effect, fit that",
 }

@@ -30,6 +30,7 @@ from ..lobes.fresnel_term import ConductorTerm, ConstantTerm, DielectricTerm, Me
 from ..lobes.microfacet import GGX, MICROFACETS, Microfacets
 from ..lobes.sheen import SheenLobe, VelvetLobe, sheen_lobe
 from ..lobes.thin_film import ThinFilm
+from ..lobes.toon import ToonLobe
 from .bumped_normals import BumpedNormals, about
 from .needed_lobes import Lobes
 from .principled_parameters import BLENDER_PRINCIPLED
@@ -59,7 +60,7 @@ class Layers:
     ay: Any
     facets: Microfacets = GGX
     sheen: Any = None
-    sheen_shape: SheenLobe | VelvetLobe | None = None
+    sheen_shape: SheenLobe | VelvetLobe | ToonLobe | None = None
     coat: Any = None
     coat_alpha: Any = None
     coat_ior: Any = None
@@ -201,7 +202,10 @@ def _compensation(white: tuple[Any, Any] | None, mean_fresnel: Any) -> Compensat
 
 def _add_sheen(stack: dict[str, Any], p: Mapping[str, Any], w: Any, view: Any, model: CyclesModel) -> Any:
     roughness = saturate(p["sheen_roughness"])
-    shape = VelvetLobe(view, roughness) if model.velvet else sheen_lobe(view, roughness)
+    if model.shader in ("toon", "toon_glossy"):
+        shape = ToonLobe(view, p["toon_size"], p["toon_smooth"], glossy=model.shader == "toon_glossy")
+    else:
+        shape = VelvetLobe(view, roughness) if model.velvet else sheen_lobe(view, roughness)
     albedo, tint = at_least(p["sheen_weight"], 0) * shape.albedo, at_least(p["sheen_tint"], 0)
     stack |= {"sheen": w * albedo * tint, "sheen_shape": shape}
     # of the tint alone: at weight 0 all channels of the product are equal, and the slope would be that of any of them

@@ -36,6 +36,9 @@ BLENDER_PRINCIPLED = ParameterTable(
         Parameter("subsurface_scale", 1, 1e-4, 10.0, 0.05),  # scene units; the radii are in it
         Parameter("subsurface_ior", 1, 1.01, 3.8, 1.4),
         Parameter("subsurface_anisotropy", 1, -0.99, 0.99, 0.0),
+        # of a Toon BSDF, in right angles
+        Parameter("toon_size", 1, 0.0, 1.0, 0.5),
+        Parameter("toon_smooth", 1, 0.0, 1.0, 0.0),
         # of a measured metal, n + i k
         Parameter("metal_ior", 3, 0.02, 8.0, (2.757, 2.513, 2.231)),
         Parameter("metal_extinction", 3, 0.02, 12.0, (3.867, 3.404, 3.009)),

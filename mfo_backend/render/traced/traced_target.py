@@ -110,7 +110,9 @@ class TracedTarget:
         pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
         f_next = mi.Color3f(evaluate(layers, drawn, reachable_only=only))
         pdf_next = dr.detach(pdf(layers, choice, drawn, reachable_only=only))
-        diffuse = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        diffuse = lobe == NAMES.index("diffuse")
+        if plugin.model.shader != "toon_glossy":
+            diffuse |= lobe == NAMES.index("sheen")
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
         kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)

@@ -108,6 +108,8 @@ CASES = {
         Extinction=(3.9, 2.3, 1.8),
         Roughness=0.35,
     ),
+    "toon": shader("BsdfToon", Color=RED, Size=0.5, Smooth=0.2),
+    "toon, glossy": shader("BsdfToon", {"component": "GLOSSY"}, Color=RED, Size=0.3, Smooth=0.1),
     "sheen": SHEEN,
     "diffuse under a fresnel": mix(fresnel, DIFFUSE, GLOSSY),
     "two by a mask": mix(noise, PLASTIC, METAL),
