@@ -227,6 +227,8 @@ NEIGHBOURS = {
     "Beckmann": CASES["Beckmann"],
     "velvet": CASES["velvet"],
     "glass": CASES_OF_PATHS["glass"],
+    "toon, glossy": CASES["toon, glossy"],
+    "metal by its index": CASES["metal by its index"],
     "translucent": shader("BsdfTranslucent", Color=GOLD),
 }
 
