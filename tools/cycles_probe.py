@@ -36,7 +36,7 @@ def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (s
     batches
         Each has `view` and `light` (cases, 3), unit vectors in the frame tangent, bitangent, normal; `sockets`, a
         mapping of the node's socket name to (cases,) or (cases, 3); optionally `distribution` ("MULTI_GGX" or "GGX")
-        and `node`, "ShaderNodeBsdfPrincipled" without it.
+        and `node`, "ShaderNodeBsdfPrincipled" without it, with further `choices` of its menus by their names.
     command
         A Python that has `bpy`, or a Blender program with the arguments up to and including `-P`.
     """
@@ -46,6 +46,7 @@ def ask_cycles(batches: Sequence[Mapping[str, Any]], command: Sequence[str] = (s
             source = Path(folder) / f"{index:03d}.npz"
             arrays = {f"socket {name}": np.asarray(value, np.float64) for name, value in batch["sockets"].items()}
             settings = {"distribution": batch.get("distribution", "MULTI_GGX"), "node": batch.get("node", PRINCIPLED)}
+            settings["choices"] = batch.get("choices", {})
             settings = json.dumps(settings)
             np.savez(source, view=batch["view"], light=batch["light"], settings=np.array(settings), **arrays)
             files += [str(source), str(source.with_suffix(".out.npy"))]
@@ -108,15 +109,16 @@ class Probe:
         scene.collection.objects.link(self.sun)
         scene.camera = self.camera
 
-    def material(self, sockets: Mapping[str, Array], kind: str, distribution: str) -> Any:
+    def material(self, sockets: Mapping[str, Array], kind: str, choices: Mapping[str, str]) -> Any:
         """A shader node whose named sockets read face attributes."""
         material = self.bpy.data.materials.new("probe")
         material.use_nodes = True
         nodes, links = material.node_tree.nodes, material.node_tree.links
         nodes.clear()
         shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
-        if hasattr(shader, "distribution"):
-            shader.distribution = distribution
+        for menu, choice in choices.items():
+            if hasattr(shader, menu):
+                setattr(shader, menu, choice)
         links.new(shader.outputs[0], output.inputs["Surface"])
         for name, values in {**sockets, "Tangent": np.zeros((1, 3))}.items():
             if name not in shader.inputs:
@@ -130,7 +132,8 @@ class Probe:
         """f_r |cos| (cases, 3) of one batch."""
         settings = json.loads(str(data["settings"]))
         sockets = {key.removeprefix("socket "): data[key] for key in data if key.startswith("socket ")}
-        material = self.material(sockets, settings["node"], settings["distribution"])
+        choices = {"distribution": settings["distribution"], **settings["choices"]}
+        material = self.material(sockets, settings["node"], choices)
         frames, angles = facet_frames(data["view"], data["light"])
         result = np.full((len(angles), 3), np.nan)
         keys = np.round(angles, 7)

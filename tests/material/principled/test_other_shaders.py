@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -32,6 +32,7 @@ class Node:
     group: parity.Group
     distribution: str = "MULTI_GGX"
     shader: str = "principled"
+    choices: dict[str, str] = field(default_factory=dict)
 
 
 TURNED = {**COLOUR, "anisotropic": "Anisotropy", "anisotropic_rotation": "Rotation"}
@@ -45,6 +46,16 @@ BENT = (*GLASS, True)
 CLOTH = {"sheen_tint": "Color", "sheen_roughness": "Roughness"}
 FIBRES = (
     {"sheen_roughness": (0.1, 1.0), "sheen_tint": (0.0, 1.0)},
+    {"sheen_weight": 1.0, "base_color": 0.0, "specular_ior_level": 0.0},
+)
+INDEX = (
+    {"metal_ior": (0.1, 4.0), "metal_extinction": (0.5, 6.0), "roughness": (0.15, 1.0), **parity.TURN},
+    {"metallic": 1.0},
+)
+MEASURED = {**TURNED, "metal_ior": "IOR", "metal_extinction": "Extinction"}
+CONE = {"sheen_tint": "Color", "toon_size": "Size", "toon_smooth": "Smooth"}
+CONES = (
+    {"toon_size": (0.2, 1.0), "toon_smooth": (0.1, 1.0), "sheen_tint": (0.0, 1.0)},
     {"sheen_weight": 1.0, "base_color": 0.0, "specular_ior_level": 0.0},
 )
 METAL = {**parity.BASE, "specular_tint": (0.0, 1.0), **parity.TURN}
@@ -78,6 +89,15 @@ NODES = (
     Node("BsdfGlass", CLEAR, parity.Group("glass, Beckmann", *GLASS, **SINGLE), "BECKMANN", "glass"),
     Node("BsdfGlass", CLEAR, parity.Group("through, Beckmann", *BENT, **SINGLE), "BECKMANN", "glass"),
     Node("BsdfRefraction", CLEAR, parity.Group("bent, Beckmann", *BENT, **SINGLE), "BECKMANN", "refraction"),
+    Node(
+        "BsdfMetallic",
+        MEASURED,
+        parity.Group("metal by index", *INDEX),
+        shader="conductor",
+        choices={"fresnel_type": "PHYSICAL_CONDUCTOR"},
+    ),
+    Node("BsdfToon", CONE, parity.Group("toon", *CONES), shader="toon"),
+    Node("BsdfToon", CONE, parity.Group("toon, glossy", *CONES), shader="toon_glossy", choices={"component": "GLOSSY"}),
 )  # fmt: skip
 
 
@@ -90,7 +110,8 @@ def answers() -> dict[str, tuple[parity.Cases, Any]]:
         if node.names is TURNED:  # its own measure: along the tangent below 0
             sockets["Anisotropy"] = np.sqrt(1.0 - 0.9 * sockets["Anisotropy"]) - 1.0
         asked = {"view": drawn.view, "light": drawn.light, "sockets": sockets}
-        batches.append({**asked, "node": f"ShaderNode{node.kind}", "distribution": node.distribution})
+        asked |= {"node": f"ShaderNode{node.kind}", "distribution": node.distribution, "choices": node.choices}
+        batches.append(asked)
     found = parity.ask_cycles(batches)
     return {node.group.name: (c, a) for node, c, a in zip(NODES, cases, found, strict=True)}
 
