@@ -54,8 +54,8 @@ _SOCKETS = (
     *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
     *("Thin Film IOR", "Emission Color"),
     # last: a file keeps what is chosen by its place
-    *("Subsurface Radius", "Subsurface Scale", "Absorption Density", "Absorption Color"),
-    *("Metal IOR", "Metal Extinction"),
+    *("Subsurface Radius", "Subsurface Scale", "Metal IOR", "Metal Extinction"),
+    *("Absorption Density", "Absorption Color"),
 )
 SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
 SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}
