@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What materials with an absorbing volume take of light on its way inside of their objects.
 
-Cycles keeps a stack of the volumes that a path is inside of: light that crosses a surface to its inner side enters, and
-leaves on the way back (kernel/integrator/volume_stack.h). A segment of length d takes exp(-sigma d) of each channel,
-sigma = density (1 - color), negative parts 0 (kernel/svm/closure.h, svm_node_closure_volume). Here a path counts for
-each such material how many of its objects it is inside of. Choose the variant before importing this.
+Cycles keeps a set of the volumes that a path is inside of, one of each object and material: light that crosses a
+surface to its inner side enters, and leaves by any of its surfaces on the way back, so that shells within each other
+count once, up to the first that is left (kernel/integrator/volume_stack.h). Here that is one of each material. A
+segment of length d takes exp(-sigma d) of each channel, sigma = density (1 - color), negative parts 0
+(kernel/svm/closure.h, svm_node_closure_volume). Choose the variant before importing this.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -19,7 +20,7 @@ import drjit as dr
 import mitsuba as mi
 
 DENSITY, COLOR = "absorption_density", "absorption_color"
-Inside = list[Any]  # mi.UInt32 for each absorbing material: of how many of its objects
+Inside = list[Any]  # mi.Bool for each absorbing material
 
 
 def coefficient(density: Any, color: Any) -> mi.Color3f:
@@ -39,7 +40,7 @@ class Absorption:
 
     def outside(self) -> Inside:
         """Of a path that begins outside of all."""
-        return [mi.UInt32(0) for _ in self.materials]
+        return [mi.Bool(False) for _ in self.materials]
 
     def coefficients(self) -> list[mi.Color3f]:
         """Of each material, with derivatives where its values have some."""
@@ -48,7 +49,7 @@ class Absorption:
     def lengths(self, inside: Inside, distance: mi.Float) -> list[mi.Float]:
         """How far a segment goes through each material; nothing where it never ends."""
         finite = dr.isfinite(distance)
-        return [dr.select(finite & (count > 0), count * distance, mi.Float(0)) for count in inside]
+        return [dr.select(finite & within, distance, mi.Float(0)) for within in inside]
 
     def further(self, lengths: list[mi.Float], inside: Inside, distance: mi.Float) -> list[mi.Float]:
         """`lengths` with those of one more segment."""
@@ -71,10 +72,9 @@ class Absorption:
         enters = dr.dot(si.n, si.to_world(si.wi)) > 0
         bsdf = si.bsdf()
         after = []
-        for count, material in zip(inside, self.materials, strict=True):
+        for within, material in zip(inside, self.materials, strict=True):
             own = active & (bsdf == mi.BSDFPtr(material))
-            left = dr.select(count > 0, count - 1, 0)
-            after.append(dr.select(own, dr.select(enters, count + 1, left), count))
+            after.append(dr.select(own, enters, within))
         return after
 
 
