@@ -40,16 +40,8 @@ _PARAMETERS = (
 )
 # sockets of Blender's Principled BSDF that can be fitted
 _SOCKETS = (
-    *(
-        "Base Color",
-        "Metallic",
-        "Roughness",
-        "IOR",
-        "Alpha",
-        "Diffuse Roughness",
-        "Specular IOR Level",
-        "Specular Tint",
-    ),
+    *("Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Diffuse Roughness", "Specular IOR Level"),
+    "Specular Tint",
     *("Anisotropic", "Anisotropic Rotation", "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR"),
     *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
     *("Thin Film IOR", "Emission Color"),
