@@ -234,3 +234,24 @@ def test_what_has_no_model_is_named(mixed: SimpleNamespace) -> None:
     metal.inputs["Thin Film Thickness"].default_value = 300.0
     mixed.tree.links.new(metal.outputs[0], mixed.output.inputs["Surface"])
     assert "set its thickness to 0" in why_no_target(mixed.material)
+
+
+def test_a_volume_inside_of_glass_is_written_to_its_own_node_and_back(mixed: SimpleNamespace) -> None:
+    from blender_addon.export.nodes.target_shader import target_shader
+    from blender_addon.result.write_back import apply_values, revert_values
+
+    tree, material = mixed.tree, mixed.material
+    volume = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    tree.links.new(volume.outputs[0], mixed.output.inputs["Volume"])
+    names = {"Absorption Density", "Absorption Color"}
+    assert not names & target_shader(material).places.keys()  # no light gets in
+    mixed.principled.inputs["Transmission Weight"].default_value = 1.0
+    assert names <= target_shader(material).places.keys()
+    before = [volume.inputs["Density"].default_value, *volume.inputs["Color"].default_value]
+    colour = mixed.principled.inputs["Base Color"].default_value[:]
+    assert apply_values(material, {"Absorption Density": 3.0, "Absorption Color": (0.1, 0.2, 0.3)}, JOB) == []
+    after = [volume.inputs["Density"].default_value, *volume.inputs["Color"].default_value]
+    assert after == pytest.approx([3.0, 0.1, 0.2, 0.3, 1.0])
+    assert mixed.principled.inputs["Base Color"].default_value[:] == colour
+    assert revert_values(material) == []
+    assert [volume.inputs["Density"].default_value, *volume.inputs["Color"].default_value] == before
