@@ -50,7 +50,7 @@ TARGETS = {
     "glass": (GLASS, ABSORBS),
     "principled": (PRINCIPLED_GLASS, shader("VolumePrincipled", Color=(0.0, 0.0, 0.0), Absorption_Color=TEA)),
     # light comes straight through it into the shadow
-    "clear to shadows": (mix(0.4, GLASS, CLEAR), ABSORBS),
+    "clear to shadows": (mix(0.8, GLASS, CLEAR), ABSORBS),
 }
 
 

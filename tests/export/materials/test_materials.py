@@ -168,20 +168,20 @@ def test_other_shaders_of_the_surroundings(scene: Any, export: Any, render_cycle
     """Diffuse and emission are exact, another shader is its nearest model with a note, nothing linked is black."""
     world_color(scene, 0.5)
     materials = [diffuse_material("d", (0.2, 0.5, 0.8)), emission_material("e", (0.3, 0.2, 0.1)), new_material("black")]
-    toon = diffuse_material("toon", (1, 1, 1))
-    tree = toon.node_tree
-    node = tree.nodes.new("ShaderNodeBsdfToon")
+    hair = diffuse_material("hair", (1, 1, 1))
+    tree = hair.node_tree
+    node = tree.nodes.new("ShaderNodeBsdfHair")
     tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
     materials[2].node_tree.links.clear()
-    for index, material in enumerate([*materials, toon]):
+    for index, material in enumerate([*materials, hair]):
         quad = add_quad(f"Quad {index}", 0.5, 0.0, material)
         quad.location.x = index * 0.5 - 0.75
     target = add_quad("Target", 0.1, 0.0, new_material("Target"))
     target.location.y = 0.9
     add_camera("ORTHO", ortho_scale=2.0)
     report = export(target)
-    assert [note for note in report.notes if "toon" in note] == [
-        "Material 'toon': Toon BSDF is approximated by its nearest model.",
+    assert [note for note in report.notes if "hair" in note] == [
+        "Material 'hair': Hair BSDF is approximated by its nearest model.",
     ]
     expected, found = render_cycles(), render_mitsuba(report, 256)
     for index in range(3):
