@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import corners_of, flat_normals, material_of_slot, slot_count
-from ..export.nodes.dependence import OF_PLACE, asked_for
+from ..export.nodes.dependence import asked_of_place
 from ..export.nodes.displacement import moves_faces
 from ..versions import active_output
 from .stage import Stage, bake, staged
@@ -42,7 +42,7 @@ def displaced_corners(
                 mesh.materials.append(materials[-1])
             mesh.polygons.foreach_set("material_index", np.clip(faces, 0, len(slots) - 1))  # clear() has set them to 0
             moving = [shown.original for shown in slots if shown is not None and moves_faces(shown.original)]
-            if not any(asked_for(material.node_tree, OF_PLACE) for material in moving):
+            if not any(asked_of_place(material.node_tree) for material in moving):
                 # far from zero the kernel's places are coarse
                 stage.item.matrix_world = stage.item.matrix_world.to_3x3().to_4x4()
             _keep_places(stage)

@@ -87,6 +87,10 @@ class _Faces:
         self._stage, self._lamp = stage, lamp
         matrix = np.array(lamp.matrix_world, dtype=np.float64)
         self._place, self._frame = matrix[:3, 3], matrix[:3, :3] @ TURN
+        # `around` makes a point of the lamp
+        data: Any = lamp.data
+        is_long = data.type == "AREA" and data.shape in ("RECTANGLE", "ELLIPSE")
+        self._sizes = (data.size, data.size_y if is_long else data.size) if data.type == "AREA" else (0.0, 0.0)
 
     def around(self, local: Numbers, distance: Any) -> Numbers:
         """Factors in local directions at distances from the lamp, which is a point meanwhile."""
@@ -98,8 +102,7 @@ class _Faces:
 
     def before(self, on_square: Numbers, distance: float) -> Numbers:
         """Factors at places on an area light, which shines straight ahead meanwhile."""
-        data = self._lamp.data
-        sizes = (data.size, data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size)
+        data, sizes = self._lamp.data, self._sizes
         data.shape, data.size, data.size_y, data.spread = "RECTANGLE", *sizes, 0.0
         away = np.cross(self._frame[:, 0], self._frame[:, 1])
         away = np.broadcast_to(away / np.linalg.norm(away), (len(on_square), 3))

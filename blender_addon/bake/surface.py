@@ -17,11 +17,11 @@ from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot, slot_count
-from ..export.nodes.dependence import OF_PLACE, OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for
+from ..export.nodes.dependence import OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for, asked_of_place
 from ..export.nodes.displacement import bends_normals, unbent
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
 from ..probe.closure_tree import ClosureTree, Leaf, Value
-from ..probe.light_path import SCATTERED, answer_light_paths, light_path_outputs
+from ..probe.light_path import SCATTERED, answer_light_paths, answer_random, light_path_outputs
 from ..versions import active_output
 from .stage import Stage, bake, staged
 from .unwrap import unwrapped
@@ -33,6 +33,7 @@ MARGIN = 8  # texels around islands that take the colour beside them
 SAMPLES = 4  # a texel, so that fine patterns are averaged
 MOST_UV_MAPS = 8  # of a mesh
 FLAT = 2e-3  # largest slope of a normal map that counts as none
+MOST_RANDOM = 0xFFFFFFFF  # Cycles divides an instance's random number by it
 LEFT_OUT = ("Coat Normal", "Tangent")
 SKIPPED = ("Weight", "Normal", *LEFT_OUT)
 
@@ -56,14 +57,15 @@ def baked_surface(
     groups: list[bpy.types.NodeTree] = []
     try:
         tree = material.node_tree
-        paths = light_path_outputs(tree)
+        paths, place = light_path_outputs(tree), asked_of_place(tree)
         groups += answer_light_paths(tree, SCATTERED)
+        groups += answer_random(tree, instance.random_id % (MOST_RANDOM + 1) / MOST_RANDOM)
         view, around = asked_for(tree, OF_VIEW), asked_for(tree, OF_SURROUNDINGS)
         emits = _emits(tree)
         with _stage(scene, instance, depsgraph, slot, material) as stage:
             baked = _Bake(stage, material, folder, size, bool(view))
             answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": around}
-            answer["place"], answer["sides"] = asked_for(tree, OF_PLACE), bool(asked_for(tree, OF_SIDE))
+            answer["place"], answer["sides"] = place, bool(asked_for(tree, OF_SIDE))
             if emits:
                 answer["emission"] = baked.file(baked.closure())
             closures = ClosureTree(tree)

@@ -9,10 +9,14 @@ from typing import Any
 
 import bpy
 
+from .findings import Findings
+
 # (type of data or modifier, what the viewport uses, what the render uses)
 RENDER_TWINS = {
     "SUBSURF": ("levels", "render_levels"),
     "MULTIRES": ("levels", "render_levels"),
+    "SCREW": ("steps", "render_steps"),
+    "OCEAN": ("viewport_resolution", "resolution"),
 }
 
 
@@ -40,7 +44,8 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
         for inner in bpy.data.collections:
             put(inner, "hide_viewport", inner.hide_render)
         if scene.render.use_simplify:
-            put(scene.render, "simplify_subdivision", scene.render.simplify_subdivision_render)
+            for name in ("simplify_subdivision", "simplify_child_particles"):
+                put(scene.render, name, getattr(scene.render, f"{name}_render"))
         in_layer = set(view_layer.objects)
         for item in bpy.data.objects:
             # what is hidden is left out of collections' instances; particles and nodes that name it still show it
@@ -129,6 +134,11 @@ def _use_render_settings(item: bpy.types.Object, put: Any) -> None:
         if modifier.type in RENDER_TWINS:
             viewport, render = RENDER_TWINS[modifier.type]
             put(modifier, viewport, getattr(modifier, render))
+    for system in item.particle_systems:
+        # particles that move lose what was computed of them with any of these; `note_viewport` names them
+        if system.settings.type == "HAIR":
+            for name, value in _particles_of_render(system.settings).items():
+                put(system.settings, name, value)
     data = item.data
     if isinstance(data, bpy.types.MetaBall):
         put(data, "resolution", data.render_resolution)
@@ -139,6 +149,47 @@ def _use_render_settings(item: bpy.types.Object, put: Any) -> None:
             value = getattr(data, f"render_resolution_{axis}", 0)
             for owner in owners if value else []:
                 put(owner, f"resolution_{axis}", value)
+
+
+def note_viewport(depsgraph: bpy.types.Depsgraph, findings: Findings) -> None:
+    """Name what the viewport alone shows and no `render_state` makes that of the render."""
+    for item in depsgraph.objects:
+        original = item.original
+        if original.hide_render:
+            continue
+        for system in original.particle_systems:
+            settings = system.settings
+            other = any(getattr(settings, name) != value for name, value in _particles_of_render(settings).items())
+            if settings.type == "EMITTER" and other:
+                findings.note(
+                    f"Particles '{system.name}' of '{original.name}' are as the viewport shows them; Cycles may show "
+                    "more. Set Viewport Display to Rendered and its Amount to 100 %."
+                )
+        for modifier in original.modifiers:
+            if modifier.type == "NODES" and modifier.show_render and _asks_viewport(modifier.node_group):
+                findings.note(
+                    f"Geometry nodes of '{original.name}' ask whether they are for the viewport (Is Viewport): the fit "
+                    "has what they make there, Cycles what they make for a render."
+                )
+
+
+def _particles_of_render(settings: bpy.types.ParticleSettings) -> dict[str, Any]:
+    """What a render takes for settings of the viewport, of particles that are objects."""
+    if settings.render_type not in ("OBJECT", "COLLECTION"):
+        return {}
+    of_children = {} if settings.child_type == "NONE" else {"child_percent": settings.rendered_child_count}
+    return {"display_method": "RENDER", "display_percentage": 100, **of_children}
+
+
+def _asks_viewport(tree: bpy.types.NodeTree | None) -> bool:
+    if tree is None:
+        return False
+    for node in tree.nodes:
+        if node.bl_idname == "GeometryNodeIsViewport" and node.outputs[0].is_linked:
+            return True
+        if node.bl_idname == "GeometryNodeGroup" and _asks_viewport(node.node_tree):
+            return True
+    return False
 
 
 def _layer_collections(root: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:

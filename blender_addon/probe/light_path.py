@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light Path nodes answered with constants, in a copy of a tree and of the groups within it."""
+"""Outputs of Light Path and Object Info answered with constants, in a copy of a tree and of the groups within it."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import bpy
 
@@ -30,21 +32,44 @@ def answer_light_paths(
 
     None is where the tree has its `own_groups` already.
     """
+    return _answered(tree, "ShaderNodeLightPath", lambda name: answers.get(name, 0.0), own_groups=own_groups)
+
+
+def answer_random(tree: bpy.types.NodeTree, number: float) -> list[bpy.types.NodeTree]:
+    """Replace Random of every Object Info by that of one instance; returns the groups that were copied for it."""
+    return _answered(tree, "ShaderNodeObjectInfo", {"Random": number}.get, own_groups=False)
+
+
+def _answered(
+    tree: bpy.types.NodeTree, kind: str, answer: Callable[[str], float | None], *, own_groups: bool
+) -> list[bpy.types.NodeTree]:
+    """Replace outputs of nodes of a kind by their answers, where they have one; returns the groups copied for it."""
     copied: list[bpy.types.NodeTree] = []
     for node in list(tree.nodes):
-        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and light_path_outputs(node.node_tree):
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and _holds(node.node_tree, kind):
             if not own_groups:
                 node.node_tree = node.node_tree.copy()
                 copied.append(node.node_tree)
-            copied += answer_light_paths(node.node_tree, answers, own_groups=own_groups)
-        if node.bl_idname != "ShaderNodeLightPath":
+            copied += _answered(node.node_tree, kind, answer, own_groups=own_groups)
+        if node.bl_idname != kind:
             continue
         for output in node.outputs:
             targets = [link.to_socket for link in output.links]
-            if not targets:
+            number = answer(output.name)
+            if not targets or number is None:
                 continue
             constant = tree.nodes.new("ShaderNodeValue")
-            constant.outputs[0].default_value = answers.get(output.name, 0.0)
+            constant.outputs[0].default_value = number
             for target in targets:
                 tree.links.new(constant.outputs[0], target)
     return copied
+
+
+def _holds(tree: bpy.types.NodeTree, kind: str) -> bool:
+    """Whether something in `tree` or its groups is linked to a node of a kind."""
+    for node in tree.nodes:
+        if node.bl_idname == kind and any(output.is_linked for output in node.outputs):
+            return True
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and _holds(node.node_tree, kind):
+            return True
+    return False

@@ -17,6 +17,7 @@ import numpy as np
 from .artist_settings import ARTIST_SETTINGS
 from .light_settings import LIGHT_SETTINGS
 from .material_settings import MATERIAL_SETTINGS
+from .owner_settings import OWNER_SETTINGS
 from .rig import Draw, Rig, Setting, background, principled, put_socket
 from .shape_settings import SHAPE_SETTINGS
 
@@ -27,7 +28,7 @@ def build(names: Iterable[str], seed: int, folder: Path, *, size: int, samples: 
     rig = _plain(np.random.default_rng([seed, 0]), folder, size, samples)
     for number, setting in enumerate(SETTINGS, start=1):
         if setting.name in set(names):
-            setting.put(rig, np.random.default_rng([seed, number]))
+            rig = setting.put(rig, np.random.default_rng([seed, number])) or rig
     bpy.context.view_layer.update()
     return rig
 
@@ -320,7 +321,7 @@ SETTINGS: tuple[Setting, ...] = (
 )  # fmt: skip
 GROUPS = {
     "plain": SETTINGS, "artist": ARTIST_SETTINGS,
-    "material": MATERIAL_SETTINGS, "light": LIGHT_SETTINGS, "shape": SHAPE_SETTINGS,
+    "material": MATERIAL_SETTINGS, "light": LIGHT_SETTINGS, "shape": SHAPE_SETTINGS, "owner": OWNER_SETTINGS,
 }  # fmt: skip
 SETTINGS = tuple(setting for group in GROUPS.values() for setting in group)
 # of what the plain scene has at times, and of what two settings make together

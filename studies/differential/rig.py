@@ -28,10 +28,13 @@ class Rig:
 
 @dataclass(frozen=True)
 class Setting:
-    """A property by name, what sets it, and words of the sentence that may name it; none where it is exported."""
+    """A property by name, what sets it, and words of the sentence that may name it; none where it is exported.
+
+    One that takes another object for the target returns the rig with that.
+    """
 
     name: str
-    put: Callable[[Rig, Draw], None]
+    put: Callable[[Rig, Draw], Rig | None]
     words: tuple[str, ...] = ()
 
 

@@ -49,7 +49,8 @@ def read_light(
     if power == 0.0 or color.max() == 0.0:
         return None
     name_settings(LIGHT_CYCLES, cycles, name, findings)
-    _note_linking(evaluated, findings)
+    if links_light(evaluated):
+        note_linking(name, findings)
     _note_rays(evaluated, findings)
     light = Light(
         kind=data.type,
@@ -107,7 +108,12 @@ def _note_rays(evaluated: bpy.types.Object, findings: Findings) -> None:
         )
 
 
-def _note_linking(evaluated: bpy.types.Object, findings: Findings) -> None:
-    linking = getattr(evaluated, "light_linking", None)
-    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-        findings.note(f"Light linking of '{evaluated.name}' is left out: it lights and shadows everything.")
+def links_light(item: bpy.types.Object) -> bool:
+    """Whether what an object gives of light is for some objects alone, or is shadowed by some alone."""
+    linking = getattr(item, "light_linking", None)
+    return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
+
+
+def note_linking(name: str, findings: Findings) -> None:
+    """Name that the object of this name `links_light`."""
+    findings.note(f"Light linking of '{name}' is left out: it lights and shadows everything.")

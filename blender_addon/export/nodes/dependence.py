@@ -21,11 +21,12 @@ OF_VIEW = {
 }
 # differ between the two sides of a surface, while a bake looks at the front
 OF_SIDE = {"ShaderNodeNewGeometry": ("Backfacing",)}
-# instances of one object may have each their own of
+# instances of one object have each their own of
 OF_PLACE = {
-    "ShaderNodeNewGeometry": ("Position", "Normal"),
-    "ShaderNodeObjectInfo": ("Location", "Random", "Object Index", "Color"),
-    "ShaderNodeParticleInfo": ("Index", "Random", "Age", "Lifetime", "Location", "Size"),
+    "ShaderNodeNewGeometry": ("Position", "Normal", "True Normal", "Tangent"),
+    "ShaderNodeObjectInfo": ("Location", "Random"),
+    "ShaderNodeVectorTransform": ("Vector",),
+    "ShaderNodeBevel": ("Normal",),
 }
 # bend normals by slopes, which are others where an instance is stretched in another way; those of a bump, whose
 # distance is in metres, also where it is larger
@@ -51,6 +52,17 @@ DEFORMING = (
 def asked_for(tree: bpy.types.NodeTree, outputs: Outputs) -> list[str]:
     """Labels of nodes in `tree` and its groups that something asks for one of these outputs."""
     return sorted({node.bl_label for node in _nodes(tree) if _is_asked(node, outputs)})
+
+
+def asked_of_place(tree: bpy.types.NodeTree) -> list[str]:
+    """Labels of nodes that something asks for what each instance of an object has of its own."""
+    others = {node.bl_label for node in _nodes(tree) if getattr(node, "object", None) is not None}
+    return sorted({*asked_for(tree, OF_PLACE), *others})
+
+
+def asked_of_instancer(tree: bpy.types.NodeTree) -> list[str]:
+    """Labels of nodes that something asks for what particles, points or other instancers say of an instance."""
+    return sorted({node.bl_label for node in _nodes(tree) if _asks_instancer(node)})
 
 
 def turns_with_camera(tree: bpy.types.NodeTree) -> list[str]:
@@ -85,6 +97,14 @@ def _nodes(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
 
 def _is_asked(node: bpy.types.Node, outputs: Outputs) -> bool:
     return any(output.is_linked and output.name in outputs.get(node.bl_idname, ()) for output in node.outputs)
+
+
+def _asks_instancer(node: bpy.types.Node) -> bool:
+    if getattr(node, "attribute_type", "") == "INSTANCER" or node.bl_idname == "ShaderNodeParticleInfo":
+        return any(output.is_linked for output in node.outputs)
+    return getattr(node, "from_instancer", False) and _is_asked(
+        node, {"ShaderNodeTexCoord": ("Generated", "UV"), "ShaderNodeUVMap": ("UV",)}
+    )
 
 
 def _asks_generated(node: bpy.types.Node) -> bool:

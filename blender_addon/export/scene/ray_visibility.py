@@ -12,9 +12,15 @@ from ..findings import Findings
 from ..meshes.read_mesh import material_of_slot
 
 
+def shown_by(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
+    """What puts an instance into the scene, whose settings Cycles takes beside those of the object: itself, if it is
+    no instance."""
+    return instance.parent if instance.is_instance and instance.parent is not None else instance.object
+
+
 def camera_misses(instance: bpy.types.DepsgraphObjectInstance, view_layer: bpy.types.ViewLayer) -> bool:
     """Whether rays of the camera pass an instance: by ray visibility, its own or its parent's, or as Indirect Only."""
-    parent = instance.parent if instance.is_instance and instance.parent is not None else instance.object
+    parent = shown_by(instance)
     if parent.original.indirect_only_get(view_layer=view_layer) and not parent.original.holdout_get(
         view_layer=view_layer
     ):
@@ -22,16 +28,23 @@ def camera_misses(instance: bpy.types.DepsgraphObjectInstance, view_layer: bpy.t
     return not (instance.object.visible_camera and parent.visible_camera)
 
 
-def shadow_transmission(item: bpy.types.Object, slot: int) -> float | None:
+def shadow_transmission(instance: bpy.types.DepsgraphObjectInstance, slot: int) -> float | None:
     """What shadow rays keep at a slot's faces, None where its material says it."""
-    if not item.visible_shadow:
+    if not (instance.object.visible_shadow and shown_by(instance).visible_shadow):
         return 1.0
-    material = material_of_slot(item, slot)
+    material = material_of_slot(instance.object, slot)
     return None if material is None or material.use_transparent_shadow else 0.0
 
 
-def note_visibility(item: bpy.types.Object, findings: Findings) -> None:
-    """Name what of an object is left out."""
+def hidden_from(instance: bpy.types.DepsgraphObjectInstance) -> list[str]:
+    """The kinds of rays, of those that the fit does not tell apart, which pass an instance."""
+    kinds, owners = ("diffuse", "glossy", "transmission"), (instance.object, shown_by(instance))
+    return [kind for kind in kinds if not all(getattr(each, f"visible_{kind}") for each in owners)]
+
+
+def note_visibility(instance: bpy.types.DepsgraphObjectInstance, findings: Findings) -> None:
+    """Name what of an instance is left out."""
+    item, parent = instance.object, shown_by(instance)
     name_settings(OBJECT_CYCLES, cycles_settings(item), item.name, findings)
     if any(divides_adaptively(modifier, item) for modifier in item.modifiers):
         findings.note(
@@ -40,8 +53,8 @@ def note_visibility(item: bpy.types.Object, findings: Findings) -> None:
     for system in item.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
-    off = [kind for kind in ("diffuse", "glossy", "transmission") if not getattr(item, f"visible_{kind}")]
+    off = hidden_from(instance)
     if off:
         findings.note(f"Object '{item.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
-    if item.is_holdout or item.is_shadow_catcher:
+    if any(each.is_holdout or each.is_shadow_catcher for each in (item, parent)):
         findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")

@@ -24,7 +24,7 @@ from ..camera.render_region import Size
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings, Fix
 from ..fitted_slot import FittedSlot
-from ..lights.read_light import read_light
+from ..lights.read_light import links_light, note_linking, read_light
 from ..material_model import Material, grey
 from ..materials.read_context import needs_bake, read_context
 from ..materials.read_material import name_material_settings, read_target
@@ -38,6 +38,7 @@ from ..nodes.displacement import moves_faces
 from ..render_state import (
     background_objects,
     layer_collections,
+    note_viewport,
     render_state,
     rendered_layer,
     rendered_objects,
@@ -145,6 +146,7 @@ def _read(
         rendered = rendered_objects(view_layer) | background_objects(scene)
         walk = _Walk(data, fitted, described, depsgraph, rendered, findings, bakes, known)
         walk.run()
+        note_viewport(depsgraph, findings)
         owners = [each for each in bpy.data.materials if each.name_full in walk.bsdfs]
         owners += [scene.world] if view_layer.use_sky and scene.world is not None else []
         refuse_unfinite_pixels(filter(None, map(node_tree_of, owners)), findings)
@@ -170,6 +172,9 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
     """Put what `bakes` was asked for into the scene, and look whether there is light."""
     if bakes is not None:
         bakes.finish(data, findings)
+    for shape in data.emitting:
+        if shape.linked:
+            note_linking(shape.linked, findings)
     if not data.world.is_lit and not data.lights and not data.emitting:
         findings.error("The scene has no light: add a light or give the world a colour.")
 
@@ -227,6 +232,7 @@ class _Walk:
         self.pieces: list[tuple[str, str, Piece]] = []  # with names of object and shape
         self.targets_left_out = [0] * len(targets)  # triangles
         self.target_bodies = [0] * len(targets)
+        self.target_shadows: list[list[float | None]] = [[] for _ in targets]  # `shadow_transmission` of the instances
         self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
         self.leaning_normals: dict[str, float] = {}  # the share of an object's normals that may turn away unnamed
@@ -263,9 +269,15 @@ class _Walk:
             names = target_shape(number), target_bsdf(number)
             if self.pieces_of(names[0]):
                 terminator = Terminator(*shadow_terminator(each.object))
-                shadow = shadow_transmission(each.object, each.slot)
-                body = self.target_bodies[number]
-                self.data.shapes.insert(0, Shape(names[0], NOT_PLACED, names[1], terminator, shadow, body=body))
+                shadows, body = self.target_shadows[number], self.target_bodies[number]
+                if len(set(shadows)) > 1:
+                    self.findings.note(
+                        f"Some instances of '{each.object.name}' cast shadows and others do not; in the fit all are as "
+                        "the first of them."
+                    )
+                linked = self._linked(each.object)
+                made = Shape(names[0], NOT_PLACED, names[1], terminator, shadows[0], body=body, linked=linked)
+                self.data.shapes.insert(0, made)
 
     def pieces_of(self, shape: str) -> list[Piece]:
         """What a shape of the scene consists of."""
@@ -314,7 +326,7 @@ class _Walk:
         mesh = self.meshes[key]
         if mesh is None:
             return
-        note_visibility(item, self.findings)
+        note_visibility(instance, self.findings)
         hidden = camera_misses(instance, self.depsgraph.view_layer)
         if item.data.has_custom_normals or item.data.normals_domain != "FACE":
             is_smooth = item.data.normals_domain == "POINT" and not item.data.has_custom_normals
@@ -342,15 +354,21 @@ class _Walk:
                 self.bakes.displaced.place(name, piece)
             if slot in fitted:
                 self.target_bodies[fitted[slot]] = body
+                self.target_shadows[fitted[slot]].append(shadow_transmission(instance, slot))
                 if hidden:
                     self.findings.error(f"Object '{item.name}' is hidden from camera rays: let the camera see it.")
                 continue
-            terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(item, slot)
+            terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(instance, slot)
             if bsdf in self.baked:
                 self._note_generated(item, slot)
                 if self.bakes is not None:
                     bsdf = self.bakes.ask_surface(self.data, name, Surface(instance, slot, piece), self.findings)
-            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body))
+            linked = self._linked(item)
+            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body, linked))
+
+    def _linked(self, item: bpy.types.Object) -> str:
+        """The name of an object that lights or shadows some objects alone, if it gives light."""
+        return item.name if links_light(item) else ""
 
     def _body(self, bsdfs: dict[int, str]) -> int:
         """The number of an object of several shapes that light goes through below the surface, else 0."""

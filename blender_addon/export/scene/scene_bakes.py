@@ -32,23 +32,25 @@ from ..materials.read_context import read_context
 from ..materials.read_material import volume_sockets
 from ..meshes.mesh_arrays import Piece
 from ..meshes.read_mesh import material_of_slot
-from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for
+from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for, asked_of_instancer, asked_of_place
 from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
+from .ray_visibility import shown_by
 from .scene_data import SceneData
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
-# of one object with bent normals, for instances of other proportions or sizes; what comes later has the first bake
-MOST_SCALES = 8
+# of one object whose instances have each something of their own, or bent normals and other proportions or sizes; what
+# comes later has the first bake
+MOST_PLACES = 8
 SIZE_STEP = 0.02  # the smallest ratio of two sizes, above 1, that counts as another: slopes of bumps change as much
 LEAST_SIZE, MOST_SIZE = 256, 2048  # texels along each side
 TEXELS_A_PIXEL = 1.5  # along each side, where a surface is nearest to the camera
 USED = 0.6  # of a map's side by the faces in it, about
 POINTS = 2000  # of a surface that are looked at for its size in the picture
 
-Scale = tuple[float, ...]
+Own = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -101,8 +103,8 @@ class SceneBakes:
         self._failed: list[str] = []  # errors of what was asked
         self._surfaces: dict[str, _Asked] = {}  # by the BSDF's id
         self._number: int | BakeError | None = None  # of the request for them, or why there is none
-        # those ids, by what bent normals hang on of a place, by object, its data and slot
-        self._ids: dict[tuple[str, int, int], dict[Scale, str]] = {}
+        # those ids, by what a bake hangs on of an instance, by object, its data and slot
+        self._ids: dict[tuple[str, int, int], dict[Own, str]] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -123,18 +125,26 @@ class SceneBakes:
     def ask_surface(self, data: SceneData, shape: str, surface: Surface, findings: Findings) -> str:
         """Have a surface baked for the shape of that id; returns the id of a BSDF that `finish` describes.
 
-        Instances share one, those whose size or proportions bend normals in another way apart.
+        Instances share one, but where nodes ask for what each has of its own, or where size or proportions bend normals
+        in another way.
         """
         item, material = surface.instance.object, surface.material
         known = self._ids.setdefault((item.name_full, item.data.as_pointer(), surface.slot), {})
-        scale = _scale(surface)
-        if scale not in known and len(known) == MOST_SCALES:
+        told = asked_of_instancer(node_tree_of(material))
+        if told and shown_by(surface.instance).original != item.original:
             findings.note(
-                f"Material '{material.name}' bends normals of '{item.name}' by the size of each instance; beyond "
-                f"{MOST_SCALES} sizes all have those of the first."
+                f"Material '{material.name}': what {', '.join(told)} tell of each instance of '{item.name}' is left "
+                "out: in the fit it is as of the object alone."
             )
-            scale = next(iter(known))
-        if scale not in known:
+        own = _own(surface)
+        if own not in known and len(known) == MOST_PLACES:
+            if not asked_of_place(node_tree_of(material)):  # else `_put_surface` names it
+                findings.note(
+                    f"Material '{material.name}' bends normals of '{item.name}' by the size of each instance; beyond "
+                    f"{MOST_PLACES} sizes all have those of the first."
+                )
+            own = next(iter(known))
+        if own not in known:
             note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
             identifier = f"baked_{sum(map(len, self._ids.values())) + 1:04d}"
             try:
@@ -147,8 +157,8 @@ class SceneBakes:
                 self._surfaces[identifier] = _Asked(material, item.name, request)
             except BakeError as problem:
                 _give_up(data, identifier, material, item.name, problem, findings)
-            known[scale] = identifier
-        identifier = known[scale]
+            known[own] = identifier
+        identifier = known[own]
         if identifier in self._surfaces:
             self._surfaces[identifier].shown.append(_Shown(shape, surface.piece))
         return identifier
@@ -251,9 +261,11 @@ def _is_uniform(radiance: NDArray[np.float32]) -> bool:
     return bool(np.ptp(radiance.reshape(-1, 3), axis=0).max() <= ALIKE * float(radiance.mean()))
 
 
-def _scale(surface: Surface) -> Scale:
-    """What the bent normals of a surface hang on of its place: proportions, size, and whether it is mirrored."""
+def _own(surface: Surface) -> Own:
+    """What a bake of a surface hangs on of its instance: all, or for bent normals proportions, size, and mirroring."""
     tree = node_tree_of(surface.material)
+    if asked_of_place(tree):
+        return (*map(float, surface.piece.matrix.ravel()), float(surface.instance.random_id))
     by_size = bool(asked_for(tree, OF_SIZE)) or bends_normals(surface.material)
     if not by_size and not asked_for(tree, OF_STRETCH):
         return ()

@@ -42,7 +42,7 @@ class Shape:
 
     `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha. Where
     `camera_hidden` rays of the camera pass it as if it were not there. Shapes of one `body`, above 0, are one object
-    below the surface.
+    below the surface. `linked` is the object's name where the light it gives is linked to some objects.
     """
 
     identifier: str
@@ -52,6 +52,7 @@ class Shape:
     shadow_transmission: float | None = None
     camera_hidden: bool = False
     body: int = 0
+    linked: str = ""
 
 
 @dataclass(frozen=True)
