@@ -19,7 +19,7 @@ from ...versions import (
 )
 from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
-from ..camera.read_camera import read_camera, read_pixel_filter
+from ..camera.read_camera import read_camera
 from ..camera.render_region import Size
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings, Fix
@@ -46,15 +46,14 @@ from ..render_state import (
 from ..steps import Steps
 from .origin import moved, note_far_scattering, scene_origin
 from .ray_visibility import camera_misses, note_visibility, shadow_transmission
-from .read_light_paths import BOUNCES, read_light_paths
+from .read_settings import read_settings
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
-from .scene_data import RenderSettings, SceneData, Shape, Terminator, target_bsdf, target_shape
+from .scene_data import SceneData, Shape, Terminator, target_bsdf, target_shape
 from .visibility import check_visible, say_no_faces
 
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
-DEFAULT_SPP = 64
 _NO_POINTS = np.zeros((0, 3), np.float32)
 NOT_PLACED = TriangleMesh(_NO_POINTS, _NO_POINTS, np.zeros((0, 2), np.float32), np.zeros((0, 3), np.int32))
 
@@ -128,7 +127,7 @@ def _read(
     with render_state(view_layer, scene):
         depsgraph = context.evaluated_depsgraph_get()
         camera = read_camera(scene, depsgraph, findings, picture)
-        settings = _read_settings(scene, findings)
+        settings = read_settings(scene, findings)
         fitted = targets or [FittedSlot(target, target.active_material_index, leaf)]
         materials = []
         for each in fitted:
@@ -190,24 +189,6 @@ def _name_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, find
     strips = getattr(scene.sequence_editor, "strips", None) or getattr(scene.sequence_editor, "sequences", ())
     if scene.render.use_sequencer and len(strips):
         findings.note("The render shows the strips of the Video Sequencer; the fit shows the scene.")
-
-
-def _read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
-    cycles = cycles_settings(scene)
-    pixel_filter = read_pixel_filter(scene)
-    if scene.render.engine not in ("CYCLES", "BLENDER_EEVEE", "BLENDER_EEVEE_NEXT"):
-        findings.note(f"The render engine is {scene.render.engine}; the scene is exported as Cycles would see it.")
-    if cycles is None:
-        findings.note("Cycles is switched off in the preferences; its default settings are used.")
-        return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
-    if cycles.sample_clamp_direct > 0.0:
-        findings.note("Cycles clamps direct light; the fit does not.")
-    light_paths = read_light_paths(cycles, findings)
-    # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
-    depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
-    exposure = cycles.film_exposure
-    film = scene.render.film_transparent
-    return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, cycles.use_light_tree)
 
 
 class _Walk:

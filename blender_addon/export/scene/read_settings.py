@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits of bounces and what else changes indirect light in Cycles, with what the fit cannot follow exactly."""
+"""Settings of the render: limits of bounces and what else changes light, with what the fit cannot follow exactly."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from typing import Any
 
 import bpy
 
-from ...versions import counts_passages_exactly
+from ...versions import counts_passages_exactly, cycles_settings
+from ..camera.read_camera import read_pixel_filter
 from ..findings import Findings
+from .scene_data import RenderSettings
 
+DEFAULT_SPP = 64
 BOUNCES = ("diffuse", "glossy", "transmission")
 # of a ball, a box and a floor with a limit of 0 one block was 8 % too dark, the picture 1 %; with 1 the picture was
 # 0.06 % too dark, and with 2 or 4 nothing was above the noise. With no diffuse bounce a metal's picture was 0.4 % too
@@ -18,7 +21,26 @@ FEW_BOUNCES = 2
 MANY_PASSAGES = 8  # Blender's default; one to three panes under lower limits were 2 to 18 % off in 4.5.15
 
 
-def read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
+def read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
+    """What the picture of `scene` needs beside what is in it; Cycles' defaults where Cycles is off."""
+    cycles = cycles_settings(scene)
+    pixel_filter = read_pixel_filter(scene)
+    if scene.render.engine not in ("CYCLES", "BLENDER_EEVEE", "BLENDER_EEVEE_NEXT"):
+        findings.note(f"The render engine is {scene.render.engine}; the scene is exported as Cycles would see it.")
+    if cycles is None:
+        findings.note("Cycles is switched off in the preferences; its default settings are used.")
+        return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
+    if cycles.sample_clamp_direct > 0.0:
+        findings.note("Cycles clamps direct light; the fit does not.")
+    light_paths = _read_light_paths(cycles, findings)
+    # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
+    depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
+    exposure = cycles.film_exposure
+    film = scene.render.film_transparent
+    return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, cycles.use_light_tree)
+
+
+def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
     """The settings that change indirect light in Cycles alone; Blender's defaults have all of them."""
     if not (cycles.caustics_reflective and cycles.caustics_refractive):
         findings.note("Cycles removes caustics; the fit does not.")
