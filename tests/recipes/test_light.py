@@ -27,7 +27,7 @@ def test_a_new_light_goes_from_blender_to_the_floor(tmp_path: Path) -> None:
         bpy.context.scene.collection.objects.link(lamp)
         lamp.location.z = 3.0
         bpy.context.view_layer.update()
-        light = read_light(lamp, np.array(lamp.matrix_world), 1.0, Findings())
+        light = read_light(lamp, np.array(lamp.matrix_world), 1.0, Findings(), camera=False, hidden_from=())
         element = ElementTree.fromstring(ElementTree.tostring(light_element(light, "ring", str), "unicode"))
 
         from mfo_backend.render.machine.plugins import check_plugins

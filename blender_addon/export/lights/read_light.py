@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +25,18 @@ LEAST_VOLUME = 1e-18
 
 
 def read_light(
-    evaluated: bpy.types.Object, matrix: NDArray[np.float64], exposure: float, findings: Findings
+    evaluated: bpy.types.Object,
+    matrix: NDArray[np.float64],
+    exposure: float,
+    findings: Findings,
+    *,
+    camera: bool,
+    hidden_from: Sequence[str],
 ) -> Light | None:
-    """Return the light with its power scaled by `exposure`, or None if it gives no light."""
+    """Return the light with its power scaled by `exposure`, or None if it gives no light.
+
+    `camera` says whether the camera sees it, and `hidden_from` which rays do not: it and what shows it say that.
+    """
     data = evaluated.data
     name = evaluated.name
     cycles = cycles_settings(data)
@@ -51,7 +62,7 @@ def read_light(
     name_settings(LIGHT_CYCLES, cycles, name, findings)
     if links_light(evaluated):
         note_linking(name, findings)
-    _note_rays(evaluated, findings)
+    _note_rays(evaluated, hidden_from, findings)
     light = Light(
         kind=data.type,
         name=name,
@@ -68,7 +79,7 @@ def read_light(
         size_x=getattr(data, "size", 1.0),
         size_y=getattr(data, "size_y", 1.0),
         spread=getattr(data, "spread", np.pi) if data.type == "AREA" else np.pi,
-        camera=evaluated.visible_camera,
+        camera=camera,
         shadow=data.use_shadow,
         nodes=nodes,
     )
@@ -96,10 +107,9 @@ def _lookup(evaluated: bpy.types.Object, tree: bpy.types.NodeTree, findings: Fin
     return found
 
 
-def _note_rays(evaluated: bpy.types.Object, findings: Findings) -> None:
-    off = [kind for kind in ("diffuse", "glossy", "transmission") if not getattr(evaluated, f"visible_{kind}")]
-    if off:
-        findings.note(f"Light '{evaluated.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
+def _note_rays(evaluated: bpy.types.Object, hidden_from: Sequence[str], findings: Findings) -> None:
+    if hidden_from:
+        findings.note(f"Light '{evaluated.name}' is hidden from {', '.join(hidden_from)} rays; in the fit it is not.")
     cycles = cycles_settings(evaluated.data)
     if cycles is not None and not cycles.use_multiple_importance_sampling:
         findings.note(

@@ -45,7 +45,7 @@ from ..render_state import (
 )
 from ..steps import Steps
 from .origin import moved, note_far_scattering, scene_origin
-from .ray_visibility import camera_misses, note_visibility, shadow_transmission
+from .ray_visibility import camera_misses, hidden_from, note_visibility, shadow_transmission
 from .read_settings import read_settings
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
@@ -233,7 +233,9 @@ class _Walk:
                 continue
             matrix = moved(np.array(instance.matrix_world, dtype=np.float64), self.data.origin)
             if item.type == "LIGHT":
-                light = read_light(item, matrix, self.data.settings.exposure, self.findings)
+                seen = not camera_misses(instance, self.depsgraph.view_layer)
+                rays = {"camera": seen, "hidden_from": hidden_from(instance)}
+                light = read_light(item, matrix, self.data.settings.exposure, self.findings, **rays)
                 if light is not None:
                     if light.nodes is not None and self.bakes is not None:
                         self.bakes.lamps.ask(instance, len(self.data.lights), light)
