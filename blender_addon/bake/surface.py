@@ -59,7 +59,8 @@ def baked_surface(
         tree = material.node_tree
         paths, place = light_path_outputs(tree), asked_of_place(tree)
         groups += answer_light_paths(tree, SCATTERED)
-        groups += answer_random(tree, instance.random_id % (MOST_RANDOM + 1) / MOST_RANDOM)
+        if instance.is_instance:  # what is none has a number by its name, which the object on stage has, too
+            groups += answer_random(tree, instance.random_id % (MOST_RANDOM + 1) / MOST_RANDOM)
         view, around = asked_for(tree, OF_VIEW), asked_for(tree, OF_SURROUNDINGS)
         emits = _emits(tree)
         with _stage(scene, instance, depsgraph, slot, material) as stage:

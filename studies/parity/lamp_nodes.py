@@ -116,6 +116,12 @@ def softbox(tree: Any, emission: Any) -> None:
     tree.links.new(gradient.outputs["Color"], emission.inputs["Color"])
 
 
+def falling_softbox(tree: Any, emission: Any) -> None:
+    """A softbox with a smooth falloff."""
+    softbox(tree, emission)
+    falloff("Quadratic", 1.0)(tree, emission)
+
+
 def by_place(tree: Any, emission: Any) -> None:
     """Checks by the Object coordinates of places on the light."""
     texco, checker = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexChecker")

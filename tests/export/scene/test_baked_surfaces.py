@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.export.scene import scene_bakes
 from mfo_backend.scene.image_file import read_image
 
 from ..scenes import add_camera, add_quad, new_material, world_color
@@ -139,27 +140,54 @@ def test_a_material_in_a_later_slot_is_baked_like_one_in_the_first(stage: Any, e
         assert np.sqrt(np.mean((found - 0.5 * positions - 0.5) ** 2)) < 0.03
 
 
-def test_instances_share_one_bake_and_say_so(stage: Any, export: Any) -> None:
+def test_instances_have_each_what_is_theirs(
+    stage: Any, export: Any, render_cycles: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Place and random number of two of three instances; the third has what the first has, and both are named."""
+    monkeypatch.setattr(scene_bakes, "MOST_PLACES", 2)
     target, ball, nodes = stage
-    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    apart, shown, glow = nodes.new("SeparateXYZ"), nodes.new("CombineColor"), nodes.new("Emission")
+    nodes.tree.links.new(nodes.place(), apart.inputs[0])
+    nodes.tree.links.new(apart.outputs[0], shown.inputs[0])
+    nodes.tree.links.new(nodes.new("ObjectInfo").outputs["Random"], shown.inputs[1])
+    told = nodes.new("Attribute")
+    told.attribute_type, told.attribute_name = "INSTANCER", "wet"
+    nodes.tree.links.new(told.outputs["Fac"], shown.inputs[2])
+    nodes.tree.links.new(shown.outputs[0], glow.inputs["Color"])
+    for socket, black in (("Base Color", (0.0, 0.0, 0.0, 1.0)), ("Specular IOR Level", 0.0)):  # Cycles sees glow alone
+        nodes.principled.inputs[socket].default_value = black
+    added = nodes.new("AddShader")
+    nodes.tree.links.new(nodes.principled.outputs[0], added.inputs[0])
+    nodes.tree.links.new(glow.outputs[0], added.inputs[1])
+    nodes.tree.links.new(added.outputs[0], nodes.surface)
     prefab = bpy.data.collections.new("Prefab")
     bpy.context.scene.collection.children.link(prefab)
     prefab.objects.link(ball)
     bpy.context.scene.collection.objects.unlink(ball)
     bpy.context.view_layer.layer_collection.children["Prefab"].exclude = True
-    for x in (-1.0, 1.0):
+    for place in ((-1.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0)):
         empty = bpy.data.objects.new("Instance", None)
-        empty.instance_type, empty.instance_collection, empty.location.x = "COLLECTION", prefab, x
+        empty.instance_type, empty.instance_collection, empty.location = "COLLECTION", prefab, place
         bpy.context.scene.collection.objects.link(empty)
     report = export(target)
     scene = ElementTree.parse(report.folder / "scene.xml").getroot()
-    refs = [attribute(shape, "ref", "id") for shape in scene.iterfind("shape")]
-    assert refs.count("baked_0001") == 2
-    said = "Geometry may differ between the 2 instances of 'Ball'; all have the bake of the first."
-    assert f"Material 'Ball': {said}" in report.notes
-    bsdf, positions, uv = shape_of(report)  # of the first
-    found = at_vertices(texture(report, bsdf, "Base Color"), uv)
-    assert np.sqrt(np.mean((found - (0.5 * positions + 0.5).clip(0.0)) ** 2)) < 0.01
+    picture, found = render_cycles(), []
+    for shape in scene.iterfind("shape"):
+        bsdf = attribute(shape, "ref", "id")
+        if bsdf.startswith("baked"):
+            positions, uv = read_ply(report.folder / attribute(shape, "string", "value"))
+            color = at_vertices(texture(report, bsdf, "Emission Color"), uv)
+            row, column = (np.array([2.0 - positions[:, 1].mean(), 2.0 + positions[:, 0].mean()]) * 64).astype(int)
+            found.append((bsdf, picture[row, column], positions, color))
+    assert [bsdf for bsdf, *_ in found] == ["baked_0001", "baked_0002", "baked_0001"]
+    for _, seen, positions, color in found[:2]:
+        assert np.sqrt(np.mean((color[:, 0] - (0.5 * positions[:, 0] + 0.5).clip(0.0)) ** 2)) < 0.01
+        np.testing.assert_allclose(color[:, 1], seen[1], atol=2e-3)
+    assert abs(found[0][1][1] - found[1][1][1]) > 0.01  # the numbers of two instances differ
+    shared = "may differ between the 2 instances of 'Ball'; all have the bake of the first."
+    assert f"Material 'Ball': Geometry, Object Info {shared}" in report.notes
+    told_of = "what Attribute tell of each instance of 'Ball' is left out: in the fit it is as of the object alone."
+    assert f"Material 'Ball': {told_of}" in report.notes
 
 
 def test_generated_coordinates_are_those_of_the_object_without_its_modifiers(stage: Any, export: Any) -> None:
