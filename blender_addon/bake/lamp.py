@@ -34,6 +34,10 @@ SURE = 1e-1  # metres; nearer to it than that it does not
 WIDEST = 89.0  # degrees from an area light's axis, which shines on one side
 LOOKED_AT = 16  # directions that say whether all fall alike with the distance
 ALIKE = 2e-3  # the largest difference of two that do, of the larger one
+# of places on a lamp, of which some lie at the edges of a picture: farther away faces look beside their place there
+DISTINCT = 5.0  # metres
+ALIKE_PLACES = 5e-2  # of the strongest place
+MOST_PLACES = 0.75  # of the places; what changes on fewer is not told from edges
 COLORS = "material_fit"
 TURN = np.diag([1.0, -1.0, -1.0])  # a Blender lamp shines along its -Z, a pattern's along +Z
 
@@ -58,10 +62,12 @@ def lamp_table(
         falloff, distance = None, DISTANCE
         side = FINE if asked["fine"] else COARSE
         if asked["falls"] and lamp.data.type != "SUN":
-            apart = np.array([[0.0, 0.0, 1.0]]) if by in (CONSTANT, PLACE) else _spread(rim, halves)
+            straight = np.array([[0.0, 0.0, 1.0]])
+            apart = {CONSTANT: lambda: straight, PLACE: _spread_places}.get(by, lambda: _spread(rim, halves))()
             steps = distances()
-            found = faces.around(np.repeat(apart, len(steps), axis=0), np.tile(steps, len(apart)))
-            falloff, distance = _by_distance(found.reshape(len(apart), len(steps), 3), steps)
+            measure = faces.before if by == PLACE else faces.around
+            found = measure(np.repeat(apart, len(steps), axis=0), np.tile(steps, len(apart)))
+            falloff, distance = _by_distance(found.reshape(len(apart), len(steps), 3), steps, of_places=by == PLACE)
         if by == CONSTANT:
             pixels = faces.around(np.array([[0.0, 0.0, 1.0]]), distance)
         elif by == PLACE:
@@ -100,14 +106,15 @@ class _Faces:
         _shrink(self._lamp.data)
         return self._factors(self._place + distance * away, away, distance)
 
-    def before(self, on_square: Numbers, distance: float) -> Numbers:
-        """Factors at places on an area light, which shines straight ahead meanwhile."""
+    def before(self, on_square: Numbers, distance: Any) -> Numbers:
+        """Factors at places on an area light at distances from it, which shines straight ahead meanwhile."""
         data, sizes = self._lamp.data, self._sizes
         data.shape, data.size, data.size_y, data.spread = "RECTANGLE", *sizes, 0.0
         away = np.cross(self._frame[:, 0], self._frame[:, 1])
         away = np.broadcast_to(away / np.linalg.norm(away), (len(on_square), 3))
+        distance = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(away))[:, None]
         points = self._place + on_square * [sizes[0] / 2.0, sizes[1] / 2.0, 0.0] @ self._frame.T + distance * away
-        return self._factors(points, away, np.full((len(points), 1), distance))
+        return self._factors(points, away, distance)
 
     def _factors(self, points: Numbers, away: Numbers, distance: Numbers) -> Numbers:
         mesh = _faces(points, away, FACE * distance)
@@ -237,9 +244,19 @@ def _spread(rim: float, halves: int) -> Numbers:
     return np.stack([across * np.cos(turn), across * np.sin(turn), up], axis=1).astype(np.float64)
 
 
-def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tuple[Numbers, float]:
-    """The factors (distances, 3) of the strongest of some directions (directions, distances, 3) over those at one
-    distance, and that.
+def _spread_places() -> Numbers:
+    """Places spread evenly over a square from -1 to 1."""
+    number = np.arange(LOOKED_AT, dtype=np.float64)[:, None] + 1.0
+    # the two-dimensional sequence of Roberts, which keeps away from lines of the places before
+    across = (0.5 + number * [0.7548776662466927, 0.5698402909980532]) % 1.0
+    return np.concatenate([2.0 * across - 1.0, np.zeros_like(number)], axis=1)
+
+
+def _by_distance(
+    found: NDArray[np.float64], steps: NDArray[np.float64], *, of_places: bool = False
+) -> tuple[Numbers, float]:
+    """The factors (distances, 3) of the strongest of some directions or places (directions, distances, 3) over those
+    at one distance, and that.
 
     Raises
     ------
@@ -255,6 +272,10 @@ def _by_distance(found: NDArray[np.float64], steps: NDArray[np.float64]) -> tupl
     falloff = strongest / base
     expected = found[:, there : there + 1] * falloff
     most = np.maximum(np.maximum(found, expected).max(axis=(0, 2)), 1e-30)[:, None]
-    if float((np.abs(found - expected) / most)[:, steps > SURE].max()) > ALIKE:
+    off = np.abs(found - expected) / most
+    if not of_places and float(off[:, steps > SURE].max()) > ALIKE:
         raise ProbeRequestError("Their light changes with the distance in another way in each direction.")
+    of_each = off[:, (steps > SURE) & (steps < DISTINCT)].max(axis=(1, 2))
+    if of_places and float(np.quantile(of_each, MOST_PLACES)) > ALIKE_PLACES:
+        raise ProbeRequestError("Their light changes with the distance in another way at each place of the lamp.")
     return falloff, float(steps[there])

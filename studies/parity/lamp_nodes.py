@@ -116,12 +116,6 @@ def softbox(tree: Any, emission: Any) -> None:
     tree.links.new(gradient.outputs["Color"], emission.inputs["Color"])
 
 
-def falling_softbox(tree: Any, emission: Any) -> None:
-    """A softbox with a smooth falloff."""
-    softbox(tree, emission)
-    falloff("Quadratic", 1.0)(tree, emission)
-
-
 def by_place(tree: Any, emission: Any) -> None:
     """Checks by the Object coordinates of places on the light."""
     texco, checker = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexChecker")
@@ -129,6 +123,12 @@ def by_place(tree: Any, emission: Any) -> None:
     checker.inputs["Color2"].default_value = (0.1, 0.1, 0.3, 1.0)
     tree.links.new(texco.outputs["Object"], checker.inputs["Vector"])
     tree.links.new(checker.outputs["Color"], emission.inputs["Color"])
+
+
+def falling_checks(tree: Any, emission: Any) -> None:
+    """Checks with a smooth falloff."""
+    by_place(tree, emission)
+    falloff("Quadratic", 1.0)(tree, emission)
 
 
 def picture() -> Any:

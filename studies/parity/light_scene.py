@@ -112,7 +112,7 @@ NODES: dict[str, Lights] = {
     "blinds, point, sphere": [("POINT", {**_POINT, "use_soft_falloff": False, "nodes": lamp_nodes.blinds})],
     "softbox, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.softbox})],
     "softbox, ellipse, spread 90°": [("AREA", {**_ROUND, "spread": 1.57, "nodes": lamp_nodes.softbox})],
-    "falling softbox, rectangle": [("AREA", {**_WIDE, "nodes": lamp_nodes.falling_softbox})],
+    "falling checks, rectangle": [("AREA", {**_WIDE, "nodes": lamp_nodes.falling_checks})],
     "gobo by UV, area, spread 0°": [("AREA", {**_WIDE, "spread": 0.0, "nodes": lamp_nodes.gobo("UV")})],
     "checks by Object, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.by_place})],
 }

@@ -17,7 +17,7 @@ from ..scene.test_light_levels import floor, tiles
 
 # one of each kind of table and lamp; `light_parity` has all
 KINDS = (
-    *("blackbody, point", "blackbody, sun", "Linear falloff, point", "falling softbox, rectangle"),
+    *("blackbody, point", "blackbody, sun", "Linear falloff, point", "falling checks, rectangle"),
     *("Linear falloff, sharp spot", "IES, sharp point", "IES, spot", "IES, area", "gobo by UV, spot"),
     *(
         "gobo by Normal, deformed spot",
