@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of textures between their pixels, as Cycles interpolates them, on a finer grid that Mitsuba can read.
 
-Cycles filters 8-bit sRGB pictures before it decodes them (kernel/svm/image.h), multiplies them by their alpha where
-the node's Alpha has no link (scene/shader_nodes.cpp, ImageTextureNode), and has a cubic B-spline. Mitsuba
+Cycles filters 8-bit sRGB pictures before it decodes them (kernel/svm/image.h), times their alpha, by which it divides
+again where the node's Alpha is linked (scene/shader_nodes.cpp, ImageTextureNode), and has a cubic B-spline. Mitsuba
 interpolates linearly what it is given. So the picture is filtered here, between its pixels, as finely as is affordable.
 """
 
@@ -34,13 +34,19 @@ def filtered_pixels(image: bpy.types.Image, interpolation: str, wrap: str, *, al
     encoded = not image.is_float and not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
     pixels = read_encoded(image) if encoded else read_pixels(image)
     pixels = _with_alpha(image, pixels, alpha_read)
+    divided = alpha_read and interpolation != "Closest" and _is_multiplied(image, pixels)
+    if divided:
+        pixels = np.concatenate([pixels[:, :, :3] * pixels[:, :, 3:], pixels[:, :, 3:]], axis=2)
     steps = _steps(pixels)
     if steps > 1 and interpolation in ("Cubic", "Smart"):
         pixels = _finer(pixels, steps, wrap, _cubic)
-    elif steps > 1 and encoded and interpolation == "Linear":
+    elif steps > 1 and (encoded or divided) and interpolation == "Linear":
         pixels = _finer(pixels, steps, wrap, _linear)
     elif encoded:
         pixels = pixels.copy()
+    if divided:
+        color, alpha = pixels[:, :, :3], pixels[:, :, 3:]
+        pixels = np.concatenate([np.divide(color, alpha, out=color.copy(), where=alpha > 0.0), alpha], axis=2)
     if encoded:
         pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
     return pixels
@@ -65,7 +71,7 @@ def _with_alpha(image: bpy.types.Image, pixels: Pixels, alpha_read: bool) -> Pix
     if mode == "NONE":
         return np.concatenate([pixels[:, :, :3], np.ones_like(pixels[:, :, 3:])], axis=2)
     alpha = pixels[:, :, 3:]
-    if is_data(image) or mode == "CHANNEL_PACKED" or (alpha == 1.0).all():
+    if not _is_multiplied(image, pixels):
         return pixels
     color = pixels[:, :, :3]
     # Cycles reads such a file itself, as if its colours were not multiplied; Blender divides, and clips to 1
@@ -76,6 +82,12 @@ def _with_alpha(image: bpy.types.Image, pixels: Pixels, alpha_read: bool) -> Pix
     elif not image.is_float and not alpha_read:
         color = color * alpha
     return np.concatenate([color, alpha], axis=2)
+
+
+def _is_multiplied(image: bpy.types.Image, pixels: Pixels) -> bool:
+    """Whether Cycles filters a picture's colours times an alpha that is not 1 everywhere."""
+    straight = is_data(image) or image.alpha_mode in ("CHANNEL_PACKED", "NONE")
+    return not straight and bool((pixels[:, :, 3] != 1.0).any())
 
 
 def _as_stored(image: bpy.types.Image) -> Pixels:

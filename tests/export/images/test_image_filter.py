@@ -18,10 +18,11 @@ MODES = ("STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE")
 
 
 def picture(path: Path, size: int = 8) -> Any:
-    """A file of random colours and alphas below 1 on its right half, 8 bits."""
+    """A file of random colours and two alphas below 1 on its right half, 8 bits."""
     values = np.ones((size, size, 4), np.float32)
     values[..., :3] = np.random.default_rng(3).uniform(0.0, 1.0, (size, size, 3))
     values[:, size // 2 :, 3] = 0.5
+    values[: size // 4, size // 2 :, 3] = 0.25
     image = bpy.data.images.new("made", size, size, alpha=True)
     image.pixels.foreach_set(values.ravel())
     image.filepath_raw, image.file_format = str(path), "PNG"
@@ -65,6 +66,17 @@ def test_colours_have_the_alpha_cycles_gives_them(
     theirs = shown_by_cycles(scene, image, "Closest", alpha_read, render_cycles)
     ours = filtered_pixels(image, "Closest", "repeat", alpha_read=alpha_read)
     assert blocks(theirs, 8) == pytest.approx(blocks(ours, 8), abs=0.02)  # Cycles rounds to 8 bits in between
+
+
+@pytest.mark.parametrize("interpolation", ["Linear", "Cubic"])
+def test_hidden_colours_do_not_bleed_into_what_is_seen(
+    interpolation: str, scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    """A leaf whose Alpha is read: Cycles weighs colours by alpha before it filters them."""
+    image = picture(tmp_path / "picture.png")
+    theirs = shown_by_cycles(scene, image, interpolation, True, render_cycles)
+    ours = filtered_pixels(image, interpolation, "repeat", alpha_read=True)
+    assert blocks(theirs, 16) == pytest.approx(blocks(ours, 16), abs=0.02)  # without alpha 0.33 and 0.26
 
 
 @pytest.mark.parametrize("interpolation", ["Linear", "Cubic"])
