@@ -102,6 +102,7 @@ def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object)
         mesh.texspace_size = original.data.texspace_size
     item.pass_index, item.color = original.pass_index, original.color
     copy_properties((original,), item)
+    copy_properties((original.data,), item.data)  # which Attribute finds after those of the object
     name = original.name  # Object Info's Random is made of it
     original.name = "material_fit_original"
     item.name = name

@@ -165,6 +165,11 @@ def note_viewport(depsgraph: bpy.types.Depsgraph, findings: Findings) -> None:
                     f"Particles '{system.name}' of '{original.name}' are as the viewport shows them; Cycles may show "
                     "more. Set Viewport Display to Rendered and its Amount to 100 %."
                 )
+        if original.mode == "SCULPT" and (len(original.modifiers) or original.use_dynamic_topology_sculpting):
+            findings.note(
+                f"Object '{original.name}' is in Sculpt Mode, where its modifiers are not as in a render: leave Sculpt "
+                "Mode before the fit."
+            )
         for modifier in original.modifiers:
             if modifier.type == "NODES" and modifier.show_render and _asks_viewport(modifier.node_group):
                 findings.note(

@@ -193,6 +193,21 @@ def _screen(rig: Rig, draw: Draw) -> None:
     put_socket(rig.box, "Emission Strength", float(draw.uniform(1.0, 4.0)))
 
 
+def _dark_emission(owner: str) -> Callable[[Rig, Draw], None]:
+    """An Emission that takes light away, added to an object's shader."""
+
+    def put(rig: Rig, _: Draw) -> None:
+        item = getattr(rig, owner)
+        tree = item.data.materials[0].node_tree
+        glow, added = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeAddShader")
+        glow.inputs["Strength"].default_value = -0.4
+        tree.links.new(principled(item).outputs[0], added.inputs[0])
+        tree.links.new(glow.outputs[0], added.inputs[1])
+        tree.links.new(added.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+
+    return put
+
+
 def _below_zero(rig: Rig, _: Draw) -> None:
     """A world that takes light away, over lamps that give it."""
     node = next(node for node in rig.scene.world.node_tree.nodes if node.type == "BACKGROUND")
@@ -215,9 +230,12 @@ def _all() -> Iterator[Setting]:
         "shading language": _shading_language, "attribute of data": _attribute_of_data,
         "attribute of place": _attribute_of_place, "indices": _indices, "shown again": _shown_again,
         "shown words": _shown_words, "particles of a collection": _particles_of_a_collection, "leaves": _leaves,
-        "screen": _screen, "below zero": _below_zero, "sculpted": _sculpted,
-    }  # fmt: skip
+        "screen": _screen,     }  # fmt: skip
     yield from (Setting(name, put) for name, put in exported.items())
+    for owner in ("box", "target"):
+        yield Setting(f"dark emission of the {owner}", _dark_emission(owner), ("takes light away",))
+    yield Setting("below zero", _below_zero, ("takes light away",))
+    yield Setting("sculpted", _sculpted, ("Sculpt Mode",))
     yield Setting("grease pencil", _pencil, ("ease",))
     yield Setting("strands of nodes", _strands_of_nodes, ("Curves",))
     for kind in ("FORWARD_PATH_TRACING", "NEXT_EVENT_ESTIMATION"):

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from ...bake.lamp_layout import FAR, NEAR, Lookup, distances
 
+MOST_TAKEN = 1e-3  # of the light that is given; less is what filters leave in pictures
+
 Vector = NDArray[np.float64]
 
 
@@ -66,6 +68,12 @@ class Light:
     def sizes(self) -> tuple[float, float]:
         """Width and height of an area light in its own space."""
         return self.size_x, self.size_y if self.shape in ("RECTANGLE", "ELLIPSE") else self.size_x
+
+
+def takes_light(radiance: NDArray[np.floating]) -> bool:
+    """Whether numbers below zero, which Cycles takes for light and the fit does not, are more than rounding."""
+    given, taken = (float(part.sum(dtype=np.float64)) for part in (radiance.clip(0.0), -radiance.clip(max=0.0)))
+    return taken > MOST_TAKEN * given
 
 
 def point_intensity(light: Light) -> Vector:

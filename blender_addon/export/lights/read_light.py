@@ -60,7 +60,7 @@ def read_light(
     if power == 0.0 or color.max() == 0.0:
         return None
     name_settings(LIGHT_CYCLES, cycles, name, findings)
-    if links_light(evaluated):
+    if linked_light(evaluated):
         note_linking(name, findings)
     _note_rays(evaluated, hidden_from, findings)
     light = Light(
@@ -118,12 +118,12 @@ def _note_rays(evaluated: bpy.types.Object, hidden_from: Sequence[str], findings
         )
 
 
-def links_light(item: bpy.types.Object) -> bool:
-    """Whether what an object gives of light is for some objects alone, or is shadowed by some alone."""
+def linked_light(item: bpy.types.Object) -> str:
+    """The name of an object, if light that it gives is for some objects alone, or is shadowed by some alone."""
     linking = getattr(item, "light_linking", None)
-    return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
+    return item.name if linking is not None and (linking.receiver_collection or linking.blocker_collection) else ""
 
 
 def note_linking(name: str, findings: Findings) -> None:
-    """Name that the object of this name `links_light`."""
+    """Name the `linked_light` of the object of this name."""
     findings.note(f"Light linking of '{name}' is left out: it lights and shadows everything.")

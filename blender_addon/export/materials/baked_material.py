@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..findings import Findings
 from ..images.color_space import to_rec709
+from ..lights.light_model import takes_light
 from ..material_model import Material, Part, Socket, Texture
 from ..nodes.leaf_kinds import CONDUCTOR, KINDS, TRANSPARENT
 from .leaf_sockets import GLOSSY, HELD, conductor_colors, stretched
@@ -53,7 +54,7 @@ class Baked:
         leaves = self._answer["leaves"]
         weighted = [(self._weight(leaf["weight"]), self._leaf(leaf, name, findings)) for leaf in leaves]
         weighted = _normalised(weighted, name, findings)
-        emission = self._emission()
+        emission = self._emission(name, findings)
         if not weighted:
             return {identifier: Material(name, "emission" if emission else "diffuse", {"Base Color": BLACK} | emission)}
         if len(weighted) == 1:
@@ -112,10 +113,13 @@ class Baked:
             shader=leaf.get("shader", kind.shader),
         )
 
-    def _emission(self) -> dict[str, Socket]:
+    def _emission(self, name: str, findings: Findings) -> dict[str, Socket]:
         if "emission" not in self._answer:
             return {}
-        radiance = self._color(np.load(self._folder / self._answer["emission"]))
+        pixels = np.load(self._folder / self._answer["emission"])
+        if takes_light(pixels):
+            refuse_dark(name, findings)
+        radiance = self._color(pixels)
         if radiance.max() <= 0.0:
             return {}
         mean = [float(number) for number in radiance.mean(axis=(0, 1))]
@@ -164,6 +168,11 @@ class Baked:
         if self._answer["paths"]:
             asked = ", ".join(self._answer["paths"])
             findings.note(f"Material '{name}' asks Light Path for {asked}: the fit has it as diffuse rays see it.")
+
+
+def refuse_dark(name: str, findings: Findings) -> None:
+    """An error for a material of this name whose emission is negative."""
+    findings.error(f"Material '{name}' takes light away (negative emission): make it positive.")
 
 
 def _picture(values: NDArray[np.float64]) -> Texture | None:

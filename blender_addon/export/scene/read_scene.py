@@ -24,8 +24,10 @@ from ..camera.render_region import Size
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings, Fix
 from ..fitted_slot import FittedSlot
-from ..lights.read_light import links_light, note_linking, read_light
+from ..lights.light_model import takes_light
+from ..lights.read_light import linked_light, note_linking, read_light
 from ..material_model import Material, grey
+from ..materials.baked_material import refuse_dark
 from ..materials.read_context import needs_bake, read_context
 from ..materials.read_material import name_material_settings, read_target
 from ..materials.unfinite_pixels import refuse_unfinite_pixels
@@ -171,6 +173,9 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
     """Put what `bakes` was asked for into the scene, and look whether there is light."""
     if bakes is not None:
         bakes.finish(data, findings)
+    for material in data.materials.values():
+        if any(leaf.model == "emission" and takes_light(leaf.emission) for leaf in (material, *material.leaves)):
+            refuse_dark(material.name, findings)
     for shape in data.emitting:
         if shape.linked:
             note_linking(shape.linked, findings)
@@ -258,9 +263,8 @@ class _Walk:
                         f"Some instances of '{each.object.name}' cast shadows and others do not; in the fit all are as "
                         "the first of them."
                     )
-                linked = self._linked(each.object)
-                made = Shape(names[0], NOT_PLACED, names[1], terminator, shadows[0], body=body, linked=linked)
-                self.data.shapes.insert(0, made)
+                made = Shape(names[0], NOT_PLACED, names[1], terminator, shadows[0], body=body)
+                self.data.shapes.insert(0, replace(made, linked=linked_light(each.object)))
 
     def pieces_of(self, shape: str) -> list[Piece]:
         """What a shape of the scene consists of."""
@@ -346,12 +350,8 @@ class _Walk:
                 self._note_generated(item, slot)
                 if self.bakes is not None:
                     bsdf = self.bakes.ask_surface(self.data, name, Surface(instance, slot, piece), self.findings)
-            linked = self._linked(item)
+            linked = linked_light(item)
             self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body, linked))
-
-    def _linked(self, item: bpy.types.Object) -> str:
-        """The name of an object that lights or shadows some objects alone, if it gives light."""
-        return item.name if links_light(item) else ""
 
     def _body(self, bsdfs: dict[int, str]) -> int:
         """The number of an object of several shapes that light goes through below the surface, else 0."""

@@ -17,6 +17,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..images.image_filter import equirectangular_pixels
 from ..images.image_pixels import UnreadableImageError
+from ..lights.light_model import takes_light
 from ..nodes.dependence import turns_with_camera
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
@@ -58,7 +59,7 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bake
     visibility = getattr(world, "cycles_visibility", None)
     camera = visibility is None or visibility.camera
     try:
-        return replace(_background(node, exposure), camera=camera)
+        return replace(_background(node, exposure, world.name, findings), camera=camera)
     except UnsupportedNodeError as problem:
         findings.note(f"World '{world.name}' uses {problem}: Cycles renders it into a panorama for the fit.")
         turning = turns_with_camera(tree)
@@ -72,21 +73,31 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bake
         return replace(UNKNOWN, camera=camera)
 
 
-def _background(node: bpy.types.Node, exposure: float) -> World:
+def refuse_negative(name: str, radiance: NDArray[np.floating], findings: Findings) -> None:
+    """An error where a world of this name takes light away."""
+    if takes_light(radiance):
+        findings.error(f"World '{name}' takes light away (negative strength or colour): make it positive.")
+
+
+def _background(node: bpy.types.Node, exposure: float, name: str, findings: Findings) -> World:
     if node.bl_idname not in ("ShaderNodeBackground", "ShaderNodeEmission"):
         raise UnsupportedNodeError(f"the node '{node.name}' ({node.bl_label})")
     strength = read_socket(node.inputs["Strength"])
     if strength.texture is not None:
         raise UnsupportedNodeError("a picture on Strength")
+    refuse_negative(name, np.array([float(strength.value)]), findings)
     scale = max(float(strength.value), 0.0) * exposure
     source = source_of(node.inputs["Color"])
     if source is not None and source.node.bl_idname == "ShaderNodeTexEnvironment":
         pixels, lookup = _environment(source.node)
+        refuse_negative(name, pixels, findings)
         return World(np.full(3, scale), pixels, lookup)
     color = read_socket(node.inputs["Color"])
     if color.texture is not None:
         raise UnsupportedNodeError("an Image Texture instead of an Environment Texture")
-    return World(np.asarray(color.value, dtype=np.float64).clip(0.0) * scale)
+    constant = np.asarray(color.value, dtype=np.float64)
+    refuse_negative(name, constant, findings)
+    return World(constant.clip(0.0) * scale)
 
 
 def _environment(node: bpy.types.Node) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:

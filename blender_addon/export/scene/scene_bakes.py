@@ -38,6 +38,7 @@ from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
 from .ray_visibility import shown_by
+from .read_world import refuse_negative
 from .scene_data import SceneData
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
@@ -237,8 +238,9 @@ class SceneBakes:
         exposure = data.settings.exposure
 
         def picture(name: str) -> NDArray[np.float32]:
-            radiance = to_rec709(np.load(folder / name)).clip(0.0) * exposure
-            return np.ascontiguousarray(radiance, dtype=np.float32)
+            radiance = to_rec709(np.load(folder / name))
+            refuse_negative(world.name, radiance, findings)
+            return np.ascontiguousarray(radiance.clip(0.0) * exposure, dtype=np.float32)
 
         light = picture(answer["light"])
         suns = [
