@@ -17,7 +17,6 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..images.image_filter import equirectangular_pixels
 from ..images.image_pixels import UnreadableImageError
-from ..lights.light_model import takes_light
 from ..nodes.dependence import turns_with_camera
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
@@ -27,7 +26,7 @@ from ..nodes.shader_graph import (
     source_of,
     surface_of,
 )
-from .world_model import World, resample
+from .world_model import World, refuse_negative, resample
 
 if TYPE_CHECKING:
     from .scene_bakes import SceneBakes
@@ -71,12 +70,6 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bake
         if bakes is not None:
             bakes.ask_world(world, findings)
         return replace(UNKNOWN, camera=camera)
-
-
-def refuse_negative(name: str, radiance: NDArray[np.floating], findings: Findings) -> None:
-    """An error where a world of this name takes light away."""
-    if takes_light(radiance):
-        findings.error(f"World '{name}' takes light away (negative strength or colour): make it positive.")
 
 
 def _background(node: bpy.types.Node, exposure: float, name: str, findings: Findings) -> World:

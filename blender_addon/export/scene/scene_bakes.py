@@ -38,8 +38,8 @@ from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
 from .ray_visibility import shown_by
-from .read_world import refuse_negative
 from .scene_data import SceneData
+from .world_model import refuse_negative
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
 # of one object whose instances have each something of their own, or bent normals and other proportions or sizes; what
