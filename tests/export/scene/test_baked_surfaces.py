@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.export.findings import Findings
+from blender_addon.export.materials.baked_material import Baked
 from blender_addon.export.scene import scene_bakes
 from mfo_backend.scene.image_file import read_image
 
@@ -332,6 +334,14 @@ def test_glow_of_any_tree_is_emission(stage: Any, export: Any) -> None:
     found = at_vertices(texture(report, bsdf, "Emission Color"), uv)
     assert np.sqrt(np.mean((found - 3.0 * (0.5 * positions + 0.5)) ** 2)) < 0.03
     assert report.request["materials"][bsdf]["sockets"]["Emission Strength"]["value"] == 1.0
+
+
+def test_glow_below_zero_is_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "glow.npy", np.full((4, 4, 3), -0.4, np.float32))
+    nothing = dict.fromkeys(("leaves", "view", "around", "sides", "left_out", "paths"), ())
+    findings = Findings()
+    Baked({**nothing, "emission": "glow.npy"}, tmp_path).materials("baked_0001", "Lamp", findings)
+    assert findings.errors == ["Material 'Lamp' takes light away (negative emission): make it positive."]
 
 
 def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(

@@ -53,27 +53,39 @@ def test_a_planted_difference_is_minimised_to_its_cause(monkeypatch: pytest.Monk
     assert minimised(outcome, SEED, tmp_path, size=32, samples=32).settings == ("lamp energy",)
 
 
+def test_what_shows_objects_is_as_in_cycles(tmp_path) -> None:
+    """Each of these alone was 0.3 to 467 % beside Cycles, a block at 8 deviations or more, and nothing was said."""
+    from studies.differential.study import try_scene
+
+    shown = ("instancer without shadow", "lamp indirect only", "ocean", "few hairs in the viewport", "children")
+    outcome = try_scene((*shown, "attribute of data"), SEED, tmp_path, size=32, samples=64)
+    assert outcome.difference is not None
+    assert not outcome.difference.is_failure
+
+
 @pytest.mark.parametrize(
     "name",
     [
-        "instancer without shadow",
         "instancer a holdout",
         "instancer a catcher",
-        "lamp's instancer hidden from camera",
+        "instancer hidden from diffuse",
         "lamp's instancer hidden from diffuse",
-        "lamp indirect only",
         "mesh light linking",
         "mesh shadow linking",
-        "ocean",
         "is viewport",
-        "few hairs in the viewport",
-        "children",
+        "few particles in the viewport",
+        "sculpted",
+        "below zero",
+        "dark emission of the target",
     ],
 )
-def test_what_shows_an_object_is_as_in_cycles_or_named(name: str, tmp_path) -> None:
-    """Each was 0.3 to 467 % beside Cycles, a block at 8 deviations or more, and nothing was said."""
-    from studies.differential.study import try_scene
+def test_what_the_fit_has_not_is_named(name: str, tmp_path) -> None:
+    """Each was beside Cycles by up to 223 %, and nothing was said; those that take light away are refused."""
+    import bpy
 
-    outcome = try_scene([name], SEED, tmp_path, size=32, samples=64)
-    assert not outcome.refusal
-    assert not outcome.is_silent
+    from blender_addon.export.job import check_export
+    from studies.differential.random_scene import WORDS, build
+
+    rig = build([name], SEED, tmp_path, size=32, samples=1)
+    errors, notes = check_export(bpy.context, rig.target)
+    assert any(word in sentence for word in WORDS[name] for sentence in (*errors, *notes))
