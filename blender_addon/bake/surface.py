@@ -28,7 +28,7 @@ from .unwrap import unwrapped
 
 Pixels = NDArray[np.float32]
 
-UV_MAP, TANGENT = "material_fit", "material_fit_tangent"
+UV_MAP, TANGENT, NO_MAP = "material_fit", "material_fit_tangent", "material_fit_none"
 MARGIN = 8  # texels around islands that take the colour beside them
 SAMPLES = 4  # a texel, so that fine patterns are averaged
 MOST_UV_MAPS = 8  # of a mesh
@@ -153,6 +153,8 @@ def _stage(
             uv = unwrapped(mesh, np.clip(faces, 0, last) == slot, stage.scene)
             while len(mesh.uv_layers) >= MOST_UV_MAPS:
                 mesh.uv_layers.remove(next(layer for layer in reversed(mesh.uv_layers) if not layer.active_render))
+            if not len(mesh.uv_layers):  # without one nodes have zero for UV, and not the map of the bake
+                mesh.uv_layers.new(name=NO_MAP, do_init=False).active_render = True
             layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
             layer.uv.foreach_set("vector", uv.reshape(-1))
             mesh.uv_layers.active = layer

@@ -18,6 +18,7 @@ from .artist_settings import ARTIST_SETTINGS
 from .light_settings import LIGHT_SETTINGS
 from .material_settings import MATERIAL_SETTINGS
 from .owner_settings import OWNER_SETTINGS
+from .picture_settings import PICTURE_SETTINGS
 from .render_settings import RENDER_SETTINGS
 from .rig import Draw, Rig, Setting, background, principled, put_socket
 from .shape_settings import SHAPE_SETTINGS
@@ -323,7 +324,7 @@ SETTINGS: tuple[Setting, ...] = (
 GROUPS = {
     "plain": SETTINGS, "artist": ARTIST_SETTINGS,
     "material": MATERIAL_SETTINGS, "light": LIGHT_SETTINGS, "shape": SHAPE_SETTINGS, "owner": OWNER_SETTINGS,
-    "render": RENDER_SETTINGS,
+    "render": RENDER_SETTINGS, "picture": PICTURE_SETTINGS,
 }  # fmt: skip
 SETTINGS = tuple(setting for group in GROUPS.values() for setting in group)
 # of what the plain scene has at times, and of what two settings make together

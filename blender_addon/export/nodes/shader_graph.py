@@ -269,6 +269,8 @@ def _uv_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
             raise UnsupportedNodeError(f"the Mapping before '{node.name}' without a texture coordinate")
     if source is None:
         return matrix
+    if getattr(source.node, "from_instancer", False):
+        raise UnsupportedNodeError(f"the coordinate of the instancer of the node '{source.node.name}'")
     if source.node.bl_idname == "ShaderNodeTexCoord" and source.name == "UV":
         return matrix
     if source.node.bl_idname == "ShaderNodeUVMap" and not source.node.uv_map:

@@ -34,6 +34,7 @@ SCENE = {
     "the Mapping node '{}' of type Normal": "le nœud Mapping '{}' de type Normal",
     "the Mapping node '{}' with a rotation about X or Y": "le nœud Mapping '{}' avec une rotation autour de X ou Y",
     "the Mapping node '{}' without a texture coordinate": "le nœud Mapping '{}' sans coordonnée de texture",
+    "the coordinate of the instancer of the node '{}'": "la coordonnée de l'instanceur du nœud '{}'",
     "the coordinate '{}' of the node '{}'": "la coordonnée '{}' du nœud '{}'",
     "the image '{}' that {}": "l'image '{}' qui {}",
     "the image '{}' with changes that are not saved (save or pack it)": "l'image '{}' avec des changements non enregistrés (l'enregistrer ou l'empaqueter)",

@@ -34,6 +34,7 @@ SCENE = {
     "the Mapping node '{}' of type Normal": "der Mapping-Node '{}' vom Typ Normal",
     "the Mapping node '{}' with a rotation about X or Y": "der Mapping-Node '{}' mit einer Drehung um X oder Y",
     "the Mapping node '{}' without a texture coordinate": "der Mapping-Node '{}' ohne eine Texturkoordinate",
+    "the coordinate of the instancer of the node '{}'": "die Koordinate des Instanzgebers am Node '{}'",
     "the coordinate '{}' of the node '{}'": "die Koordinate '{}' des Nodes '{}'",
     "the image '{}' that {}": "das Bild '{}', das: {}",
     "the image '{}' with changes that are not saved (save or pack it)": "das Bild '{}' mit Änderungen, die nicht gespeichert sind (es speichern oder packen)",

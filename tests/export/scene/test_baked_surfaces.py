@@ -91,7 +91,9 @@ def texture(report: Any, bsdf: str, socket: str) -> np.ndarray:
 
 
 def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
-    target, _, nodes = stage
+    target, ball, nodes = stage
+    ball.data.uv_layers.remove(ball.data.uv_layers[0])  # without a map UV is zero, and not that of the bake
+    nodes.tree.links.new(nodes.new("TexCoord").outputs["UV"], nodes.principled.inputs["Sheen Tint"])
     place = nodes.place()
     apart, bump = nodes.new("SeparateXYZ"), nodes.new("Bump")
     nodes.tree.links.new(place, apart.inputs[0])
@@ -110,6 +112,7 @@ def test_sockets_hold_what_their_nodes_say(stage: Any, export: Any) -> None:
     sockets = report.request["materials"][bsdf]["sockets"]
     luminance = 0.2126 * 0.1 + 0.7152 * 0.2 + 0.0722 * 0.9
     assert sockets["Coat Weight"]["value"] == pytest.approx(luminance, abs=1e-3)
+    assert sockets["Sheen Tint"]["value"] == [0.0, 0.0, 0.0]
     grey = np.repeat(expected[:, :1], 3, axis=1)
     for socket, values in (
         ("Base Color", expected),
