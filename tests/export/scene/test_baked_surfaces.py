@@ -152,7 +152,9 @@ def test_instances_have_each_what_is_theirs(
     monkeypatch.setattr(scene_bakes, "MOST_PLACES", 2)
     target, ball, nodes = stage
     apart, shown, glow = nodes.new("SeparateXYZ"), nodes.new("CombineColor"), nodes.new("Emission")
-    nodes.tree.links.new(nodes.place(), apart.inputs[0])
+    place = nodes.place()
+    place.node.inputs[1].default_value = (0.25, 0.25, 0.25)  # above zero on all instances
+    nodes.tree.links.new(place, apart.inputs[0])
     nodes.tree.links.new(apart.outputs[0], shown.inputs[0])
     nodes.tree.links.new(nodes.new("ObjectInfo").outputs["Random"], shown.inputs[1])
     told = nodes.new("Attribute")
@@ -186,7 +188,7 @@ def test_instances_have_each_what_is_theirs(
             found.append((bsdf, picture[row, column], positions, color))
     assert [bsdf for bsdf, *_ in found] == ["baked_0001", "baked_0002", "baked_0001"]
     for _, seen, positions, color in found[:2]:
-        assert np.sqrt(np.mean((color[:, 0] - (0.5 * positions[:, 0] + 0.5).clip(0.0)) ** 2)) < 0.01
+        assert np.sqrt(np.mean((color[:, 0] - 0.25 * positions[:, 0] - 0.5) ** 2)) < 0.01
         np.testing.assert_allclose(color[:, 1], seen[1], atol=2e-3)
     assert abs(found[0][1][1] - found[1][1][1]) > 0.01  # the numbers of two instances differ
     shared = "may differ between the 2 instances of 'Ball'; all have the bake of the first."
