@@ -8,6 +8,8 @@ from typing import Any
 import bpy
 import pytest
 
+from blender_addon.export.render_state import RENDER_TWINS
+
 from .rna_walk import TYPES, cycles_owners, unknown
 from .scenes import add_camera, add_light, add_quad, new_material, world_color
 
@@ -28,6 +30,18 @@ def test_named_properties_are_neutral_at_first(scene: Any) -> None:
     for owner, table in [*owners, *cycles_owners().values()]:
         for key, rule in table.named.items():
             assert getattr(owner, key, rule.neutral) == rule.neutral, key
+
+
+def test_modifiers_that_differ_between_viewport_and_render_are_known(scene: Any) -> None:
+    kinds = [getattr(bpy.types, name) for name in dir(bpy.types)]
+    found = {
+        prop.identifier
+        for kind in kinds
+        if isinstance(kind, type) and issubclass(kind, bpy.types.Modifier)
+        for prop in kind.bl_rna.properties
+        if "render" in prop.identifier or "viewport" in prop.identifier
+    }
+    assert found - {"show_render", "show_viewport"} <= {name for pair in RENDER_TWINS.values() for name in pair}
 
 
 def ball(scene: Any) -> Any:

@@ -9,7 +9,10 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.bake.lamp import _by_distance
+from blender_addon.bake.lamp_layout import distances
 from blender_addon.export.job import check_export
+from blender_addon.probe.server import ProbeRequestError
 from studies.parity import lamp_nodes
 from studies.parity.light_scene import NODES, add_light
 
@@ -119,6 +122,20 @@ def test_light_that_is_no_product_of_direction_and_distance_is_refused(scene: An
         "The nodes of light 'Light' could not be measured by Cycles: Their light changes with the distance in another "
         "way in each direction."
     )
+
+
+def test_places_of_a_lamp_that_fall_otherwise_are_refused() -> None:
+    """A texture times a falloff, of which a fifth lies at edges; then one that fades into another with the distance."""
+    steps = distances()
+    texture = np.linspace(0.2, 1.0, 16)[:, None, None] * np.ones(3)
+    fall = (steps / (1.0 + steps))[None, :, None]
+    at_edges = texture * np.where(np.arange(16)[:, None, None] < 3, np.where(steps > 1.0, 0.5, 1.0)[None, :, None], 1.0)
+    found, distance = _by_distance(at_edges * fall, steps, of_places=True)
+    assert distance == pytest.approx(1.0, rel=0.01)
+    np.testing.assert_allclose(found[:, 0] / found[-1, 0], fall[0, :, 0] / fall[0, -1, 0], rtol=1e-6)
+    mixed = texture * fall + texture[::-1] * (1.0 - fall)
+    with pytest.raises(ProbeRequestError, match="at each place of the lamp"):
+        _by_distance(mixed, steps, of_places=True)
 
 
 def test_light_below_zero_is_refused(scene: Any, export: Any) -> None:
