@@ -21,7 +21,8 @@ def _instancer(rig: Rig, *, scale: tuple[float, float, float] = (0.7, 0.7, 0.7))
     made.objects.link(other)
     empty = bpy.data.objects.new("Instancer", None)
     empty.instance_type, empty.instance_collection = "COLLECTION", made
-    empty.location, empty.scale = (1.5, -1.0, 0.4), scale
+    others = sum(item.name.startswith("Instancer") for item in rig.scene.objects)  # not in one place with those
+    empty.location, empty.scale = (1.5 - 0.13 * others, -1.0 - 0.41 * others, 0.4 + 0.07 * others), scale
     rig.scene.collection.objects.link(empty)
     return empty
 
