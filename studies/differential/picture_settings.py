@@ -89,7 +89,7 @@ def _numbers(owner: str) -> Callable[[Rig, Draw], None]:
                 made.inputs[1].default_value = float(draw.uniform(0.2, 1.5))
             tree.links.new(last, made.inputs[1 if kind == "Invert" else 0])
             last = made.outputs[int(draw.integers(len(made.outputs)))]
-        socket = str(draw.choice(["Base Color", "Roughness", "Metallic", "Alpha", "Coat Weight", "Specular IOR Level"]))
+        socket = str(draw.choice(["Base Color", "Roughness", "Metallic", "Alpha", "Coat Weight"]))
         tree.links.new(last, shader.inputs[socket])
 
     return put

@@ -28,3 +28,9 @@ def srgb_to_linear(values: NDArray[np.float32]) -> NDArray[np.float32]:
     low = values / 12.92
     high = ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(values <= 0.04045, low, high).astype(np.float32)
+
+
+def linear_to_srgb(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Encode as sRGB display values, also above 1; the inverse of `srgb_to_linear`."""
+    high = 1.055 * np.maximum(values, 0.0031308) ** (1.0 / 2.4) - 0.055
+    return np.where(values <= 0.0031308, 12.92 * values, high).astype(np.float32)

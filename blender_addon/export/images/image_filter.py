@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of textures between their pixels, as Cycles interpolates them, on a finer grid that Mitsuba can read.
 
-Cycles filters 8-bit sRGB pictures before it decodes them (kernel/svm/image.h), times their alpha, by which it divides
+Cycles filters sRGB pictures before it decodes them (kernel/svm/image.h), times their alpha, by which it divides
 again where the node's Alpha is linked (scene/shader_nodes.cpp, ImageTextureNode), and has a cubic B-spline. Mitsuba
 interpolates linearly what it is given. So the picture is filtered here, between its pixels, as finely as is affordable.
 """
@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .color_space import srgb_to_linear
+from .color_space import linear_to_srgb, srgb_to_linear
 from .image_pixels import SRGB_NAMES, is_data, read_encoded, read_pixels
 
 MOST_PIXELS = 1 << 22  # of a finer grid; 2048 squared, 50 MB of colours
@@ -31,8 +31,12 @@ def filtered_pixels(image: bpy.types.Image, interpolation: str, wrap: str, *, al
     UnreadableImageError
         If the image cannot be read.
     """
-    encoded = not image.is_float and not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
-    pixels = read_encoded(image) if encoded else read_pixels(image)
+    encoded = not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
+    pixels = read_encoded(image) if encoded and not image.is_float else read_pixels(image)
+    if encoded and image.is_float:  # of which Blender keeps linear numbers; with alpha they are taken as they are
+        encoded = bool((pixels[:, :, 3] == 1.0).all())
+        if encoded:
+            pixels[:, :, :3] = linear_to_srgb(pixels[:, :, :3])
     pixels = _with_alpha(image, pixels, alpha_read)
     divided = alpha_read and interpolation != "Closest" and _is_multiplied(image, pixels)
     if divided:
