@@ -77,21 +77,21 @@ def test_a_normal_map_on_instances_of_other_sizes_shares_a_bake_and_on_stretched
     target, ball, nodes = stage
     bent = nodes.new("NormalMap")
     bent.inputs["Color"].default_value = (0.7, 0.5, 0.9, 1.0)
-    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    nodes.tree.links.new(nodes.new("TexCoord").outputs["Generated"], nodes.principled.inputs["Base Color"])
     nodes.tree.links.new(bent.outputs[0], nodes.principled.inputs["Normal"])
     _instances(ball, (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (1.0, 2.0, 1.0), (-1.0, 1.0, 1.0))
     assert _references(export(target)) == ["baked_0001", "baked_0001", "baked_0002", "baked_0003"]
 
 
 def test_bumps_on_instances_of_many_sizes_are_baked_for_some_and_named(stage: Any, export: Any) -> None:
-    from blender_addon.export.scene.scene_bakes import MOST_SCALES
+    from blender_addon.export.scene.scene_bakes import MOST_PLACES
 
     target, ball, nodes = stage
     _bump(nodes)
-    _instances(ball, *((0.5 + 0.1 * number,) * 3 for number in range(MOST_SCALES + 2)))
+    _instances(ball, *((0.5 + 0.1 * number,) * 3 for number in range(MOST_PLACES + 2)))
     report = export(target)
-    assert _references(report) == [f"baked_{number + 1:04d}" for number in range(MOST_SCALES)] + ["baked_0001"] * 2
-    said = f"beyond {MOST_SCALES} sizes all have those of the first."
+    assert _references(report) == [f"baked_{number + 1:04d}" for number in range(MOST_PLACES)] + ["baked_0001"] * 2
+    said = f"beyond {MOST_PLACES} sizes all have those of the first."
     assert [said in note for note in report.notes].count(True) == 1
 
 
