@@ -112,11 +112,12 @@ NODES: dict[str, Lights] = {
     "blinds, point, sphere": [("POINT", {**_POINT, "use_soft_falloff": False, "nodes": lamp_nodes.blinds})],
     "softbox, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.softbox})],
     "softbox, ellipse, spread 90°": [("AREA", {**_ROUND, "spread": 1.57, "nodes": lamp_nodes.softbox})],
-    "falling checks, rectangle": [("AREA", {**_WIDE, "nodes": lamp_nodes.falling_checks})],
     "gobo by UV, area, spread 0°": [("AREA", {**_WIDE, "spread": 0.0, "nodes": lamp_nodes.gobo("UV")})],
     "checks by Object, area": [("AREA", {**_WIDE, "nodes": lamp_nodes.by_place})],
 }
 SHINY |= {f"nodes: {name}": NODES[name] for name in ("IES, area", "softbox, area", "blinds, point, sphere")}
+# a light of nodes that has no row in the table of `light_parity`
+FALLING: Lights = [("AREA", {**_WIDE, "nodes": lamp_nodes.falling_checks})]
 FLOORS = {"matt": MATT, "nodes": NODES, "shiny": SHINY}
 
 

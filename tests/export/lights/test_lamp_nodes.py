@@ -14,7 +14,7 @@ from blender_addon.bake.lamp_layout import distances
 from blender_addon.export.job import check_export
 from blender_addon.probe.server import ProbeRequestError
 from studies.parity import lamp_nodes
-from studies.parity.light_scene import NODES, add_light
+from studies.parity.light_scene import FALLING, NODES, add_light
 
 from ..scene.test_light_levels import floor, tiles
 
@@ -34,7 +34,7 @@ KINDS = (
 @pytest.mark.parametrize("kind", KINDS)
 def test_nodes_shine_as_in_cycles(kind: str, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
     target = floor()
-    for lamp, settings in NODES[kind]:
+    for lamp, settings in (NODES | {"falling checks, rectangle": FALLING})[kind]:
         add_light(lamp, **settings)
     scene.cycles.samples = 256
     report = export(target)
