@@ -22,19 +22,22 @@ shading frame, dp/du of the UV map.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from ...types.errors import SetupError
 from ...types.parameter import Value
-from ..cycles_model import cycles_model
+from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
 from ..principled.bumped_normals import valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
-from ..principled.needed_lobes import needed_lobes
+from ..principled.needed_lobes import Lobes, needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
 from ..principled.random_walk import Below
 
@@ -91,6 +94,7 @@ class BlenderPrincipled(mi.BSDF):
             setattr(self, item.name, value)
         self.directions = {name: props[name] for name in DIRECTIONS if name in props}
         self.fixed = fixed
+        self._row: NDArray[np.float32] | None = None
         self._choose_lobes()
         # A lobe that is left out keeps its literal values, which the compiler removes
         for item in BLENDER_PRINCIPLED:
@@ -118,11 +122,7 @@ class BlenderPrincipled(mi.BSDF):
             flags |= flag
         self.m_flags = flags
         # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
-        above = mi.Vector3f(0, 0, 1)
-        for index in (mi.Float(1.5), dr.opaque(mi.Float, 1.5)):  # known and unknown ones read other tables
-            indices = {"ior": index, "coat_ior": index, "specular_ior_level": index}
-            evaluate(layer_stack(indices, above, self.lobes, self.model), above)
-            evaluate(layer_stack({"ior": index, "coat_ior": index}, above, self.lobes, self.model), above)
+        _load_tables(self.lobes, self.model)
 
     def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Show every value; those of lobes that are left out too, so that a caller can set them."""
@@ -139,6 +139,7 @@ class BlenderPrincipled(mi.BSDF):
             self._choose_lobes()
         for name in changed:
             dr.make_opaque(getattr(self, name))
+        self._row = None
 
     def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
         """What alpha, sheen and coat leave of the surface's own light towards `si.wi`, perhaps to a light sample."""
@@ -170,6 +171,25 @@ class BlenderPrincipled(mi.BSDF):
     def below(self, si: mi.SurfaceInteraction3f, active: Any) -> Below | None:
         """What the view finds below a surface point; None of a material without."""
         return self._layers(si, active).layers.below
+
+    @property
+    def opened(self) -> tuple[str, ...]:
+        """Names of the values that are no part of the traced code."""
+        return tuple(item.name for item in BLENDER_PRINCIPLED if item.name in self.given or item.name in self.free)
+
+    @property
+    def kind(self) -> tuple[Any, ...] | None:
+        """What is traced: two materials of one kind differ in the values that are `opened`; None with textures."""
+        if self.directions or None in self.fixed.values():
+            return None
+        return (self.lobes, self.model, self.filtered, self.walks, self.reachable_only, self.opened)
+
+    @property
+    def row(self) -> NDArray[np.float32]:
+        """The values that are `opened`, one after the other."""
+        if self._row is None:
+            self._row = np.concatenate([np.ravel(getattr(self, name)) for name in self.opened])
+        return self._row
 
     def picture_of(self, name: str) -> Any:
         """The texture of a parameter or a direction that has one."""
@@ -269,10 +289,10 @@ class BlenderPrincipled(mi.BSDF):
         return dr.select(active, self._density(layers, self._choice(ctx, layers), surface.to_local(wo)), 0)
 
     def eval_pdf(
-        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True, **instead: Any
     ) -> tuple[Any, Any]:
-        """`eval` and `pdf`, the layers evaluated once."""
-        surface = self._layers(si, active)
+        """`eval` and `pdf`, the layers evaluated once; with the values of another material of this `kind` `instead`."""
+        surface = self._layers(si, active, **instead)
         layers, local = surface.layers, surface.to_local(wo)
         density = self._density(layers, self._choice(ctx, layers), local)
         return dr.select(active, self._value(layers, local), 0), dr.select(active, density, 0)
@@ -284,9 +304,13 @@ class BlenderPrincipled(mi.BSDF):
         sample1: Any,
         sample2: mi.Point2f,
         active: Any = True,
+        **instead: Any,
     ) -> tuple[mi.BSDFSample3f, Any]:
-        """A direction of any lobe and value over density; straight through with probability 1 - alpha."""
-        surface = self._layers(si, active)
+        """A direction of any lobe and value over density; straight through with probability 1 - alpha.
+
+        With the values of another material of this `kind` `instead`.
+        """
+        surface = self._layers(si, active, **instead)
         layers = surface.layers
         choice = self._choice(ctx, layers)
         local, lobe, valid = sample(layers, choice, sample1, sample2)
@@ -339,6 +363,16 @@ def _towards(view: mi.Vector3f, si: mi.SurfaceInteraction3f) -> mi.Vector3f:
     """The mesh's geometric normal on the side of the view."""
     geometric = mi.Vector3f(si.n)
     return dr.select(dr.dot(geometric, view) < 0, -geometric, geometric)
+
+
+@cache
+def _load_tables(lobes: Lobes, model: CyclesModel) -> None:
+    """Read the tables that these lobes look into."""
+    above = mi.Vector3f(0, 0, 1)
+    for index in (mi.Float(1.5), dr.opaque(mi.Float, 1.5)):  # known and unknown ones read other tables
+        indices = {"ior": index, "coat_ior": index, "specular_ior_level": index}
+        evaluate(layer_stack(indices, above, lobes, model), above)
+        evaluate(layer_stack({"ior": index, "coat_ior": index}, above, lobes, model), above)
 
 
 def register() -> None:

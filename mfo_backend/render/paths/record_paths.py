@@ -25,6 +25,7 @@ from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..random_numbers.even_points import even_points
 from ..transport.camera_view import CameraView
+from ..transport.material_kinds import MaterialKinds
 from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
@@ -340,7 +341,7 @@ def _over_others(
     si = hits.si
     before = None
     if settings.light_paths is not None:
-        value, likely = si.bsdf().eval_pdf(mi.BSDFContext(), si, wo)
+        value, likely = MaterialKinds(scene).eval_pdf(si.bsdf(), mi.BSDFContext(), si, wo, mi.Bool(True))
         before = (likely, value / dr.maximum(likely, 1e-12))
     sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
     ray = starts.ray(si, si.to_world(wo))

@@ -24,6 +24,7 @@ from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside
 from .camera_view import CameraView
+from .material_kinds import MaterialKinds
 from .shadow_rays import ShadowRays, sample_light
 from .smooth_facets import leaves_on, met_light, seen_side
 
@@ -74,7 +75,7 @@ class CyclesPath(RBIntegrator):
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
         terminator, view, absorption = shadows.terminator, CameraView(scene), shadows.absorption
-        context = mi.BSDFContext()
+        context, materials = mi.BSDFContext(), MaterialKinds(scene) if primal else None
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
         change = mi.Spectrum(0 if δL is None else δL)
@@ -144,7 +145,9 @@ class CyclesPath(RBIntegrator):
             goes_on = goes_on if shadows.lets_through else scatters
             on_light = sampler.next_2d()
             if dr.hint(every_lamp, mode="scalar"):
-                direct = throughput * of_lamps(scene, shadows, si, on_light, scatters, bounce == 0, passages, inside)
+                direct = throughput * of_lamps(
+                    scene, shadows, materials, si, on_light, scatters, bounce == 0, passages, inside
+                )
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
             else:
                 ds, light, _, ways = sample_light(scene, shadows, si, on_light, scatters, None, passages, inside)
@@ -154,12 +157,19 @@ class CyclesPath(RBIntegrator):
                 with dr.resume_grad(when=not primal):
                     if dr.hint(absorption, mode="scalar"):
                         light *= absorption.left(ways)
-                    value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+                    if dr.hint(primal, mode="scalar"):
+                        value, chance = materials.eval_pdf(bsdf, context, si, si.to_local(ds.d), lit)
+                    else:
+                        value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
                     weight = dr.detach(share(alone(ds), ds.pdf, chance))
                     direct = dr.select(lit, throughput * value * light * weight, 0)
                     direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
 
-            bs, ratio = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), goes_on)
+            u1, u2 = sampler.next_1d(), sampler.next_2d()
+            if dr.hint(primal, mode="scalar"):
+                bs, ratio = materials.sample(bsdf, context, si, u1, u2, goes_on)
+            else:
+                bs, ratio = bsdf.sample(context, si, u1, u2, goes_on)
             if dr.hint(terminator.bends, mode="scalar"):
                 ratio *= terminator.bend(si, bs.wo, goes_on)
             onward = shadows.starts.ray(si, si.to_world(bs.wo))
@@ -215,6 +225,7 @@ class CyclesPath(RBIntegrator):
 def of_lamps(
     scene: mi.Scene,
     shadows: ShadowRays,
+    materials: MaterialKinds,
     si: mi.SurfaceInteraction3f,
     on_light: mi.Point2f,
     active: mi.Bool,
@@ -236,7 +247,7 @@ def of_lamps(
         light *= weight * shadows.left(shadows.passed(si, ds, lit, None, passages, inside))
         if dr.hint(shadows.terminator.bends, mode="scalar"):
             light *= shadows.terminator.bend(si, si.to_local(ds.d), lit)
-        value, _ = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+        value, _ = materials.eval_pdf(bsdf, context, si, si.to_local(ds.d), lit)
         total += dr.select(lit, value * light, 0)
         number += 1
     return total
