@@ -331,7 +331,9 @@ def _file_problem(given: str) -> str:
 def _promised_file(given: str) -> tuple[Path, PictureHeader]:
     path, header = chosen_file(given)
     if header is None:
-        raise ExportError(f"The reference {path.name} holds no picture its name promises: choose another file.")
+        raise ExportError(
+            f"The reference '{path.name}' holds no picture of the kind that its name says: choose another file."
+        )
     return path, header
 
 

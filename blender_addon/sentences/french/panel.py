@@ -66,7 +66,7 @@ PANEL = {
     "The reference {} is empty: wait until it is written, or choose another file.": "La référence {} est vide : attendre qu'elle soit écrite, ou choisir un autre fichier.",
     "The reference {} is a movie: save one frame of it as EXR or PNG and choose that.": "La référence {} est un film : en enregistrer une image en EXR ou PNG et choisir celle-ci.",
     "The reference {} is a Blender file: render a picture of it and choose that.": "La référence {} est un fichier Blender : en rendre une image et choisir celle-ci.",
-    "The reference {} holds no picture its name promises: choose another file.": "La référence {} ne contient pas l'image que son nom promet : choisir un autre fichier.",
+    "The reference '{}' holds no picture of the kind that its name says: choose another file.": "La référence '{}' ne contient pas l'image que son nom promet : choisir un autre fichier.",
     "The reference '{}' {}.": "La référence '{}' {}.",
     "The reference '{}' is {}, but the scene renders {}: set the output resolution to the reference's.": "La référence '{}' fait {}, mais la scène rend {} : donner à la sortie la résolution de la référence.",
     "Reference: {}, {}.": "Référence : {}, {}.",

@@ -66,7 +66,7 @@ PANEL = {
     "The reference {} is empty: wait until it is written, or choose another file.": "Die Referenz {} ist leer: warten, bis sie geschrieben ist, oder eine andere Datei wählen.",
     "The reference {} is a movie: save one frame of it as EXR or PNG and choose that.": "Die Referenz {} ist ein Film: ein Einzelbild davon als EXR oder PNG speichern und dieses wählen.",
     "The reference {} is a Blender file: render a picture of it and choose that.": "Die Referenz {} ist eine Blender-Datei: ein Bild daraus rendern und dieses wählen.",
-    "The reference {} holds no picture its name promises: choose another file.": "Die Referenz {} enthält kein Bild, wie es ihr Name verspricht: eine andere Datei wählen.",
+    "The reference '{}' holds no picture of the kind that its name says: choose another file.": "Die Referenz '{}' enthält kein Bild, wie es ihr Name verspricht: eine andere Datei wählen.",
     "The reference '{}' {}.": "Die Referenz '{}': {}.",
     "The reference '{}' is {}, but the scene renders {}: set the output resolution to the reference's.": "Die Referenz '{}' hat {}, aber die Szene rendert {}: die Ausgabeauflösung auf die der Referenz setzen.",
     "Reference: {}, {}.": "Referenz: {}, {}.",

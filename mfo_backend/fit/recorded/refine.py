@@ -172,7 +172,7 @@ def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
         lambda start, box: solve(setting, problem, start, NEAR_EVALUATIONS, stage=stage, box=box),
         problem.equations(x), problem.independent, x, setting.user, table,
     )  # fmt: skip
-    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table)
+    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table, setting.plan.asked)
     last = others.simplest(SimplestEnd(found, off))
     return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals, richer=last.richer)
 

@@ -147,7 +147,7 @@ def test_a_mended_shader_keeps_its_colour_and_the_old_node(scene: SimpleNamespac
     ("name", "words"),
     [("/nowhere/a.exr", "is in a folder that does not exist: connect its drive"),
      ("a.exr", "a.exr does not exist: choose another file"), ("text.txt", "no picture we read"),
-     ("text.png", "no picture its name promises"), ("folder", "is a folder: choose one picture in it"),
+     ("text.png", "no picture of the kind that its name says"), ("folder", "is a folder: choose one picture in it"),
      ("folder.exr", "is a folder: choose one picture in it"), ("text.mp4", "is a movie: save one frame of it"),
      ("text.blend", "is a Blender file: render a picture of it"), ("empty.png", "is empty: wait until it is written"),
      ("half.png", "is not complete: wait until it is written"),
@@ -180,7 +180,7 @@ def test_references_that_are_none(scene: SimpleNamespace, tmp_path: Path, name: 
     assert len(said) == 1, said
     assert words in said[0]
     assert said[0].startswith("Picture 2: The reference" if number == 2 else "The reference")
-    if "promises" not in words:  # which the backend says
+    if "its name says" not in words:  # which the backend says
         with pytest.raises(RuntimeError, match=re.escape(words)):
             scene.bpy.ops.mfo.fit(object="Väse", job_folder=scene.job)
 
