@@ -188,7 +188,7 @@ class BlenderPrincipled(mi.BSDF):
     def row(self) -> NDArray[np.float32]:
         """The values that are `opened`, one after the other."""
         if self._row is None:
-            self._row = np.concatenate([np.ravel(getattr(self, name)) for name in self.opened])
+            self._row = np.concatenate([np.ravel(dr.detach(getattr(self, name))) for name in self.opened])
         return self._row
 
     def picture_of(self, name: str) -> Any:

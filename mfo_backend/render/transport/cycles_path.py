@@ -75,7 +75,7 @@ class CyclesPath(RBIntegrator):
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
         terminator, view, absorption = shadows.terminator, CameraView(scene), shadows.absorption
-        context, materials = mi.BSDFContext(), MaterialKinds(scene) if primal else None
+        context, materials = mi.BSDFContext(), MaterialKinds(scene)
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
         change = mi.Spectrum(0 if δL is None else δL)
