@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from .tolerances import HOPELESS, SIGNIFICANT
-
 NEAR_EVALUATIONS = 12  # of a solve that begins near its end: where light is sampled, and of what is tried from there
 PERCEPTUAL_EVALUATIONS = 25  # of a stage, from each start
 # Squared: most rays of a pixel of one of several materials. With 256 half of the residual of a chest of 411 pixels was
@@ -65,8 +63,6 @@ class RecordedPlan:
     alike
         Whether materials that are known to be taken for the solution are tried where light is sampled, too. Under exact
         lights they always are.
-    asked
-        Chi squared of lobes that were left out, above which pictures are asked whether an eye sees that they are gone.
     """
 
     scan: bool = True
@@ -97,11 +93,10 @@ class RecordedPlan:
     basins: int = 3
     basin_factor: float = 1.5
     alike: bool = False
-    asked: float = HOPELESS
 
     def among_others(self) -> RecordedPlan:
         """The same for one of several materials, which may fill few pixels: more rays for each, more basins."""
-        return replace(self, grid_finest=FINEST_AMONG_OTHERS, alike=True, asked=SIGNIFICANT)
+        return replace(self, grid_finest=FINEST_AMONG_OTHERS, alike=True)
 
     @staticmethod
     def of(preset: str) -> RecordedPlan:

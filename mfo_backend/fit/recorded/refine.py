@@ -17,6 +17,7 @@ from ..plans import NEAR_EVALUATIONS
 from ..result.course import Stage
 from ..squares.problem import Refined
 from ..squares.residuals import MakeResidual, MakeWeighted
+from ..tolerances import HOPELESS, SIGNIFICANT
 from .recording import SAMPLES, Recording, Setting, Vector
 from .reference_noise import TileNoise
 from .solve import better_basin, solve
@@ -172,7 +173,9 @@ def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
         lambda start, box: solve(setting, problem, start, NEAR_EVALUATIONS, stage=stage, box=box),
         problem.equations(x), problem.independent, x, setting.user, table,
     )  # fmt: skip
-    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table, setting.plan.asked)
+    # of few pixels a recording says little of a narrow lobe, and less than pictures do
+    asked = SIGNIFICANT if setting.plan.alike else HOPELESS
+    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table, asked)
     last = others.simplest(SimplestEnd(found, off))
     return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals, richer=last.richer)
 
