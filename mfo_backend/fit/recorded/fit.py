@@ -25,7 +25,6 @@ from ..alike.compare import compare
 from ..alike.unneeded_lobes import box_holding
 from ..certainty.covariance import certainties_away
 from ..certainty.weak_combinations import weak_combinations
-from ..judge.checked_reference import counted_pixels
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
@@ -274,16 +273,13 @@ class RecordedRoute:
         """
         if not asked:
             return choose
-        task = self._task
-        seen = self._judge(blurred=task.linear).value
-        # errors are means over the picture, of which a small target is a small part
-        visible = VISIBLE * float(counted_pixels(task.reference, task.mask, task.settings).mean())
+        seen = self._judge(blurred=self._task.linear).value
 
         def choice(images: Sequence[Pixels]) -> Choice:
             chosen = choose([*images[:2], *images[2 + asked :]])
             end = chosen.end if chosen.end == 0 else chosen.end + asked
             least, best = min((seen(images[1 + k]), k) for k in range(1, 1 + asked))
-            if least < seen(images[1 + end]) - visible:
+            if least < seen(images[1 + end]) - VISIBLE:
                 return Choice(best, chosen.beats_start or least < seen(images[0]))
             return replace(chosen, end=end)
 
