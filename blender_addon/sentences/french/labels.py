@@ -3,6 +3,10 @@
 
 # fmt: off
 LABELS = {
+    "Absorption Density": "Densité d'absorption",
+    "Absorption Color": "Couleur d'absorption",
+    "Metal IOR": "IOR du métal",
+    "Metal Extinction": "Extinction du métal",
     "Live": "En direct",
     "Fit again from the present values when the reference, what counts of it, a limit or a lock changes": "Réajuster à partir des valeurs actuelles quand la référence, la partie qui compte, une limite ou un choix de valeurs change",
     "Mark the material as an asset, with its verdict, its reference and the picture of its fit": "Marquer le matériau comme asset, avec son verdict, sa référence et l'image de son ajustement",

@@ -3,6 +3,10 @@
 
 # fmt: off
 LABELS = {
+    "Absorption Density": "Absorptionsdichte",
+    "Absorption Color": "Absorptionsfarbe",
+    "Metal IOR": "IOR des Metalls",
+    "Metal Extinction": "Extinktion des Metalls",
     "Live": "Live",
     "Fit again from the present values when the reference, what counts of it, a limit or a lock changes": "Von den jetzigen Werten neu anpassen, wenn sich die Referenz, was von ihr zählt, eine Grenze oder eine Auswahl ändert",
     "Mark the material as an asset, with its verdict, its reference and the picture of its fit": "Das Material als Asset markieren, mit seinem Urteil, seiner Referenz und dem Bild seiner Anpassung",
