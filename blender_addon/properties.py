@@ -38,7 +38,9 @@ _PARAMETERS = (
     ("flatness", "Flatness", "Approximation of subsurface scattering"),
     ("spec_trans", "Transmission", "Weight of refraction"),
 )
-# sockets of Blender's Principled BSDF that can be fitted
+# values of other nodes, whose names here Blender does not translate
+_OF_NODES = ("Metal IOR", "Metal Extinction", "Absorption Density", "Absorption Color")
+# sockets of Blender's Principled BSDF that can be fitted, and these
 _SOCKETS = (
     *("Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Diffuse Roughness", "Specular IOR Level"),
     "Specular Tint",
@@ -46,8 +48,7 @@ _SOCKETS = (
     *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
     *("Thin Film IOR", "Emission Color"),
     # last: a file keeps what is chosen by its place
-    *("Subsurface Radius", "Subsurface Scale", "Metal IOR", "Metal Extinction"),
-    *("Absorption Density", "Absorption Color"),
+    *("Subsurface Radius", "Subsurface Scale", *_OF_NODES),
 )
 SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
 SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}

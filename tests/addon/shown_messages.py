@@ -33,6 +33,8 @@ def shown_messages() -> set[tuple[str, str]]:
             elif isinstance(node, ast.Assign) and _name(node.targets[0]) == "_TITLES":
                 titles = node.value.values if isinstance(node.value, ast.Dict) else []
                 found.update(pair for title in titles for pair in _texts("*", title))
+            elif isinstance(node, ast.Assign) and _name(node.targets[0]) == "_OF_NODES":
+                found.update(pair for name in getattr(node.value, "elts", ()) for pair in _texts("*", name))
     return {(context, text) for context, text in found if any(letter.isalpha() for letter in text)}
 
 

@@ -84,8 +84,8 @@ def diffuse(scene: SimpleNamespace) -> None:
     tree(scene).links.new(shader.outputs[0], output.inputs["Surface"])
 
 
-def toon(scene: SimpleNamespace) -> None:
-    shader = tree(scene).nodes.new("ShaderNodeBsdfToon")
+def hair(scene: SimpleNamespace) -> None:
+    shader = tree(scene).nodes.new("ShaderNodeBsdfHair")
     output = next(n for n in tree(scene).nodes if n.type == "OUTPUT_MATERIAL")
     tree(scene).links.new(shader.outputs[0], output.inputs["Surface"])
 
@@ -115,7 +115,7 @@ SPOILED: list[tuple[Callable[[SimpleNamespace], None], str]] = [
     (another_region, "scale"),
     (stereo, "one_eye"), (override, "no_override"), (hidden, "show_in_render"), (hidden_collection, "show_in_render"),
     (another_size, "resolution"), (another_size, "scale"), (another_display, "reference_view"),
-    (no_material, "new_material"), (toon, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
+    (no_material, "new_material"), (hair, "principled"), (empty_group, "unlink"), (nothing_active, "select"),
     (the_light_is_active, "select"), (nothing_chosen, "all_parameters"),
 ]  # fmt: skip
 

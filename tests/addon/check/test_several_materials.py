@@ -46,8 +46,8 @@ def mend(scene: SimpleNamespace, kind: str) -> str:
 
 def test_what_stops_another_than_the_active_one_is_found_and_mended(listed: SimpleNamespace) -> None:
     tree = wood(listed)
-    toon = tree.nodes.new("ShaderNodeBsdfToon")
-    tree.links.new(toon.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+    hair = tree.nodes.new("ShaderNodeBsdfHair")
+    tree.links.new(hair.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
     assert len(stopping(listed)) == 1
     assert "'Wood'" in mend(listed, "principled")
     assert stopping(listed) == {}
