@@ -54,11 +54,8 @@ class SimplestEnd:
 class OtherEnds:
     """Solutions in other basins than that of a fit's last problem."""
 
-    def __init__(
-        self, refined: Refined, solve: Solve, user: Vector, table: ParameterTable, asked: float = HOPELESS
-    ) -> None:
+    def __init__(self, refined: Refined, solve: Solve, user: Vector, table: ParameterTable) -> None:
         self._few, self._all, self._solve, self._user, self._table = refined.few, refined.all, solve, user, table
-        self._asked = asked  # chi squared of a lobe that was left out, above which pictures are asked
 
     def simplest(self, found: SimplestEnd) -> SimplestEnd:
         """What the picture does not tell from `found`: with base and coat exchanged, without lobes that are new."""
@@ -123,7 +120,7 @@ class OtherEnds:
         share = float(1.0 / (1.0 + np.exp(-0.5 * against)))  # of all materials with these lobes
         others = [Rival(rival.x, share * rival.share) for rival in found.rivals]
         rest = share - sum(rival.share for rival in others)
-        richer = (*found.richer, x) if it.more > self._asked else found.richer
+        richer = (*found.richer, x) if it.more > HOPELESS else found.richer
         return SimplestEnd(end, off, (*others, Rival(x, rest)), richer)
 
     def _without_coat(self, x: Vector, lobes: list[str]) -> Iterator[Vector]:

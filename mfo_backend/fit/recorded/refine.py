@@ -17,7 +17,6 @@ from ..plans import NEAR_EVALUATIONS
 from ..result.course import Stage
 from ..squares.problem import Refined
 from ..squares.residuals import MakeResidual, MakeWeighted
-from ..tolerances import HOPELESS, SIGNIFICANT
 from .recording import SAMPLES, Recording, Setting, Vector
 from .reference_noise import TileNoise
 from .solve import better_basin, solve
@@ -173,9 +172,7 @@ def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
         lambda start, box: solve(setting, problem, start, NEAR_EVALUATIONS, stage=stage, box=box),
         problem.equations(x), problem.independent, x, setting.user, table,
     )  # fmt: skip
-    # of few pixels a recording says little of a narrow lobe, and less than pictures do
-    asked = SIGNIFICANT if setting.plan.alike else HOPELESS
-    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table, asked)
+    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table)
     last = others.simplest(SimplestEnd(found, off))
     return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals, richer=last.richer)
 
