@@ -47,11 +47,11 @@ class CyclesModel:
         What nodes bend of a diffuse lobe's normal shades light as bumps of a microfacet surface would (from 4.5);
         before, the light fades towards the plane of the mesh.
     shader
-        The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "conductor"
-        one by index and extinction, "glass" tints what it reflects
-        and what it lets through by the base colour, "refraction" reflects nothing, and "translucent" is a white cosine
-        lobe on the other side times the base colour. The sheen of "toon" is a cone about the normal, that of
-        "toon_glossy" one about the mirrored view. Light enters below "subsurface" with an index of its own.
+        The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "conductor" one by index and
+        extinction. "glass" tints what it reflects and what it lets through by the base colour, "refraction" reflects
+        nothing, and "translucent" is a white cosine lobe on the other side times the base colour. The sheen of "toon"
+        is a cone about the normal, that of "toon_glossy" one about the mirrored view. Light enters below "subsurface"
+        with an index of its own.
     skin
         How light enters below the surface and how far it goes there, the node's "Random Walk (Skin)".
     disk

@@ -216,7 +216,8 @@ def _color_attribute(rig: Rig, draw: Draw) -> None:
     tree.links.new(node.outputs["Color"], principled(rig.box).inputs["Base Color"])
 
 
-def _bumped_box(rig: Rig, _: Draw) -> None:
+def bumped_box(rig: Rig, _: Draw) -> None:
+    """Waves as a bump on the box."""
     tree = rig.box.data.materials[0].node_tree
     waves, bump = tree.nodes.new("ShaderNodeTexWave"), tree.nodes.new("ShaderNodeBump")
     waves.inputs["Scale"].default_value, bump.inputs["Distance"].default_value = 1.0, 0.1
@@ -383,7 +384,7 @@ def _all() -> Iterator[Setting]:
         "mirror modifier": _modifier("MIRROR", use_axis=(False, False, True), use_bisect_axis=(False, False, True)),
         "array modifier": _modifier("ARRAY", count=2, relative_offset_displace=(1.2, 0.3, 0.0)),
         "bevel modifier": _modifier("BEVEL", width=0.2, segments=3),
-        "bumped box": _bumped_box, "normal map": _normal_map, "smooth beside flat": _smooth_beside_flat,
+        "bumped box": bumped_box, "normal map": _normal_map, "smooth beside flat": _smooth_beside_flat,
         "far away": _far_away, "layer attribute": _layer_attribute,
         "displaced target": _displaced_target, "displaced box": _displaced_box,
         "solidify modifier": _modifier("SOLIDIFY", thickness=0.1),

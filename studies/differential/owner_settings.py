@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a random scene that belong to what shows an object: instancers, particles, the viewport, other data."""
+"""Settings of a random scene that belong to what shows an object: instancers, particles, the viewport."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import bpy
 
-from .rig import Draw, Rig, Setting, principled, put_socket
+from .artist_settings import bumped_box
+from .rig import Draw, Rig, Setting, color_of, put_socket
 
 
 def _instancer(rig: Rig, *, scale: tuple[float, float, float] = (0.7, 0.7, 0.7)) -> Any:
@@ -168,18 +167,13 @@ def _emitter_hidden(rig: Rig, draw: Draw) -> None:
     carrier.show_instancer_for_render = False
 
 
-def _color_of(rig: Rig, output: Any) -> None:
-    """Put a socket on the box's Base Color."""
-    rig.box.data.materials[0].node_tree.links.new(output, principled(rig.box).inputs["Base Color"])
-
-
 def _ramp(rig: Rig, output: Any) -> None:
     """A colour that changes with a number."""
     tree = rig.box.data.materials[0].node_tree
     ramp = tree.nodes.new("ShaderNodeValToRGB")
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (0.9, 0.1, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0)
     tree.links.new(output, ramp.inputs[0])
-    _color_of(rig, ramp.outputs[0])
+    color_of(rig, ramp.outputs[0])
 
 
 def _random_of_instances(rig: Rig, _: Draw) -> None:
@@ -225,7 +219,7 @@ def _seen_from_an_empty(rig: Rig, _: Draw) -> None:
     where, checker = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexChecker")
     where.object, checker.inputs["Scale"].default_value = empty, 3.0
     tree.links.new(where.outputs["Object"], checker.inputs["Vector"])
-    _color_of(rig, checker.outputs[0])
+    color_of(rig, checker.outputs[0])
     _instancer(rig)
 
 
@@ -234,14 +228,14 @@ def _instancer_attribute(rig: Rig, draw: Draw) -> None:
     empty["tint"] = tuple(draw.uniform(0.1, 0.9, 3))
     node = rig.box.data.materials[0].node_tree.nodes.new("ShaderNodeAttribute")
     node.attribute_type, node.attribute_name = "INSTANCER", "tint"
-    _color_of(rig, node.outputs["Color"])
+    color_of(rig, node.outputs["Color"])
 
 
 def _from_instancer(rig: Rig, _: Draw) -> None:
     """Generated coordinates of the floor, on particles."""
     node = rig.box.data.materials[0].node_tree.nodes.new("ShaderNodeTexCoord")
     node.from_instancer = True
-    _color_of(rig, node.outputs["Generated"])
+    color_of(rig, node.outputs["Generated"])
     _few(rig, 6)
 
 
@@ -251,16 +245,12 @@ def _turned_directions(rig: Rig, _: Draw) -> None:
     where, turned = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeVectorTransform")
     turned.vector_type, turned.convert_from, turned.convert_to = "NORMAL", "OBJECT", "WORLD"
     tree.links.new(where.outputs["Normal"], turned.inputs[0])
-    _color_of(rig, turned.outputs[0])
+    color_of(rig, turned.outputs[0])
     _instancer(rig).rotation_euler = (0.4, 0.8, 0.3)
 
 
-def _mirrored_instance(rig: Rig, _: Draw) -> None:
-    tree = rig.box.data.materials[0].node_tree
-    waves, bump = tree.nodes.new("ShaderNodeTexWave"), tree.nodes.new("ShaderNodeBump")
-    waves.inputs["Scale"].default_value, bump.inputs["Distance"].default_value = 1.0, 0.1
-    tree.links.new(waves.outputs["Fac"], bump.inputs["Height"])
-    tree.links.new(bump.outputs["Normal"], principled(rig.box).inputs["Normal"])
+def _mirrored_instance(rig: Rig, draw: Draw) -> None:
+    bumped_box(rig, draw)
     _instancer(rig, scale=(-0.9, 0.9, 0.7))
 
 
@@ -319,118 +309,6 @@ def _nested(rig: Rig, _: Draw) -> None:
     outer.hide_render = True
 
 
-def _shared_mesh(rig: Rig, _: Draw) -> None:
-    """Another object of the box's mesh, with a modifier and a material of its own."""
-    other = rig.box.copy()
-    other.location = (1.5, -0.9, 0.52)
-    rig.scene.collection.objects.link(other)
-    other.modifiers.new("Bevel", "BEVEL").width = 0.3
-    other.material_slots[0].link = "OBJECT"
-    other.material_slots[0].material = rig.floor.data.materials[0]
-
-
-def _odd_slots(rig: Rig, draw: Draw) -> None:
-    """Slots without a material, and faces that name slots which are not there."""
-    rig.box.data.materials.append(None)
-    rig.box.data.materials.append(rig.floor.data.materials[0])
-    for polygon in rig.box.data.polygons:
-        polygon.material_index = int(draw.integers(0, 5))
-
-
-def _other_map(rig: Rig, _: Draw) -> None:
-    """A texture by a map that is rendered and not the one that is edited."""
-    mesh = rig.box.data
-    other = mesh.uv_layers.new(name="Rendered")
-    for loop in other.uv:
-        loop.vector = loop.vector * 2.3
-    other.active_render = True
-    mesh.uv_layers.active = mesh.uv_layers[0]
-    tree = rig.box.data.materials[0].node_tree
-    node = tree.nodes.new("ShaderNodeTexImage")
-    node.image, node.interpolation = bpy.data.images.new("Grid", 64, 64), "Closest"
-    node.image.generated_type = "COLOR_GRID"
-    _color_of(rig, node.outputs[0])
-
-
-def _texture_space(rig: Rig, draw: Draw) -> None:
-    mesh = rig.box.data
-    mesh.use_auto_texspace = False
-    mesh.texspace_location, mesh.texspace_size = (0.3, 0.2, 0.1), tuple(draw.uniform(0.4, 2.0, 3))
-    tree = mesh.materials[0].node_tree
-    _color_of(rig, tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"])
-
-
-def _driven(rig: Rig, draw: Draw) -> None:
-    """A value by a driver of the frame, another by keyframes."""
-    rig.scene.frame_set(int(draw.integers(2, 20)))
-    socket = principled(rig.box).inputs["Roughness"]
-    socket.driver_add("default_value").driver.expression = "0.1 + 0.02 * frame"
-    lamp: Any = rig.light.data
-    for frame, energy in ((1, 100.0), (21, 700.0)):
-        lamp.energy = energy
-        lamp.keyframe_insert("energy", frame=frame)
-    rig.scene.frame_set(rig.scene.frame_current)
-
-
-def _bright_base(rig: Rig, draw: Draw) -> None:
-    put_socket(rig.box, "Base Color", (float(draw.uniform(1.0, 1.6)), 0.8, 0.9, 1.0))
-
-
-def _dark_glow(rig: Rig, _: Draw) -> None:
-    """A box that takes light away."""
-    put_socket(rig.box, "Emission Strength", -0.5)
-
-
-def _focused(rig: Rig, draw: Draw) -> None:
-    rig.camera.data.dof.use_dof, rig.camera.data.dof.aperture_fstop = True, 0.3
-    rig.camera.data.dof.focus_object = rig.box
-    rig.camera.scale = (float(draw.choice([1.0, 2.0])),) * 3
-
-
-def _of_another_type(kind: str) -> Callable[[Rig, Draw], Rig]:
-    """What is fitted is no mesh."""
-
-    def put(rig: Rig, draw: Draw) -> Rig:
-        material = rig.target.data.materials[0]
-        if kind == "FONT":
-            made: Any = bpy.data.curves.new("Word", "FONT")
-            made.body, made.extrude, made.bevel_depth, made.size = "B", 0.3, 0.05, 2.4
-        elif kind == "META":
-            made = bpy.data.metaballs.new("Drop")
-            made.resolution, made.render_resolution = 0.4, 0.12
-            made.elements.new().radius = 1.6
-        elif kind == "SURFACE":
-            made = bpy.data.curves.new("Sheet", "SURFACE")
-            made.resolution_u = made.resolution_v = 3
-            made.render_resolution_u = made.render_resolution_v = 6
-        else:
-            made = bpy.data.curves.new("Tube", "CURVE")
-            made.dimensions, made.bevel_depth, made.use_fill_caps = "3D", 0.4, True
-            made.resolution_u, made.render_resolution_u = 2, int(draw.integers(4, 12))
-            spline = made.splines.new("BEZIER")
-            spline.bezier_points.add(1)
-            for point, place in zip(spline.bezier_points, ((-0.7, 0.0, -0.6), (0.7, 0.3, 0.7)), strict=True):
-                point.co, point.handle_left_type, point.handle_right_type = place, "AUTO", "AUTO"
-        if kind == "SURFACE":
-            bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(0.0, 0.0, 1.0))
-            item = bpy.context.object
-            item.data.resolution_u = item.data.resolution_v = 2
-            item.data.render_resolution_u = item.data.render_resolution_v = 6
-            made = item.data
-        else:
-            item = bpy.data.objects.new("Fitted", made)
-            item.location = (0.0, 0.0, 1.0)
-            rig.scene.collection.objects.link(item)
-        if kind == "FONT":
-            item.location, item.rotation_euler = (-0.8, 0.0, 0.3), (math.pi / 2, 0.0, 0.0)
-        made.materials.append(material)
-        bpy.data.objects.remove(rig.target)
-        bpy.context.view_layer.objects.active = item
-        return replace(rig, target=item)
-
-    return put
-
-
 def _all() -> Iterator[Setting]:
     of_viewport, of_instance = ("viewport",), ("of each instance",)
     yield Setting("instancer", _of_instancer())
@@ -468,16 +346,6 @@ def _all() -> Iterator[Setting]:
     yield Setting("on a bone", _on_a_bone)
     yield Setting("eye closed", _eye_closed)
     yield Setting("nested collections", _nested)
-    yield Setting("shared mesh", _shared_mesh)
-    yield Setting("odd slots", _odd_slots)
-    yield Setting("other map", _other_map)
-    yield Setting("texture space", _texture_space)
-    yield Setting("driven", _driven)
-    yield Setting("bright base", _bright_base)
-    yield Setting("dark glow", _dark_glow)
-    yield Setting("focused", _focused)
-    for kind in ("FONT", "META", "SURFACE", "CURVE"):  # last: other settings change the ball's mesh
-        yield Setting(f"target of type {kind.lower()}", _of_another_type(kind))
 
 
 OWNER_SETTINGS = tuple(_all())

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from .artist_settings import ARTIST_SETTINGS
+from .data_settings import DATA_SETTINGS
 from .light_settings import LIGHT_SETTINGS
 from .material_settings import MATERIAL_SETTINGS
 from .owner_settings import OWNER_SETTINGS
@@ -323,8 +324,8 @@ SETTINGS: tuple[Setting, ...] = (
 )  # fmt: skip
 GROUPS = {
     "plain": SETTINGS, "artist": ARTIST_SETTINGS,
-    "material": MATERIAL_SETTINGS, "light": LIGHT_SETTINGS, "shape": SHAPE_SETTINGS, "owner": OWNER_SETTINGS,
-    "render": RENDER_SETTINGS, "picture": PICTURE_SETTINGS,
+    "material": MATERIAL_SETTINGS, "light": LIGHT_SETTINGS, "shape": SHAPE_SETTINGS,
+    "owner": OWNER_SETTINGS + DATA_SETTINGS, "render": RENDER_SETTINGS, "picture": PICTURE_SETTINGS,
 }  # fmt: skip
 SETTINGS = tuple(setting for group in GROUPS.values() for setting in group)
 # of what the plain scene has at times, and of what two settings make together

@@ -51,3 +51,8 @@ def principled(item: Any) -> Any:
 def put_socket(item: Any, name: str, value: Any) -> None:
     """Set a socket of an object's Principled node."""
     principled(item).inputs[name].default_value = value
+
+
+def color_of(rig: Rig, output: Any) -> None:
+    """Put a socket on the box's Base Color."""
+    rig.box.data.materials[0].node_tree.links.new(output, principled(rig.box).inputs["Base Color"])

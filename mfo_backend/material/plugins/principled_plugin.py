@@ -36,7 +36,7 @@ from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
 from ..principled.bumped_normals import valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
-from ..principled.lobe_sampling import NAMES, LobeChoice, lobe_choice, pdf, sample
+from ..principled.lobe_sampling import NAMES, LobeChoice, is_diffuse, lobe_choice, pdf, sample
 from ..principled.needed_lobes import Lobes, needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
 from ..principled.random_walk import Below
@@ -319,9 +319,7 @@ class BlenderPrincipled(mi.BSDF):
         weight = self._value(layers, local) / dr.maximum(density, 1e-30)
         weight = dr.select(density > 0, weight, 0)
         glass = lobe == NAMES.index("glass")
-        diffuse = lobe == NAMES.index("diffuse")
-        if self.model.shader != "toon_glossy":
-            diffuse |= lobe == NAMES.index("sheen")
+        diffuse = is_diffuse(lobe, self.model.shader)
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         kind = dr.select(glass & (local.z < 0), mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
         through = lobe == NAMES.index("translucent")

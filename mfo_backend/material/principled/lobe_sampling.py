@@ -32,6 +32,12 @@ class LobeChoice:
         return self.probability.get(name)
 
 
+def is_diffuse(lobe: Any, shader: str) -> Any:
+    """Whether what a drawn lobe of a shader scatters is a diffuse bounce, as Cycles counts them."""
+    diffuse = lobe == NAMES.index("diffuse")
+    return diffuse if shader == "toon_glossy" else diffuse | (lobe == NAMES.index("sheen"))
+
+
 def lobe_choice(layers: Layers, with_transparency: bool, least_diffuse: float = 0.0) -> LobeChoice:
     """Probabilities from the weights of the layers, normalised over reflection, transmission and, if asked, alpha.
 

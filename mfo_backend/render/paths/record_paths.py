@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from ...material.plugins.material_kinds import MaterialKinds
 from ...material.principled.random_walk import WALK, Below
 from ...types.errors import BadInputError
 from ...types.light_paths import LightPaths
@@ -25,7 +26,6 @@ from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..random_numbers.even_points import even_points
 from ..transport.camera_view import CameraView
-from ..transport.material_kinds import MaterialKinds
 from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side

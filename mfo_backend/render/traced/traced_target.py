@@ -19,7 +19,7 @@ from ...material.plugins.closure_tree import ClosureTree
 from ...material.plugins.principled_plugin import BlenderPrincipled
 from ...material.principled.blender_principled import evaluate
 from ...material.principled.layers import layer_stack
-from ...material.principled.lobe_sampling import NAMES, lobe_choice, pdf, sample
+from ...material.principled.lobe_sampling import NAMES, is_diffuse, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
 from ..models.prepared_material import EMISSION
 from ..pictures.mitsuba_renderer import MitsubaRenderer
@@ -110,9 +110,7 @@ class TracedTarget:
         pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
         f_next = mi.Color3f(evaluate(layers, drawn, reachable_only=only))
         pdf_next = dr.detach(pdf(layers, choice, drawn, reachable_only=only))
-        diffuse = lobe == NAMES.index("diffuse")
-        if plugin.model.shader != "toon_glossy":
-            diffuse |= lobe == NAMES.index("sheen")
+        diffuse = is_diffuse(lobe, plugin.model.shader)
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
         kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)

@@ -20,11 +20,11 @@ import drjit as dr
 import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
+from ...material.plugins.material_kinds import MaterialKinds
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside
 from .camera_view import CameraView
-from .material_kinds import MaterialKinds
 from .shadow_rays import ShadowRays, sample_light
 from .smooth_facets import leaves_on, met_light, seen_side
 

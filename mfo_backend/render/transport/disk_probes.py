@@ -22,7 +22,9 @@ from ..random_numbers.path_random import PathRandom
 from .bodies import bodies_of, met_inside
 
 AXES = (0.5, 0.25, 0.25)  # probabilities of the normal and of two directions across it
-MOST_HITS = 16  # of one line, the last of which ends the loop; Cycles takes four of them by chance. No measurement
+# of one line, what lies beyond is left out; Cycles takes four by chance. Of endless lines through five heads and
+# statues 18 to 33 % meet more than 4, 2 to 7 % more than 8, and 0.01 to 0.1 % more than 16
+MOST_HITS = 16
 
 
 def probed(

@@ -118,7 +118,7 @@ def seen_side(scene: mi.Scene, si: mi.SurfaceInteraction3f) -> mi.SurfaceInterac
     That is Cycles' rule for glossy lobes (kernel/closure/bsdf_util.h, ensure_valid_specular_reflection): the mirrored
     view is lifted to a cosine of 0.01, or 0.9 of the view's own. It matters near the outline of a coarse mesh and for
     custom normals. Cycles leaves diffuse lobes at the normal they had; a frame here is that of all lobes. Mitsuba's
-    integrators bend nothing: the light that a smooth metal of 9,500 triangles sends to itself is a seventh darker.
+    integrators bend nothing: the light that a smooth metal of 9,500 triangles sends to itself is an eighth less.
     """
     if not follows_cycles(scene):
         return si

@@ -45,7 +45,7 @@ def pictures(renderers):
 
 def test_pictures_are_those_of_virtual_calls(tmp_path, monkeypatch):
     ours = pictures(load(tmp_path, 4))
-    from mfo_backend.render.transport.material_kinds import MaterialKinds  # needs a variant
+    from mfo_backend.material.plugins.material_kinds import MaterialKinds  # needs a variant
 
     monkeypatch.setattr(MaterialKinds, "eval_pdf", lambda self, bsdf, *rest: bsdf.eval_pdf(*rest))
     monkeypatch.setattr(MaterialKinds, "sample", lambda self, bsdf, *rest: bsdf.sample(*rest))

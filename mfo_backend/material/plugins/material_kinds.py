@@ -20,7 +20,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ...material.arrays.own_memory import own_memory
+from ..arrays.own_memory import own_memory
 
 
 class MaterialKinds:
