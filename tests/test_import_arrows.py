@@ -41,32 +41,32 @@ def short(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
-@pytest.mark.parametrize("path", BACKEND_FILES, ids=short)
-def test_backend_imports_point_down(path: Path) -> None:
-    parts = path.relative_to(ROOT / "mfo_backend").parts
-    layer = parts[0] if len(parts) > 1 else "cli"
-    allowed = set(LAYERS[: LAYERS.index(layer) + 1])
-    for name in imports_of(path, ROOT / "mfo_backend"):
-        root, *rest = name.split(".")
-        assert root not in {"bpy", "mathutils", "blender_addon"}, (
-            f"{short(path)} imports {name}: the backend runs without Blender"
-        )
-        if root in RENDERER_MODULES:
-            assert layer in RENDERER_LAYERS, f"{short(path)} imports {name}: only {RENDERER_LAYERS} may"
-        if root == "mfo_backend" and rest and rest[0] in LAYERS:
-            assert rest[0] in allowed, f"{short(path)} imports {name}: an arrow that points up"
+def test_backend_imports_point_down() -> None:
+    wrong = []
+    for path in BACKEND_FILES:
+        parts = path.relative_to(ROOT / "mfo_backend").parts
+        layer = parts[0] if len(parts) > 1 else "cli"
+        allowed = set(LAYERS[: LAYERS.index(layer) + 1])
+        for name in imports_of(path, ROOT / "mfo_backend"):
+            root, *rest = name.split(".")
+            if root in {"bpy", "mathutils", "blender_addon"}:
+                wrong.append(f"{short(path)} imports {name}: the backend runs without Blender")
+            if root in RENDERER_MODULES and layer not in RENDERER_LAYERS:
+                wrong.append(f"{short(path)} imports {name}: only {RENDERER_LAYERS} may")
+            if root == "mfo_backend" and rest and rest[0] in LAYERS and rest[0] not in allowed:
+                wrong.append(f"{short(path)} imports {name}: an arrow that points up")
+    assert wrong == []
 
 
-@pytest.mark.parametrize("path", ADDON_FILES, ids=short)
-def test_addon_imports_nothing_of_the_backend(path: Path) -> None:
-    for name in imports_of(path, ROOT / "blender_addon"):
-        assert name.split(".")[0] not in ADDON_FORBIDDEN, f"{short(path)} imports {name} into Blender's process"
+def test_addon_imports_nothing_of_the_backend() -> None:
+    found = [(short(path), name) for path in ADDON_FILES for name in imports_of(path, ROOT / "blender_addon")]
+    assert [each for each in found if each[1].split(".")[0] in ADDON_FORBIDDEN] == []
 
 
-@pytest.mark.parametrize("path", [*BACKEND_FILES, *ADDON_FILES], ids=short)
-def test_files_stay_small(path: Path) -> None:
-    lines = len(path.read_text("utf-8").splitlines())
-    assert lines <= 400, f"{short(path)} has {lines} lines; split it by what it holds"
+def test_files_stay_small() -> None:
+    """A longer one is split by what it holds."""
+    lines = {short(path): len(path.read_text("utf-8").splitlines()) for path in [*BACKEND_FILES, *ADDON_FILES]}
+    assert {path: count for path, count in lines.items() if count > 400} == {}
 
 
 # Rooms of fit/ from the ground up; those of one floor do not know each other. A file of fit/ itself is a room, too.
@@ -92,22 +92,23 @@ FOLDERS = [
 ]
 
 
-@pytest.mark.parametrize("path", sorted(FIT.rglob("*.py")), ids=short)
-def test_rooms_of_fit_import_what_lies_below_them(path: Path) -> None:
+def test_rooms_of_fit_import_what_lies_below_them() -> None:
     floor = {room: number for number, rooms in enumerate(FIT_FLOORS) for room in rooms}
-    parts = path.relative_to(FIT).with_suffix("").parts
-    if parts == ("__init__",):
-        return
-    for name in imports_of(path, ROOT / "mfo_backend"):
-        layer, room = [*name.split("."), "", ""][1:3]
-        if name.startswith("mfo_backend.") and layer == "fit" and room != parts[0]:
-            assert floor[room] < floor[parts[0]], f"{short(path)} imports {name}: an arrow that does not point down"
+    wrong = []
+    for path in sorted(FIT.rglob("*.py")):
+        parts = path.relative_to(FIT).with_suffix("").parts
+        for name in imports_of(path, ROOT / "mfo_backend") if parts != ("__init__",) else ():
+            layer, room = [*name.split("."), "", ""][1:3]
+            is_other = name.startswith("mfo_backend.") and layer == "fit" and room != parts[0]
+            if is_other and floor[room] >= floor[parts[0]]:
+                wrong.append(f"{short(path)} imports {name}: an arrow that does not point down")
+    assert wrong == []
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=short)
-def test_a_room_can_be_seen_at_one_glance(folder: Path) -> None:
-    files = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
-    assert len(files) <= MOST_FILES, f"{short(folder)} has {len(files)} files; give some of them a room of their own"
+def test_a_room_can_be_seen_at_one_glance() -> None:
+    """Some files of a fuller one get a room of their own."""
+    files = {short(folder): len([*folder.glob("*.py")]) - (folder / "__init__.py").is_file() for folder in FOLDERS}
+    assert {folder: count for folder, count in files.items() if count > MOST_FILES} == {}
 
 
 PACKAGES = pytest.mark.parametrize(
