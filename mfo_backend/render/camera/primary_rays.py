@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
 from .pixel_cells import PixelCells
+from .sensor_rays import sensor_ray
 
 TILE = 4  # pixels along each side
 # Row and column of a tile's pixels, quarter by quarter
@@ -143,8 +144,7 @@ def camera_ray(sensor: mi.Sensor, pixel: mi.UInt32, offset: mi.Point2f, on_lens:
     # a sensor counts from 0 to 1 along the part of its film that is rendered
     on_film = mi.Point2f(mi.Float(x) + offset.x + 0.5, mi.Float(y) + offset.y + 0.5)
     on_film /= dr.opaque(mi.Point2f, tuple(int(n) for n in film.crop_size()))
-    ray, _ = sensor.sample_ray(0.5 * sensor.shutter_open_time(), 0.5, on_film, on_lens)
-    return ray
+    return sensor_ray(sensor, on_film, on_lens)
 
 
 def through_filter(

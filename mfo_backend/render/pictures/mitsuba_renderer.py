@@ -176,7 +176,8 @@ class MitsubaRenderer:
         import drjit as dr
         import mitsuba as mi
 
-        from ..transport.camera_view import CameraView  # can be imported when a variant is set
+        from ..camera.sensor_rays import sensor_ray  # can be imported when a variant is set
+        from ..transport.camera_view import CameraView
 
         width, height = (int(n) for n in self._sensor.film().crop_size())
         # one pixel's rays follow each other: the nearer the rays of a packet, the quicker
@@ -189,8 +190,7 @@ class MitsubaRenderer:
         if self._sensor.needs_aperture_sample():  # those of a pixel lie apart on it
             along = (0.5 + mi.Float(of_pixel) * step for step in _PLASTIC)
             on_lens = mi.Point2f(*(number - dr.floor(number) for number in along))
-        ray, _ = self._sensor.sample_ray(0.5, 0.5, position, on_lens)
-        surface = CameraView(self._scene).met(ray)
+        surface = CameraView(self._scene).met(sensor_ray(self._sensor, position, on_lens))
         target = mi.ShapePtr(self.shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
         hit = surface.is_valid() & (surface.shape == target)

@@ -20,6 +20,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..camera.sensor_rays import film_samples
+
 MOST_SAMPLES = 1 << 23  # of one part, 20 bytes each; also far below the 2^32 that Mitsuba takes at once
 _NEXT_SEED = 0x9E3779B9
 
@@ -58,14 +60,13 @@ def render_part(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part)
 
 def _render(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> np.ndarray:
     sampler, spp = integrator.prepare(sensor, opaque(part.seed), part.spp, [])
-    ray, weight, position = integrator.sample_rays(scene, sensor, sampler)
+    ray, position = film_samples(sensor, sampler)
     light, *_ = integrator.sample(
         mode=dr.ADMode.Primal, scene=scene, sampler=sampler, ray=ray, depth=mi.UInt32(0), δL=None, δaovs=None,
         state_in=None, active=mi.Bool(True),
     )  # fmt: skip
-    light = mi.Color3f(light * weight)
-    position = mi.Point2f(position)
-    del sampler, ray, weight  # nothing else may become an output of the kernel
+    light = mi.Color3f(light)
+    del sampler, ray  # nothing else may become an output of the kernel
     dr.eval(light, position)
     film = sensor.film()
     width, height = (int(n) for n in film.crop_size())
@@ -79,7 +80,7 @@ def _render(integrator: Any, scene: mi.Scene, sensor: mi.Sensor, part: Part) -> 
     x = pixel - y * opaque(width)
     plain = rfilter.is_box_filter()
     reach = 0 if plain else math.ceil(rfilter.radius() - 0.5)
-    centre = mi.Point2f(mi.Float(x) + (offset[0] + 0.5), mi.Float(y) + (offset[1] + 0.5))
+    centre = mi.Point2f(x, y) + dr.opaque(mi.Point2f, (offset[0] + 0.5, offset[1] + 0.5))
     x, y = x + border, y + border
     left, right = dr.maximum(x, reach) - reach, dr.minimum(x + reach, columns - 1)
     bottom = dr.minimum(y + reach, rows - 1)
