@@ -51,6 +51,14 @@ def census(sources: dict[str, str]) -> Census:
     return Census(len(sources), count, module, fields, said, literals)
 
 
+def named_numbers(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
+    """Name and value of every number that is named at the top of a module."""
+    for node in tree.body:
+        if _names_a_number(node):
+            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+            yield target.id, node.value
+
+
 def _names_a_number(node: ast.stmt) -> bool:
     one_name = isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)
     return (one_name or isinstance(node, ast.AnnAssign)) and node.value is not None and _is_number(node.value)

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..process.backend_python import EXTENSION_ROOT, backend_environment
 from ..process.process_group import KILL, own_group, signal_group
 
-PATIENCE = 120.0  # seconds; the first start compiles a kernel with every LLVM it finds
+CHECK_SECONDS = 120.0  # seconds; the first start compiles a kernel with every LLVM it finds
 _MEMORY = "tested.json"
 
 
@@ -53,9 +53,9 @@ class BackendCheck:
         """The verdict once there is one; never blocks."""
         if self.verdict is None and self._process.poll() is not None:
             self.verdict = _read(self._process.returncode, _content(self._out), _content(self._err), self.python)
-        elif self.verdict is None and time.monotonic() - self._began > PATIENCE:
+        elif self.verdict is None and time.monotonic() - self._began > CHECK_SECONDS:
             self.close()
-            self.verdict = Verdict(False, f"The backend did not answer within {PATIENCE:.0f} s.")
+            self.verdict = Verdict(False, f"The backend did not answer within {CHECK_SECONDS:.0f} s.")
         return self.verdict
 
     def close(self) -> None:

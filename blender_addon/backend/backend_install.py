@@ -22,7 +22,7 @@ from .backend_folder import LOCK, LOG, complete, new_environment
 from .interpreters import InterpreterError, find_interpreter
 
 SCRIPT = Path(__file__).resolve().with_name("backend_install_script.py")
-CANCEL_GRACE = 5.0  # seconds the script has to clean up after itself
+CLEAN_UP_SECONDS = 5.0  # seconds the script has to clean up after itself
 SIZE = "about 130 MB to download, 450 MB on the disk"  # measured with the lock file of July 2026, Linux
 _LOG_LINES = 2000
 _CANCELLED = 4
@@ -156,7 +156,7 @@ class BackendInstall:
         while process is not None and process.poll() is None:
             if self._stop.is_set():
                 self._close_stdin()
-                deadline = deadline or time.monotonic() + CANCEL_GRACE
+                deadline = deadline or time.monotonic() + CLEAN_UP_SECONDS
                 if time.monotonic() > deadline:
                     signal_group(process.pid, KILL)
             time.sleep(0.05)

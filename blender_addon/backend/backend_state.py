@@ -16,12 +16,12 @@ from pathlib import Path
 import bpy
 
 from ..process.backend_python import BackendPythonError
+from ..process.background_task import TASK_TICK
 from .backend_check import BackendCheck, Verdict, remember, remembered
 from .backend_folder import LOG, is_outdated, remove_all
 from .backend_install import BackendInstall, InstallOutcome
 from .preferences import backend_root, chosen_python, preference
 
-TICK = 0.2  # seconds between two looks at a running process
 SHOWN_LINES = 8
 
 
@@ -214,12 +214,12 @@ def _end_check() -> None:
 
 def _drive() -> None:
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+        bpy.app.timers.register(_tick, first_interval=TASK_TICK, persistent=True)
 
 
 def _tick() -> float | None:
     step()
-    return TICK if _install is not None or _check is not None else None
+    return TASK_TICK if _install is not None or _check is not None else None
 
 
 def _first_look() -> None:

@@ -33,11 +33,11 @@ TINY = 1e-5  # metres; from a face an area light of that size lies in one direct
 SURE = 1e-1  # metres; nearer to it than that it does not
 WIDEST = 89.0  # degrees from an area light's axis, which shines on one side
 LOOKED_AT = 16  # directions that say whether all fall alike with the distance
-ALIKE = 2e-3  # the largest difference of two that do, of the larger one
+ALIKE_DIRECTIONS = 2e-3  # the largest difference of two that do, of the larger one
 # of places on a lamp, of which some lie at the edges of a picture: farther away faces look beside their place there
 DISTINCT = 5.0  # metres
 ALIKE_PLACES = 5e-2  # of the strongest place
-MOST_PLACES = 0.75  # of the places; what changes on fewer is not told from edges
+AWAY_FROM_EDGES = 0.75  # of the places; what changes on fewer is not told from edges
 COLORS = "material_fit"
 TURN = np.diag([1.0, -1.0, -1.0])  # a Blender lamp shines along its -Z, a pattern's along +Z
 
@@ -273,9 +273,9 @@ def _by_distance(
     expected = found[:, there : there + 1] * falloff
     most = np.maximum(np.maximum(found, expected).max(axis=(0, 2)), 1e-30)[:, None]
     off = np.abs(found - expected) / most
-    if not of_places and float(off[:, steps > SURE].max()) > ALIKE:
+    if not of_places and float(off[:, steps > SURE].max()) > ALIKE_DIRECTIONS:
         raise ProbeRequestError("Their light changes with the distance in another way in each direction.")
     of_each = off[:, (steps > SURE) & (steps < DISTINCT)].max(axis=(1, 2))
-    if of_places and float(np.quantile(of_each, MOST_PLACES)) > ALIKE_PLACES:
+    if of_places and float(np.quantile(of_each, AWAY_FROM_EDGES)) > ALIKE_PLACES:
         raise ProbeRequestError("Their light changes with the distance in another way at each place of the lamp.")
     return falloff, float(steps[there])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MARGIN = 1  # pixels around a disc, which filtering may look at
+PATTERN_MARGIN = 1  # pixels around a disc, which filtering may look at
 NEAR, FAR, STEPS = 1e-3, 1e3, 2048  # metres; between two steps a square is within 2e-5 of a line
 INSIDE = 1e-3  # share of a cone's angle that measurements keep away from its rim
 
@@ -46,7 +46,7 @@ def directions(side: int, rim: float, halves: int) -> NDArray[np.float64]:
     Of two halves, side by side, the second is turned round by the Y axis. Beyond the rim of one alone directions are
     those at the rim.
     """
-    axis = (np.arange(side) + 0.5 - side / 2) / (side / 2 - MARGIN)
+    axis = (np.arange(side) + 0.5 - side / 2) / (side / 2 - PATTERN_MARGIN)
     x, y = np.meshgrid(axis, -axis)
     sine = np.hypot(x, y) * math.sin(math.radians(rim) / 2)
     most = 1.0 if halves == 2 else math.sin(math.radians(rim) * (1.0 - INSIDE) / 2)
@@ -61,6 +61,6 @@ def directions(side: int, rim: float, halves: int) -> NDArray[np.float64]:
 def places(side: int) -> NDArray[np.float64]:
     """Places (side * side, 3) of the pixels' middles on a square from -1 to 1, row by row, first row at the largest y;
     those at its edges are a little inside."""
-    axis = (np.arange(side) + 0.5 - side / 2) / (side / 2 - MARGIN)
+    axis = (np.arange(side) + 0.5 - side / 2) / (side / 2 - PATTERN_MARGIN)
     x, y = np.meshgrid(*(np.clip(each, INSIDE - 1.0, 1.0 - INSIDE) for each in (axis, -axis)))
     return np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)

@@ -29,7 +29,7 @@ from .unwrap import unwrapped
 Pixels = NDArray[np.float32]
 
 UV_MAP, TANGENT, NO_MAP = "material_fit", "material_fit_tangent", "material_fit_none"
-MARGIN = 8  # texels around islands that take the colour beside them
+BLEED = 8  # texels around islands that take the colour beside them
 SAMPLES = 4  # a texel, so that fine patterns are averaged
 MOST_UV_MAPS = 8  # of a mesh
 FLAT = 2e-3  # largest slope of a normal map that counts as none
@@ -147,7 +147,7 @@ def _stage(
             mesh: Any = stage.item.data
             stage.scene.cycles.samples = SAMPLES
             settings = stage.scene.render.bake
-            settings.target, settings.margin, settings.margin_type = "IMAGE_TEXTURES", MARGIN, "EXTEND"
+            settings.target, settings.margin, settings.margin_type = "IMAGE_TEXTURES", BLEED, "EXTEND"
             faces = np.empty(len(mesh.polygons), dtype=np.int32)
             mesh.polygons.foreach_get("material_index", faces)
             uv = unwrapped(mesh, np.clip(faces, 0, last) == slot, stage.scene)

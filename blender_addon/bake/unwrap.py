@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ANGLE = 1.15  # radians; Blender's own default for Smart UV Project is 66 degrees
-MARGIN = 0.004  # between islands, in parts of the map: four texels of 1024
+ISLAND_MARGIN = 0.004  # between islands, in parts of the map: four texels of 1024
 
 
 def unwrapped(mesh: bpy.types.Mesh, slots: NDArray[np.bool_], scene: bpy.types.Scene) -> NDArray[np.float32]:
@@ -38,7 +38,7 @@ def unwrapped(mesh: bpy.types.Mesh, slots: NDArray[np.bool_], scene: bpy.types.S
             if chosen:
                 face.select_set(True)
         bmesh.update_edit_mesh(copy)
-        bpy.ops.uv.smart_project(angle_limit=ANGLE, island_margin=MARGIN)
+        bpy.ops.uv.smart_project(angle_limit=ANGLE, island_margin=ISLAND_MARGIN)
         bpy.ops.object.mode_set(mode="OBJECT")
         uv = np.zeros(len(copy.loops) * 2, dtype=np.float32)
         copy.uv_layers.active.uv.foreach_get("vector", uv)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 NAMES = ("reference", "result", "difference")
 COMPARISON = "Material Fit comparison"
 SPLIT = "Material Fit split"
-GAP = 8  # pixels between two pictures
+PICTURE_GAP = 8  # pixels between two pictures
 
 Display = NDArray[np.float32]  # display values (height, width, 4), bottom row first as Blender keeps them
 _halves: tuple[Display, Display] | None = None
@@ -28,12 +28,12 @@ def comparison_image(pictures: Path) -> bpy.types.Image:
     """
     parts = [_pixels(picture_image(pictures, name)) for name in NAMES]
     height = max(p.shape[0] for p in parts)
-    width = sum(p.shape[1] for p in parts) + GAP * (len(parts) - 1)
+    width = sum(p.shape[1] for p in parts) + PICTURE_GAP * (len(parts) - 1)
     strip = np.zeros((height, width, 4), np.float32)
     left = 0
     for part in parts:
         strip[: part.shape[0], left : left + part.shape[1]] = part
-        left += part.shape[1] + GAP
+        left += part.shape[1] + PICTURE_GAP
     return _packed(COMPARISON, strip)
 
 

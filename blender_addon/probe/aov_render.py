@@ -22,9 +22,9 @@ from ..export.camera.render_region import region_settings, square_size
 from ..versions import save_as_multilayer
 from .plain_exr import read_plain_exr
 
-MARGIN = 2.0  # pixels around the target: as far as a pixel filter looks
+FILTER_MARGIN = 2.0  # pixels around the target: as far as a pixel filter looks
 # bytes of one render's AOVs, 16 for each value and subpixel; larger ones are made at a smaller scale
-MOST_BYTES = 2 * 10**9
+MOST_AOV_BYTES = 2 * 10**9
 BYTES_PER_VALUE = 16
 LEAST_TRANSPARENT = 16  # surfaces that a ray may pass: those before the target, and its own
 
@@ -71,7 +71,7 @@ def frame_of(
         return None
     left, top, right, bottom = bounds
     area = max((right - left) * (bottom - top), 1)
-    while scale > 1 and area * scale**2 * outputs * BYTES_PER_VALUE > MOST_BYTES:
+    while scale > 1 and area * scale**2 * outputs * BYTES_PER_VALUE > MOST_AOV_BYTES:
         scale //= 2
     sides = (left * scale, top * scale, right * scale, bottom * scale)
     return Frame(scale, *sides, (size[0] * scale, size[1] * scale))
@@ -228,7 +228,7 @@ def _bounds(
     """Left, top, right and bottom of the pixels of a region that can see `obj`; all where it reaches behind the camera,
     None where there are none."""
     width, height = size
-    margin = int(MARGIN)
+    margin = int(FILTER_MARGIN)
     whole = (
         max(region.left - margin, 0),
         max(region.top - margin, 0),
@@ -252,9 +252,9 @@ def _bounds(
     left, right = (pick(point.x for point in seen) * width for pick in (min, max))
     bottom, top = (pick(point.y for point in seen) * height for pick in (min, max))
     found = (
-        max(math.floor(left - MARGIN), whole[0]),
-        max(math.floor(height - top - MARGIN), whole[1]),
-        min(math.ceil(right + MARGIN), whole[2]),
-        min(math.ceil(height - bottom + MARGIN), whole[3]),
+        max(math.floor(left - FILTER_MARGIN), whole[0]),
+        max(math.floor(height - top - FILTER_MARGIN), whole[1]),
+        min(math.ceil(right + FILTER_MARGIN), whole[2]),
+        min(math.ceil(height - bottom + FILTER_MARGIN), whole[3]),
     )
     return found if found[0] < found[2] and found[1] < found[3] else None

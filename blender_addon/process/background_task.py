@@ -16,6 +16,7 @@ from typing import Any
 from .job_process import log_tail
 from .process_group import KILL, own_group, signal_group
 
+TASK_TICK = 0.2  # seconds between two looks at a program that runs
 _SAMPLE = re.compile(r"Sample (\d+)/(\d+)")  # as Cycles prints it
 
 

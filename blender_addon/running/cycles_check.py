@@ -21,11 +21,9 @@ import bpy
 from ..check.preflight import redraw
 from ..pictures import previews
 from ..process.backend_python import EXTENSION_ROOT, backend_environment
-from ..process.background_task import BackgroundTask, Step, environment_for
+from ..process.background_task import TASK_TICK, BackgroundTask, Step, environment_for
 from ..process.temporary_folder import make_folder
 from ..result import shown_result
-
-TICK = 0.3  # seconds between two looks
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,7 @@ def _begin(folder: Path, steps: list[Step], done: Callable[[list[dict[str, Any]]
     runtime = _runtime()
     runtime.cycles_text, runtime.cycles_flip = steps[0].label, -1.0
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+        bpy.app.timers.register(_tick, first_interval=TASK_TICK, persistent=True)
     redraw()
 
 
@@ -180,7 +178,7 @@ def _blender_step(folder: Path, command: str, words: list[str], label: str) -> S
 
 
 def _tick() -> float | None:
-    return TICK if step() else None
+    return TASK_TICK if step() else None
 
 
 def _runtime() -> bpy.types.PropertyGroup:

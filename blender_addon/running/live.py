@@ -12,7 +12,7 @@ import bpy
 
 from . import running_export, running_job
 
-TICK = 0.2  # seconds between two looks
+SCENE_TICK = 0.2  # seconds between two looks at the scene
 SETTLED = 0.6  # seconds without a further change, so that a drag is one fit
 
 _seen: Any = None  # what the next fit depends on, as it was when it was looked at last
@@ -23,7 +23,7 @@ def watch(context: bpy.types.Context) -> None:
     """Called while drawing: look after the settings as long as Live is on."""
     if context.scene.mfo.live and not bpy.app.background and not bpy.app.timers.is_registered(_tick):
         forget(context.scene, context.view_layer)
-        bpy.app.timers.register(_tick, first_interval=TICK)
+        bpy.app.timers.register(_tick, first_interval=SCENE_TICK)
 
 
 def forget(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
@@ -61,7 +61,7 @@ def _tick() -> float | None:
         with bpy.context.temp_override(window=window), suppress(RuntimeError):
             if bpy.ops.mfo.fit.poll():
                 bpy.ops.mfo.fit("EXEC_DEFAULT", True)
-    return TICK
+    return SCENE_TICK
 
 
 def _look(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Any:

@@ -19,7 +19,6 @@ from ..check.preflight import look_at_scene, redraw
 from ..export.steps import STEP_SECONDS, Found, Pause, Steps, advance
 from . import running_job
 
-TICK = 0.1  # seconds between two looks at what is waited for
 AT_ONCE = 1.0  # seconds that a press may take: the export of a plain scene is done then, and its fit has begun
 DRAWN = 0.01  # seconds that Blender has to draw where nothing is waited for
 _UNDONE = "The export was ended by an undo or another file: press Fit again."
@@ -155,7 +154,7 @@ def _look(scene: bpy.types.Scene) -> object:
 
 
 def _interval(pause: Pause) -> float:
-    return DRAWN if pause.is_over() else TICK
+    return DRAWN if pause.is_over() else running_job.TICK
 
 
 def _hand_over(job: RunningExport, found: object) -> None:

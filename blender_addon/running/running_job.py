@@ -35,7 +35,7 @@ from . import fit_queue, kept_results, notice
 from .fit_queue import PreparedFit
 
 TICK = 0.1  # seconds between two looks at the process
-PATIENCE = 60  # looks at a modal operator before a result goes into its history without an undo step
+MODAL_LOOKS = 60  # looks at a modal operator before a result goes into its history without an undo step
 _FIRST_STAGES = ("scan", "start")  # they look for a place to begin; every other stage refines
 _FIRST_GUESS = 0.05  # share from which on the time left is more than a guess
 _GOOD = {"converged", "stale", "unchanged", "max_iterations"}
@@ -53,7 +53,7 @@ class RunningJob:
 current: RunningJob | None = None
 unrecorded: list[tuple[JobResult, int]] = []  # results with their material's session_uid, not in its history yet
 _refused: object = None  # what was checked when a fit was refused last
-_patience = PATIENCE
+_patience = MODAL_LOOKS
 
 
 def start(fit: PreparedFit, *, timer: bool) -> None:
@@ -244,7 +244,7 @@ def _record_as_undo_step() -> None:
         return
     else:
         record_results()
-    _patience = PATIENCE
+    _patience = MODAL_LOOKS
 
 
 def _start_next() -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..types.status import Status
-from .cluster import POLL_SECONDS, RETRIES, as_they_come
+from .cluster import LOOK_SECONDS, RETRIES, as_they_come
 
 _ROOT = Path(__file__).resolve().parents[2]
 
@@ -56,7 +56,7 @@ def run_one(
     asked = False
     while True:
         try:
-            _, errors = process.communicate(timeout=POLL_SECONDS)
+            _, errors = process.communicate(timeout=LOOK_SECONDS)
             break
         except subprocess.TimeoutExpired:
             if should_stop() and not asked:
@@ -91,7 +91,7 @@ def run_here(
     with ThreadPoolExecutor(at_once) as pool:
         waiting = {pool.submit(run_one, job, threads, should_stop, trusted) for job in jobs}
         while waiting:
-            ended, waiting = wait(waiting, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED)
+            ended, waiting = wait(waiting, timeout=LOOK_SECONDS, return_when=FIRST_COMPLETED)
             yield from (future.result() for future in ended)
             if should_stop():
                 waiting = {future for future in waiting if not future.cancel()}

@@ -19,7 +19,7 @@ from ..types.errors import BadInputError, SetupError
 from ..types.processors import processors
 
 RETRIES = 2  # of work that raises; a lost worker's work goes to another one without counting here
-POLL_SECONDS = 0.2
+LOOK_SECONDS = 0.2
 NO_WORKER_SECONDS = 120.0  # a cluster may take this long to replace one
 # after which workers are added to a cluster of our own: a nanny of Dask (2026.8.0) does not replace one that died while
 # it started. Larger: a longer wait after that. Smaller: busy cores start workers that were not needed
@@ -98,7 +98,7 @@ def as_they_come(
     lost: list[Any] = []  # whose result was on a worker that died: Dask computes them again
     while left and not should_stop():
         try:
-            future = ended.get(timeout=POLL_SECONDS)
+            future = ended.get(timeout=LOOK_SECONDS)
         except queue.Empty:
             if workers := client.scheduler_info()["workers"]:
                 alive, renewed, crew = time.monotonic(), False, max(crew, len(workers))
@@ -132,7 +132,7 @@ def _outcome(future: Any) -> Outcome | None:
         If the scheduler is gone.
     """
     try:
-        error = future.exception(timeout=POLL_SECONDS)
+        error = future.exception(timeout=LOOK_SECONDS)
         return Outcome(error=error) if error is not None else Outcome(future.result(timeout=_CONNECT_SECONDS))
     except TimeoutError:
         return None

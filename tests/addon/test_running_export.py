@@ -44,14 +44,14 @@ def steps(log: list[str], *, fails: bool = False, holds_scene: bool = False):
 
 
 def test_a_timer_takes_the_steps(scene: SimpleNamespace, taken: list[object]) -> None:
-    from blender_addon.running import running_export
+    from blender_addon.running import running_export, running_job
 
     log: list[str] = []
     running_export.start(scene.bpy.context, steps(log), taken.append)
     assert log == ["first"]
     assert not scene.bpy.ops.mfo.fit.poll()
     assert scene.bpy.ops.mfo.cancel.poll()
-    assert running_export._tick() == running_export.TICK
+    assert running_export._tick() == running_job.TICK
     assert log == ["first"]  # which it waits for
     log.append("go")
     assert running_export._tick() is not None
@@ -123,7 +123,7 @@ def test_windows_are_drawn_between_pictures(scene: SimpleNamespace, taken: list[
     from contextlib import contextmanager
 
     from blender_addon.export.steps import Pause, held
-    from blender_addon.running import running_export
+    from blender_addon.running import running_export, running_job
 
     log: list[str] = []
 
@@ -149,7 +149,7 @@ def test_windows_are_drawn_between_pictures(scene: SimpleNamespace, taken: list[
     running_export.start(scene.bpy.context, both(), taken.append)
     piece = ["shown", "read", "written", "back"]
     assert log == piece
-    assert running_export._tick() == running_export.TICK
+    assert running_export._tick() == running_job.TICK
     assert log == piece  # nothing is shown for a look at what is waited for
     log.append("evaluated")
     running_export._tick()

@@ -38,9 +38,11 @@ collect_ignore = (
 
 @pytest.fixture(scope="session")
 def mitsuba() -> Any:
+    from mfo_backend.render.machine.variant import load_variant
+
+    load_variant("llvm_ad_rgb")
     import mitsuba as mi
 
-    mi.set_variant("llvm_ad_rgb")
     from mfo_backend.render.lamps.lamp_plugins import register
 
     register()

@@ -29,8 +29,10 @@ APART = ((0, 2), (2, 0), (2, 2), (2, -2), (0, 3), (3, 0))
 FINE = (((0, 1), (1, 0)), ((1, 1), (1, -1)), ((0, 2), (2, 0)), ((2, 2), (2, -2)))
 # The same of means over blocks, which share nothing
 NEXT = ((0, 1), (1, 0), (1, 1), (1, -1))
-BLUR = 2.0  # pixels: of what an eye is asked about, so that it does not look at noise
-REACH = 4  # pixels to each side of one that its noise is taken from
+# Pixels: of what an eye is asked about, so that it does not look at noise. Nine tenths of independent noise go, and
+# little of what few global values change
+BLUR = 2.0
+NOISE_REACH = 4  # pixels to each side of one that its noise is taken from
 LEAST_PIXELS = 40  # fewer say too little
 # Below as many, noise is drawn from the pictures themselves, with their tails and colours: normal numbers of the same
 # variance look larger, by up to 0.03 of FLIP in rooms of Cycles, and made errors of 0.02 look like 0.01 on targets of
@@ -45,8 +47,8 @@ FILTERED = 0.6
 MOST_APART = 0.5
 LEAST_STEP = 1e-3  # of light: over which the slope of a display is taken. No measurement
 DRAWS = 4  # whose mean is the noise of few pixels; of one, FLIP scattered by 0.005
-# Standard deviations that are chance: they are taken from what neighbours share, and a slope may be so much larger in
-# truth. No measurement
+# Standard deviations that are chance: they are taken from what neighbours share, a slope may be so much larger in
+# truth, and a square that is not above so many of its own may be none. No measurement
 CHANCE = 2.0
 
 Light = NDArray[np.floating]
@@ -126,8 +128,8 @@ def _of_few(
     wider than a pixel. Drawn signs lose it, so it is made up for in size: in a mean over neighbours it adds to the
     variance.
     """
-    squares = sums_around(np.square(apart).mean(axis=-1) * mask, REACH)
-    around = squares / np.maximum(sums_around(mask.astype(np.float64), REACH), 1.0)
+    squares = sums_around(np.square(apart).mean(axis=-1) * mask, NOISE_REACH)
+    around = squares / np.maximum(sums_around(mask.astype(np.float64), NOISE_REACH), 1.0)
     wide = max(_shared_square(apart, mask, lags)[0], 0.0)
     beside, across = (max(_shared_square(apart, mask, of)[0] - wide, 0.0) for of in FINE[:2])
     mean = max(float(variance[mask].mean()), 1e-30)
@@ -157,9 +159,9 @@ def _noise_variance(apart: Light, mask: Mask, lags: Sequence[tuple[int, int]]) -
         both = mask[here] & mask[there]
         products[here] += (apart[here] * apart[there]).mean(axis=-1) * both
         pairs[here] += both
-    shared = sums_around(products, REACH) / np.maximum(sums_around(pairs, REACH), 1.0)
-    squares = sums_around(np.square(apart).mean(axis=-1) * mask, REACH)
-    variance = squares / np.maximum(sums_around(mask.astype(np.float64), REACH), 1.0)
+    shared = sums_around(products, NOISE_REACH) / np.maximum(sums_around(pairs, NOISE_REACH), 1.0)
+    squares = sums_around(np.square(apart).mean(axis=-1) * mask, NOISE_REACH)
+    variance = squares / np.maximum(sums_around(mask.astype(np.float64), NOISE_REACH), 1.0)
     return np.where(mask, np.maximum(variance - np.maximum(shared, 0.0), 0.0), 0.0)
 
 

@@ -19,7 +19,7 @@ from ...types.verdict import Verdict
 from ..result.outcome import START_KEPT
 from .verdict import difference_of, is_worse, judge, worst_judgement
 
-MOVED = 1e-6  # relative to a value and to 1: float32 from file to file
+FILE_ROUNDING = 1e-6  # relative to a value and to 1: float32 from file to file
 
 
 def judged_result(
@@ -79,7 +79,7 @@ def _has_moved(result: FitResult) -> bool:
 
 
 def _moved(before: Value | None, after: Value) -> bool:
-    return before is None or not np.allclose(before, after, rtol=MOVED, atol=MOVED)
+    return before is None or not np.allclose(before, after, rtol=FILE_ROUNDING, atol=FILE_ROUNDING)
 
 
 def _said(result: FitResult, *, doubted: bool) -> dict[str, Certainty]:

@@ -17,7 +17,7 @@ MOST_SHIFT = 5  # pixels that a picture is tried to be moved by, along each axis
 # Part of the squared difference that a moved picture takes away, from which on its place is the reason
 EXPLAINED = 0.5
 SMOOTH = 1.0  # pixels: noise would hide what a shift takes away
-BESIDE = 6  # pixels around the target that a shift is looked for in
+SHIFTED_WITHIN = 6  # pixels around the target that a shift is looked for in
 RIM = 2  # pixels inside of the silhouette that belong to it
 # Part of the squared difference at the silhouette, and how much more than the silhouette's part of the area
 AT_RIM, MORE_THAN_AREA = 0.6, 2.0
@@ -99,7 +99,7 @@ class _Shift(NamedTuple):
 def _best_shift(reference: Shown, result: Shown, mask: Mask) -> _Shift:
     """That of some pixels at the target and beside it."""
     first, second = _calm(reference), _calm(result)
-    near = widened(mask, BESIDE)
+    near = widened(mask, SHIFTED_WITHIN)
     edge = MOST_SHIFT  # what is moved in from outside of the picture is not known
     height, width = mask.shape
     inside = (slice(edge, height - edge), slice(edge, width - edge))

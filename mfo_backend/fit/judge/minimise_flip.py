@@ -13,7 +13,7 @@ from ...types.image import Pixels
 from .picture_judge import PictureJudge
 
 Vector = NDArray[np.float64]
-EVALUATIONS = 12  # a gradient of HDR-FLIP at 256 x 256 takes about a tenth of a second
+FLIP_EVALUATIONS = 12  # a gradient of HDR-FLIP at 256 x 256 takes about a tenth of a second
 GAIN = 1e-3  # relative to the error at the start; less cannot be seen
 SKIP_BELOW = 1e-4  # a mean FLIP that leaves nothing to gain
 
@@ -46,7 +46,7 @@ def minimise_flip(
 
     def at(scaled: Vector) -> tuple[float, Vector]:
         nonlocal best, best_value, count
-        if count >= EVALUATIONS or should_stop():
+        if count >= FLIP_EVALUATIONS or should_stop():
             raise _Enough
         count += 1
         x = np.clip(lower + scaled * width, lower, upper)
@@ -67,5 +67,7 @@ def minimise_flip(
     first = np.clip((start - lower) / width, 0.0, (upper - lower) / width)
     bounds = list(zip(np.zeros_like(width), (upper - lower) / width, strict=True))
     with suppress(_Enough):
-        minimize(at, first, jac=True, method="SLSQP", bounds=bounds, options={"ftol": GAIN, "maxiter": EVALUATIONS})
+        minimize(
+            at, first, jac=True, method="SLSQP", bounds=bounds, options={"ftol": GAIN, "maxiter": FLIP_EVALUATIONS}
+        )
     return best, best_value

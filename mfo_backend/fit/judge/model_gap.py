@@ -13,13 +13,12 @@ from ...metrics.pixels.neighbours import sums_around
 from ...types.image import Encoding, Image, Pixels
 from ...types.model_gap import ModelGap
 from ..tolerances import DIM_FLOOR
+from .beyond_noise import CHANCE
 from .region import blocks_around
 
-BLOCK = 4  # pixels along each side of what is compared
+GAP_BLOCK = 4  # pixels along each side of what is compared
 LEAST_BLOCKS = 32  # fewer say too little
 CONFIDENCE = 1.64  # standard deviations that 95 % of normal draws stay below
-# A difference whose square is not twice its standard deviation above 0 may be none
-SIGNIFICANT = 2.0
 
 
 def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np.bool_], view: View) -> ModelGap | None:
@@ -30,7 +29,7 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
     itself. Noise that is not independent from pixel to pixel, as after denoising, counts as a difference; so does
     anything else that is wider than a pixel. None if the target fills too few blocks.
     """
-    near = blocks_around(mask, BLOCK)
+    near = blocks_around(mask, GAP_BLOCK)
     mask, target = mask[near], reference.pixels[near]
     first, second = (render[near] for render in renders)
     if reference.encoding is Encoding.SRGB:  # what a display cannot show is not known of the reference
@@ -38,19 +37,21 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
         first, second = view.light(first), view.light(second)
     weight = mask.astype(np.float64)[..., None]
     even = (np.indices(mask.shape).sum(axis=0) % 2 == 0)[..., None]
-    full = block_sums(weight, BLOCK)[..., 0] == BLOCK * BLOCK
+    full = block_sums(weight, GAP_BLOCK)[..., 0] == GAP_BLOCK * GAP_BLOCK
     if np.count_nonzero(full) < LEAST_BLOCKS:
         return None
-    half = BLOCK * BLOCK / 2
+    half = GAP_BLOCK * GAP_BLOCK / 2
     a, b = (
-        block_sums((np.asarray(render, np.float64) - target) * weight * chosen, BLOCK)[full] / half
+        block_sums((np.asarray(render, np.float64) - target) * weight * chosen, GAP_BLOCK)[full] / half
         for render, chosen in ((first, even), (second, ~even))
     )
-    level = _around(block_sums(np.asarray(first, np.float64) + second, BLOCK).mean(axis=-1) / (2 * BLOCK**2), full)
+    level = _around(
+        block_sums(np.asarray(first, np.float64) + second, GAP_BLOCK).mean(axis=-1) / (2 * GAP_BLOCK**2), full
+    )
     scale = np.maximum(level, 0.0) + DIM_FLOOR * max(float(level.mean()), 1e-12)
     squares = (a * b / scale**2).mean(axis=-1)
     square, sd = float(squares.mean()), float(squares.std()) / squares.size**0.5
-    found = max(square, 0.0) ** 0.5 if square > SIGNIFICANT * sd else 0.0
+    found = max(square, 0.0) ** 0.5 if square > CHANCE * sd else 0.0
     return ModelGap(found, max(square + CONFIDENCE * sd, 0.0) ** 0.5)
 
 

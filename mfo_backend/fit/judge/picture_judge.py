@@ -11,10 +11,9 @@ from ...metrics.flip.block_means import block_means, block_side, block_sums, ful
 from ...metrics.losses.loss import Loss
 from ...types.image import Encoding, Image, Pixels
 from ..settings import FitSettings
+from .beyond_noise import BLUR
 from .checked_reference import counted_pixels, stage_losses
 from .region import fill_outside
-
-BLUR = 2.0  # pixels: takes nine tenths of independent noise away and little of what few global values change
 
 
 class PictureJudge:

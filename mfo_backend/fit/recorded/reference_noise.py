@@ -21,7 +21,7 @@ from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
 from ...types.image import Pixels
 from ..tolerances import DIM_FLOOR
 
-REACH = 8  # pixels to each side of a tile that its variance is taken from
+VARIANCE_REACH = 8  # pixels to each side of a tile that its variance is taken from
 PRIOR_PAIRS = 8  # pairs of pixels that the variance of the whole picture counts for
 SKEW = 1.5  # mean over median of the tiles' variances under path tracing's skewed noise, about
 
@@ -78,7 +78,7 @@ def tile_noise(
     if not counted.any():
         return TileNoise(np.ones((len(groups), 3)), 0.0)
     typical = SKEW * np.median(squares[counted] / pairs[counted], axis=0)  # which one firefly cannot move
-    reach = REACH // (side * step)
+    reach = VARIANCE_REACH // (side * step)
     variance = (_around(squares, reach) + PRIOR_PAIRS * typical) / (_around(pairs, reach) + PRIOR_PAIRS)
 
     first = np.divmod(groups.pixels[groups.first[:-1]], width)

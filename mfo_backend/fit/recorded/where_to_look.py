@@ -29,7 +29,7 @@ MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recordi
 # A recording that leaves pixels out: no more of them than this share; so many of the brightest are in it; and what
 # counts as lit, of the median of the target
 MOST_THINNED, BRIGHTEST, LIT = 0.6, 100, 0.01
-FEW_PIXELS = 16  # a target this small may lie between the rays of a coarser grid
+SMALL_TARGET = 16  # a target this small may lie between the rays of a coarser grid
 FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
 _AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
@@ -102,7 +102,7 @@ def detail_grid(
     grid[inside & (change > 0.5)] = GRID_EDGE
     if edges is not None:
         grid[edges] = GRID_EDGE
-    if mask.sum() <= FEW_PIXELS:
+    if mask.sum() <= SMALL_TARGET:
         grid[mask] = GRID_EDGE
     return grid
 

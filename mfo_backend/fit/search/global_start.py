@@ -30,7 +30,7 @@ OPPOSITE, OPPOSITE_WIDTH = (1.0 - METAL, METAL), 0.3
 ROUGHER_WIDTH = 0.6
 # Of the residuals, for one node. With 2 and 8 the first 14 scenes of `base` end at the same FLIP, for 0.95 and 1.04 of
 # the passes; those of `noise` with 2, for 0.98
-EVALUATIONS = 4
+NODE_EVALUATIONS = 4
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def scan(
             for name, value in {**hold, **dict(zip(held, values, strict=True))}.items():
                 part = table.slice_of(name)
                 start[part] = lower[part] = upper[part] = value
-            limits = SolveLimits(evaluations=EVALUATIONS, cost_change=1e-3, damping=1e-3)
+            limits = SolveLimits(evaluations=NODE_EVALUATIONS, cost_change=1e-3, damping=1e-3)
             try:
                 solution = solve_bounded(residuals, start, lower, upper, limits)
             except ValueError:  # no finite numbers there: the node comes last

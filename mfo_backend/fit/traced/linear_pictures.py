@@ -21,7 +21,7 @@ MOST_PIXELS = 1 << 16  # whole pictures are needed; of more pixels one takes too
 # of 4 % is found in half of the pictures of 48 x 48 pixels only
 HALF_PATHS = 1 << 19
 HALF_SAMPLES = (4, 32)  # of a pixel, at least and at most
-REACH = 0.1  # of the range: as far as one linear picture is trusted
+LINEAR_WITHIN = 0.1  # of the range: as far as one linear picture is trusted
 TILE = 4  # pixels: averages noise before the response of an eye bends it
 
 Vector = NDArray[np.float64]
@@ -32,7 +32,7 @@ class LinearPictures:
     """Whole pictures of the target with many paths a pixel, and their derivatives, as `pictures` traces them.
 
     Noise is no part of a search on them: a picture and its derivatives are traced once, and what is minimised is a
-    measure of y + J (x - at) within `REACH`.
+    measure of y + J (x - at) within `LINEAR_WITHIN`.
     """
 
     def __init__(self, pictures: TracedTiles, seed: int) -> None:
@@ -64,7 +64,7 @@ class LinearPictures:
     def box(self, x: Vector, kept: NDArray[np.bool_]) -> tuple[Vector, Vector]:
         """Bounds around `x`; the values of `kept` stay."""
         table = self._pictures.paths.table
-        reach = np.where(kept, 0.0, REACH * self.width)
+        reach = np.where(kept, 0.0, LINEAR_WITHIN * self.width)
         return np.maximum(table.lower, x - reach), np.minimum(table.upper, x + reach)
 
     def whole(self, rows: NDArray[np.floating]) -> Pixels:

@@ -20,8 +20,8 @@ from .linear_pictures import LinearPicture, LinearPictures
 
 FLIP = "flip"
 ROUNDS = 2  # linear pictures of the stage `flip`; a third changed nothing
-STILL = 0.01  # of the range: a shorter way needs no other picture
-COST_CHANGE = 1e-4  # relative, of a step that ends them
+SHORT_WAY = 0.01  # of the range: a shorter way needs no other picture
+STAGE_COST_CHANGE = 1e-4  # relative, of a step that ends them
 
 Vector = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def _lower_squares(
     residual = make(pictures.tiles.reference)
     with course.stage(name) as stage:
         equations = course.watch(stage, unbiased_equations(picture.of_tiles(), residual, start))
-        limits = SolveLimits(evaluations=PERCEPTUAL_EVALUATIONS, cost_change=COST_CHANGE)
+        limits = SolveLimits(evaluations=PERCEPTUAL_EVALUATIONS, cost_change=STAGE_COST_CHANGE)
         try:
             stage.vector = solve_bounded(equations, start, *pictures.box(start, kept), limits, course.should_stop).x
         except ValueError:  # a response may not be finite where a picture is
@@ -94,7 +94,7 @@ def _lower_flip(
             )
             moved = float(np.max(np.abs(new - x) / width))
             x = stage.vector = new
-            following = pictures.around(x, turn + 1) if turn < ROUNDS and moved >= STILL else None
+            following = pictures.around(x, turn + 1) if turn < ROUNDS and moved >= SHORT_WAY else None
             if following is None:
                 break
             picture = following

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...types.image import Pixels
 from .sample_count import EqualCounts, NoiseComparison, Recount, TwoPictures, equal_counts, recount
-from .tile_rows import BLOCK, CHANNELS, TileRows
+from .tile_rows import CHANNELS, LARGEST_TILE, TileRows
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from ...render.traced.traced_paths import TracedPaths
@@ -120,7 +120,7 @@ class TracedTiles:
 
     def counted(self, x: Vector, most: int, seed: int) -> TracedTiles:
         """The same, compared as the reference's noise asks for, judged by pictures of `x` in about `most` pixels."""
-        pixels = replace(self, counts=None).tiles(BLOCK, most).pixels
+        pixels = replace(self, counts=None).tiles(LARGEST_TILE, most).pixels
         counts = equal_counts(self.reference, self.mask, pixels, self.clipped, self._linear(x, pixels, seed))
         return replace(self, counts=counts)
 

@@ -37,8 +37,8 @@ LEVEL = 0.25  # of the median: below, compressed values are about linear
 MOST_COUNT = 64  # samples a pixel; more take too long, and there is less to compress
 ALIKE = 0.2  # logarithm: with so much more noise at the most samples these are taken
 LOUD = 0.25  # relative variance of a pixel's radiance; for a calmer reference plain squares do, in half the time
-REACH = 3  # pixels to each side that noise is averaged over
-FINER = 0.1  # of `LEVEL`, for the count: counts of glass' pictures are off by 7 % with it, and by 9 % without
+COUNT_REACH = 3  # pixels to each side that noise is averaged over
+COUNT_LEVEL = 0.1  # of `LEVEL`, for the count: counts of glass' pictures are off by 7 % with it, and by 9 % without
 GROUPS = 24  # of pixels, whose scatter tells how well the noise is known
 LEAST = 1e-30
 LEAST_SLOPE = 0.05  # of the excess by the logarithm of the count: below, noise hardly tells it
@@ -127,7 +127,7 @@ def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArra
     """
     model = halves.mean(axis=0)
     inside, shown = _in_picture(model, pixels, shape)
-    total, count = (sums_around(picture, REACH) for picture in (shown, inside.astype(np.float64)))
+    total, count = (sums_around(picture, COUNT_REACH) for picture in (shown, inside.astype(np.float64)))
     level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + DIM_FLOOR * float(model.mean())
     residual = (seen - model) / np.maximum(level, 1e-30)
     here, there = neighbour_pairs(pixels, shape)
@@ -138,7 +138,7 @@ def _local_noise(variance: Vector, pixels: NDArray[np.int64], shape: Shape) -> P
     """Variances (p, 3) averaged with those around them, and nowhere near 0: (height, width, 3)."""
     inside, shown = _in_picture(variance, pixels, shape)
     mean = variance.mean(axis=0)
-    total, count = (sums_around(picture, REACH) for picture in (shown, inside.astype(np.float64)))
+    total, count = (sums_around(picture, COUNT_REACH) for picture in (shown, inside.astype(np.float64)))
     return ((total + PRIOR * mean) / (count + PRIOR)[..., None] + FLOOR * mean).astype(np.float32)
 
 
@@ -168,7 +168,7 @@ class NoiseComparison:
     def __init__(
         self, reference: Values, pixels: NDArray[np.int64], shape: tuple[int, ...], level: float, top: float
     ) -> None:
-        self._level, self._top = FINER * level, top
+        self._level, self._top = COUNT_LEVEL * level, top
         self._seen = self._compressed(reference.reshape(-1, 3)[pixels])
         self._here, self._there = neighbour_pairs(pixels, shape)
         self._group = self._here * GROUPS // len(pixels)

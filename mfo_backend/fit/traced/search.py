@@ -22,7 +22,7 @@ from .polished import CORE
 
 Vector = NDArray[np.float64]
 
-ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
+TRACED_ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 TRUST = 0.25  # of the range: the longest step
 RIVALS = 3  # other ends of a race
@@ -79,7 +79,7 @@ def scan(setting: Setting) -> list[Vector]:
     plan, table, pictures = setting.plan, setting.table, setting.pictures
     with setting.course.stage("scan") as stage:
         tiles = pictures.tiles(4, plan.scan_pixels)
-        nodes = {"roughness": ROUGHNESS_NODES, "ior": IOR_NODES}
+        nodes = {"roughness": TRACED_ROUGHNESS_NODES, "ior": IOR_NODES}
         held = [name for name in GEOMETRIC if name in table.names]
         middle = setting.start.copy()
         for name in ("base_color", "transmission_weight"):

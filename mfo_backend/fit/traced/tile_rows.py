@@ -15,7 +15,7 @@ from ..tolerances import DIM_FLOOR
 Rows = NDArray[np.float32]
 
 
-BLOCK = 8  # pixels: the largest tile
+LARGEST_TILE = 8  # pixels: the largest tile
 CHANNELS = 3  # of a tile follow each other and share its noise
 
 
@@ -108,14 +108,14 @@ def _some_blocks(mask: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
     count = int(mask.sum())
     if count <= most:
         return np.ones_like(mask)
-    rows, columns = (-(-n // BLOCK) for n in mask.shape)
-    padded = np.zeros((rows * BLOCK, columns * BLOCK), bool)
+    rows, columns = (-(-n // LARGEST_TILE) for n in mask.shape)
+    padded = np.zeros((rows * LARGEST_TILE, columns * LARGEST_TILE), bool)
     padded[: mask.shape[0], : mask.shape[1]] = mask
-    filled = np.flatnonzero(padded.reshape(rows, BLOCK, columns, BLOCK).any(axis=(1, 3)).ravel())
+    filled = np.flatnonzero(padded.reshape(rows, LARGEST_TILE, columns, LARGEST_TILE).any(axis=(1, 3)).ravel())
     wanted = min(max(round(len(filled) * most / count), 6), len(filled))
     chosen = np.zeros(rows * columns, bool)
     chosen[filled[np.linspace(0, len(filled) - 1, wanted).astype(int)]] = True
-    whole = np.repeat(np.repeat(chosen.reshape(rows, columns), BLOCK, 0), BLOCK, 1)
+    whole = np.repeat(np.repeat(chosen.reshape(rows, columns), LARGEST_TILE, 0), LARGEST_TILE, 1)
     return whole[: mask.shape[0], : mask.shape[1]]
 
 

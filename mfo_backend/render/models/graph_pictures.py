@@ -30,7 +30,7 @@ MOST_SUBPIXELS = 400_000  # of a small picture at its scale
 # Where normals change two subpixels are too few, and certainty does not know: values were 2 to 3 % off. Up to 256 x 256
 MOST_SUBPIXELS_OF_NORMALS = 1_050_000
 FINE_SCALE, FINE_SAMPLES = 4, 4  # of a scene's textures; the scale of the export's, where that is smaller
-RECALLED = 6  # answers that are kept
+KEPT_ANSWERS = 6  # answers that are kept
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
 # square: a tenth of what is seen, and a third of what a noisy reference hides
 EXTRAPOLATED = 1e-3
@@ -150,7 +150,7 @@ class GraphPictures:
         key = vector.tobytes()
         if key not in self._states:
             self._states[key] = self._extrapolated(vector) or self._evaluated(vector)
-            if len(self._states) > RECALLED:
+            if len(self._states) > KEPT_ANSWERS:
                 self._states.popitem(last=False)
         self._states.move_to_end(key)
         return self._states[key]
@@ -202,7 +202,7 @@ class GraphPictures:
         for known, other in self._exact[-1:]:
             bend = _bend(state, other, self._width, (vector - known) / self._width)
             self._bend = bend if self._bend is None else np.maximum(self._bend, bend)
-        self._exact = [*self._exact[1 - RECALLED :], (vector.copy(), state)]
+        self._exact = [*self._exact[1 - KEPT_ANSWERS :], (vector.copy(), state)]
         return state
 
     def _extrapolated(self, vector: Vector) -> GraphState | None:
@@ -230,7 +230,7 @@ class GraphPictures:
                 name_of(s): Shown(p, found.elsewhere.get(s), None if s in DIRECTIONS else _flat(p, seen)[-1])
                 for s, p in found.pictures[0].items()
             }
-            if len(self._fine) > RECALLED:
+            if len(self._fine) > KEPT_ANSWERS:
                 self._fine.popitem(last=False)
         self._fine.move_to_end(key)
         return self._fine[key]

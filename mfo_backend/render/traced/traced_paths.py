@@ -35,7 +35,7 @@ from ..transport.shadow_rays import ShadowRays, left_of, sample_light
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from .traced_target import TracedTarget
 
-MOST_LANES = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
+LANES_OF_A_LAUNCH = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two
 MOST_FLOATS = 1 << 24  # that leave one launch, 64 MB
 DEEPEST = 32  # path length of a scene without a limit
 
@@ -100,7 +100,7 @@ class TracedPaths:
         vectors = np.atleast_2d(vectors)
         count = (1 + len(self._tangents.entries)) if jacobian else 1
         result = np.zeros((len(vectors), len(pixels), 3, count), np.float32)
-        most = min(MOST_LANES, MOST_FLOATS // (3 * count))
+        most = min(LANES_OF_A_LAUNCH, MOST_FLOATS // (3 * count))
         rows = max(1, min(len(pixels), most // samples))
         models = max(1, most // (rows * samples))
         for begin in range(0, len(pixels), rows):

@@ -28,7 +28,7 @@ from .bodies import bodies_of, met_inside
 from .disk_probes import probed
 
 # Collisions that a walk survives whatever is absorbed: a short one that ended by chance is only noise. No measurement
-CERTAIN = 8
+SPARED_COLLISIONS = 8
 _PER_COLLISION = 4  # places of the random numbers
 
 
@@ -93,7 +93,7 @@ def walked(
         length = length + dr.select(leaves, met.t, dr.select(collides, t, 0.0))
         collisions = collisions + dr.select(collides, 1, 0)
         goes_on = collides & (collisions < MOST_COLLISIONS)
-        goes_on &= (collisions <= CERTAIN) | (u.y < survival)
+        goes_on &= (collisions <= SPARED_COLLISIONS) | (u.y < survival)
         scattered = _scattered(d, g, numbers.pair(place + 2))
         p = dr.select(goes_on, p + t * d, p)
         d = dr.select(goes_on, scattered, d)
@@ -107,7 +107,7 @@ def walked(
     exits.sh_frame = mi.Frame3f(dr.mulsign(mi.Vector3f(exits.sh_frame.n), dr.dot(exits.n, d)))
     exits.wi = exits.to_local(d)
     count = mi.Float(collisions)
-    passed = dr.log(survival) * dr.maximum(count - CERTAIN, 0.0)
+    passed = dr.log(survival) * dr.maximum(count - SPARED_COLLISIONS, 0.0)
     logs = [dr.log(extinction) * count - extinction * length for extinction in extinctions]
     largest = logs[0]
     for each in logs[1:]:

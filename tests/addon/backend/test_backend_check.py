@@ -82,7 +82,7 @@ def test_an_answer_that_is_none(tmp_path: Path, line: str) -> None:
 
 
 def test_one_that_never_answers_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(backend_check, "PATIENCE", 0.3)
+    monkeypatch.setattr(backend_check, "CHECK_SECONDS", 0.3)
     python = tmp_path / "python"
     python.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid\nexec sleep 3600\n")
     python.chmod(0o755)

@@ -86,7 +86,7 @@ def test_a_wheel_with_another_hash_is_refused_and_nothing_stays(folder: Path, wh
 def test_cancel_ends_the_whole_group_and_removes_the_environment(
     folder: Path, wheels: tuple[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(backend_install, "CANCEL_GRACE", 3600.0)  # it ends by itself, nobody kills it
+    monkeypatch.setattr(backend_install, "CLEAN_UP_SECONDS", 3600.0)  # it ends by itself, nobody kills it
     source, lock = wheels
     install = BackendInstall(folder, BASE, source, lock)
     end = time.monotonic() + 30

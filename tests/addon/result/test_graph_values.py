@@ -243,7 +243,7 @@ def test_all_answers_have_the_size_that_is_asked(
     names = ("Mix/Factor",)
     variants = [{"values": [0.2 * k], "sockets": ["Base Color"]} for k in range(5)]
     found, seen = asked(graph, tmp_path, names, variants=variants, scale=2)
-    monkeypatch.setattr(aov_render, "MOST_BYTES", seen.size * 16 * 5)  # three variants, mask and position
+    monkeypatch.setattr(aov_render, "MOST_AOV_BYTES", seen.size * 16 * 5)  # three variants, mask and position
     again, _ = asked(graph, tmp_path, names, variants=variants, scale=2)
     assert (again["scale"], again["camera"]) == (2, found["camera"])
     assert np.load(tmp_path / again["files"][4]["Base Color"]).shape[:2] == seen.shape

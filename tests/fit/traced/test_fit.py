@@ -222,7 +222,7 @@ def test_no_launch_is_longer_than_a_request_to_stop_may_wait(tmp_path, monkeypat
     monkeypatch.setattr(traced_paths.TracedPaths, "_launch", launched)
     monkeypatch.setattr(renderer, "pixels_later", part)
     fit(renderer, reference)
-    assert max(launches) <= traced_paths.MOST_LANES == 1 << 17
+    assert max(launches) <= traced_paths.LANES_OF_A_LAUNCH == 1 << 17
     assert len(parts) > 4
     assert max(parts) <= verified_end.PATHS_OF_A_PART == 1 << 19
 

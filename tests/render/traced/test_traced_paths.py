@@ -145,7 +145,7 @@ def test_large_pictures_are_traced_in_parts(glass, monkeypatch):
     renderer, paths, pixels = glass
     x = np.stack([renderer.table.pack({**GLASS, "roughness": r}) for r in (0.2, 0.4, 0.6)])
     whole = paths.images(x, pixels, seed=3, samples=4, jacobian=True)
-    monkeypatch.setattr("mfo_backend.render.traced.traced_paths.MOST_LANES", 150)
+    monkeypatch.setattr("mfo_backend.render.traced.traced_paths.LANES_OF_A_LAUNCH", 150)
     np.testing.assert_allclose(paths.images(x, pixels, seed=3, samples=4, jacobian=True), whole, rtol=1e-3, atol=1e-3)
 
 
