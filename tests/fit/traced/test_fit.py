@@ -80,7 +80,8 @@ def test_values_the_picture_does_not_show_stay_the_users(tmp_path):
 def test_a_coat_is_found_with_all_values_free(tmp_path):
     renderer = load(tmp_path, "all", size=64)
     truth = {**renderer.table.unpack(renderer.start), **TRUTH, "coat_weight": 0.5, "coat_roughness": 0.03}
-    result, _ = fit(renderer, renderer.image(renderer.table.pack(truth), seed=5, spp=64))
+    # with 64 samples a pixel three seeds have 0.605, 0.579 and 0.552 of the coat on a processor without AVX-512
+    result, _ = fit(renderer, renderer.image(renderer.table.pack(truth), seed=5, spp=256))
     for name, atol in {"base_color": 0.02, "roughness": 0.03, "ior": 0.02, "coat_weight": 0.1}.items():
         np.testing.assert_allclose(result.recovered[name], truth[name], atol=atol, err_msg=name)
     # its roughness free from the start, it came out as 1 with a roughness of 0.98; other lobes are not asked for
