@@ -10,7 +10,8 @@ from typing import Any
 
 import bpy
 
-from .checks import IGNORED, STOPS, TO_CHOOSE, Finding, quick_check
+from .checks import quick_check
+from .finding import IGNORED, STOPS, TO_CHOOSE, Finding, first_refused
 
 _WITH_PANELS = {("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")}  # areas and their regions
 FILES_LAST = 2.0  # seconds after which chosen files are looked at again: they may be on a drive that answers slowly
@@ -92,6 +93,15 @@ def check_mended(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Non
     said = {finding.sentence for finding in findings}
     mended = tuple(finding for finding in before if finding.fixes and finding.sentence not in said)
     _before = before
+
+
+def refusal(context: bpy.types.Context, *, of_all: bool = False) -> str:
+    """Why a fit would not start, as far as a check since the last change knows; empty where nothing is known.
+
+    With `of_all` of what stops the fit of any object.
+    """
+    is_known = _checked and _seen == look(context.scene, context.view_layer)
+    return first_refused(_quick, of_all=of_all) if is_known else ""
 
 
 def rows() -> tuple[Finding, ...]:

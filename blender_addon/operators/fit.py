@@ -13,6 +13,9 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..backend.backend_section import why_no_fit
 from ..backend.preferences import idle_seconds
+from ..check import preflight
+from ..check.checks import quick_check
+from ..check.finding import first_refused
 from ..check.ticked_slots import NONE_TICKED, left_out, ticked_slots
 from ..export.fitted_slot import FittedSlot
 from ..export.meshes.known_meshes import KnownMeshes
@@ -73,9 +76,16 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
             return False
         return True
 
+    @classmethod
+    def description(cls, context: bpy.types.Context, _properties: bpy.types.OperatorProperties) -> str:
+        """Why it does not start as things are, else what it does."""
+        return _tooltip(cls, preflight.refusal(context))
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Export the job and start the backend or, while another fit runs, queue it; wait in background mode."""
         try:
+            if not (self.object or self.is_given()):  # which the check knows nothing of
+                _refuse(context)
             if not bpy.app.background:  # it loads while the job is exported
                 waiting_backend.prepare(python_of(context), idle_seconds(context), own_blender(SERVER, []))
                 steps = self.steps(context, *self._targets(context))
@@ -127,6 +137,11 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
+    def description(cls, context: bpy.types.Context, _properties: bpy.types.OperatorProperties) -> str:
+        """Why none of them would start as things are, else what it does."""
+        return _tooltip(cls, preflight.refusal(context, of_all=True))
+
+    @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with more than one material to fit."""
         if running_job.current is not None and bpy.app.background:
@@ -147,6 +162,13 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Export one job for each material; the first starts, the others wait, or in background mode all are done."""
+        try:
+            if not self.is_given():
+                _refuse(context, of_all=True)
+        except FitError as error:
+            running_job.fail([str(error)])
+            self.report({"ERROR"}, translated(str(error)))
+            return {"CANCELLED"}
         asked: list[_Asked] = []
         refused: list[EndedFit] = []
         known = KnownMeshes()
@@ -292,6 +314,18 @@ def _say_refused(refused: Sequence[EndedFit], started: int) -> None:
         return
     for each in refused:
         fit_queue.refused(each)
+
+
+def _tooltip(operator: type[bpy.types.Operator], why_not: str) -> str:
+    """Why it does not start as things are, else what it does."""
+    return translated(why_not) if why_not else bpy.app.translations.pgettext_tip(str(operator.__doc__))
+
+
+def _refuse(context: bpy.types.Context, *, of_all: bool = False) -> None:
+    """Raise `FitError` with the first line of the check that keeps a fit from starting, with `of_all` of any object."""
+    said = first_refused(quick_check(context.scene, context.view_layer), of_all=of_all)
+    if said:
+        raise FitError(said)
 
 
 def _error_summary() -> str:

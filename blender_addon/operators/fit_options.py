@@ -73,6 +73,10 @@ class FitOptions:
         """Whether the operator returns only when the fit has ended."""
         return self.wait or (bpy.app.background and not self.properties.is_property_set("wait"))
 
+    def is_given(self) -> bool:
+        """Whether a script has said anything of what is fitted, or to which picture."""
+        return bool(self.reference or self.parameters or self.shader or self.model or self.reference_view)
+
     def start(self, fit: PreparedFit) -> None:
         """Start the backend; raises `FitError`, and removes a new folder, where it cannot be started."""
         start_fit(fit, timer=not self.blocks() and not bpy.app.background)

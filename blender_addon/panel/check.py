@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..check import preflight
-from ..check.checks import FINE, IGNORED, STOPS, TO_CHOOSE, Finding
+from ..check.finding import FINE, IGNORED, STOPS, TO_CHOOSE, Finding
 from ..check.mending import KINDS
 from ..running import running_job
 from ..sentences.translated import translated

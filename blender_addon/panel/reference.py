@@ -8,15 +8,18 @@ from pathlib import Path
 import bpy
 
 from ..check import preflight
-from ..check.checks import asks_view
+from ..check.picture_checks import asks_view
 from ..check.ticked_slots import slot_of
 from ..pictures import overlay
 from ..running import running_job
 from ..sentences.translated import translated, word
-from .layout import BOX, BUTTON, NAMED_NUMBER, UNIT, buttons_side_by_side, fits, names_of, room, side_by_side
+from ..text_width import wrapped
+from .layout import BOX, BUTTON, LABEL, NAMED_NUMBER, UNIT, buttons_side_by_side, fits, names_of, room, side_by_side
 from .part import draw_part
 from .thumbnails import thumbnail
 
+_FIELD = 40.0  # of a path's field: margins and the button of the file browser, pixels at a scale of 1
+_IMAGE = 120.0  # of the choice of an image: its buttons, as above
 _ROWS, _SHARE = 4.0, 0.37  # of a picture of several: its height in rows of the interface, its share of the width
 
 
@@ -35,9 +38,11 @@ class Reference:
         column.label(text="Picture to match")
         column.row().prop(settings, "reference_source", expand=True)
         if settings.reference_source == "FILE":
-            column.prop(settings, "reference_path", text="")
+            _draw_path(column, context, settings, "reference_path")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
+            if settings.reference_image is not None:
+                _draw_name(column, context, settings.reference_image.name, beside=_IMAGE)
         _draw_pictures(column, context, settings)
         shown = overlay.is_shown(context.scene.camera)
         row = buttons_side_by_side(layout, context, "Over the View", "") if shown else layout.row(align=True)
@@ -69,6 +74,29 @@ def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, setti
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
 
 
+def _draw_path(
+    layout: bpy.types.UILayout, context: bpy.types.Context, owner: bpy.types.bpy_struct, path: str, taken: float = 0.0
+) -> None:
+    """The field of a path; `taken` is the width of what stands beside it."""
+    layout.prop(owner, path, text="")
+    given = getattr(owner, path)
+    if not fits(context, room(context) - taken - _FIELD, given):
+        _draw_name(layout, context, Path(given).name, taken=taken)
+
+
+def _draw_name(
+    layout: bpy.types.UILayout, context: bpy.types.Context, name: str, taken: float = 0.0, beside: float = 0.0
+) -> None:
+    """All of a name below a field that leaves `beside` of its width to others and would cut it."""
+    width = room(context) - taken - LABEL
+    if fits(context, width - beside, name):
+        return
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in wrapped(context, name, width):
+        column.label(text=line, translate=False)
+
+
 def _draw_what_it_shows(
     box: bpy.types.UILayout,
     context: bpy.types.Context,
@@ -98,7 +126,7 @@ def _draw_what_it_shows(
     row.prop(picture, "exposure", text="EV")
     row.prop(picture, "frame")
     if index is not None:
-        rest.prop(picture, "path", text="")
+        _draw_path(rest, context, picture, "path", taken=taken)
         if len(bpy.data.scenes) > 1:
             rest.prop(picture, "scene", text="", icon="SCENE_DATA")
 
@@ -130,10 +158,10 @@ def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     row.operator("mfo.list_materials", text="", icon="FILE_REFRESH")
     row.operator("mfo.clear_materials", text="", icon="X")
     for entry in context.scene.mfo.targets:
-        row = box.row(align=True)
         is_there = slot_of(context.scene, entry) is not None
-        row.alert = entry.use and not is_there
         name = entry.material.name if entry.material is not None else word("No material")
+        row = side_by_side(box, context, name, entry.object.name if is_there else word("Not there"), taken=BOX)
+        row.alert = entry.use and not is_there
         row.prop(entry, "use", text=name, translate=False)
         if is_there:
             row.label(text=entry.object.name, icon="OBJECT_DATA", translate=False)

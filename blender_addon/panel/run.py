@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..backend.backend_section import draw_setup, has_trouble
+from ..check import preflight
 from ..operators.fit_options import selected_targets
 from ..pictures import previews
 from ..result import shown_result
@@ -15,6 +16,7 @@ from ..sentences.translated import translated, word
 from ..translations import CONTEXT
 from .layout import BOX, BUTTON, LABEL, UNIT, draw_pictures, draw_sentence, fits, room
 
+REFUSED = "The fit did not begin: the check above says what is to be mended."
 _USUAL_SECONDS = 3.0  # of an export that asks Cycles something
 
 _JOINT = " · "  # between what is done, how far it is and the time left
@@ -66,7 +68,8 @@ def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     box = layout.box()
     box.alert = failed or must_ask(runtime.verdict)
     icon = "ERROR" if failed else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")
-    draw_sentence(box, context, runtime.sentence, icon)
+    is_listed = failed and any(finding.sentence == runtime.sentence for finding in preflight.findings)
+    draw_sentence(box, context, REFUSED if is_listed else runtime.sentence, icon)
     for message in runtime.messages if failed else ():
         if message.icon == "ERROR":  # the others are notes of the export
             draw_sentence(box, context, message.name, message.icon)
@@ -78,13 +81,16 @@ def _draw_buttons(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     row = column.row(align=True)
     row.scale_y = 1.0 if running else 1.4
     several = bool(context.scene.mfo.targets)
+    row.enabled = not preflight.refusal(context)  # the tooltip says why, and a script may give what is missing
     row.operator(
         "mfo.fit",
         text="Add to Queue" if running else "Fit Together" if several else "Fit Material",
         icon="ADD" if running else "PLAY",
     )
     if not several and len(selected_targets(context, most=2)) > 1:
-        column.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
+        row = column.row(align=True)
+        row.enabled = not preflight.refusal(context, of_all=True)
+        row.operator("mfo.fit_selected", icon="OUTLINER_OB_GROUP_INSTANCE")
 
 
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 
+from ..check import preflight
 from . import running_export, running_job
 
 SCENE_TICK = 0.2  # seconds between two looks at the scene
@@ -57,9 +58,10 @@ def _tick() -> float | None:
     if window is None or not window.scene.mfo.live:
         return None
     if is_due(window.scene, window.view_layer, time.monotonic()):
-        # what stops it is in the check already, and in the poll
         with bpy.context.temp_override(window=window), suppress(RuntimeError):
-            if bpy.ops.mfo.fit.poll():
+            preflight.check_now(window.scene, window.view_layer)  # it lists what stops the fit
+            preflight.redraw()
+            if bpy.ops.mfo.fit.poll() and not preflight.refusal(bpy.context):
                 bpy.ops.mfo.fit("EXEC_DEFAULT", True)
     return SCENE_TICK
 

@@ -112,7 +112,7 @@ def _exr(data: bytes) -> PictureHeader:
         _kind, at = _text(data, at)
         (size,) = struct.unpack_from("<i", data, at)
         at += 4
-        if name == "dataWindow":
+        if name == "displayWindow":  # its pixels beside the data are black, as the backend reads it
             left, top, right, bottom = struct.unpack_from("<4i", data, at)
             width, height = right - left + 1, bottom - top + 1
         elif name == "channels":

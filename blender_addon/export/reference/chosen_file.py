@@ -16,13 +16,13 @@ _MOVIES = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".m4v", ".o
 _RELATIVE = "//"  # to the folder of the .blend
 
 
-def chosen_file(given: str | Path) -> tuple[Path, PictureHeader | None]:
-    """The absolute path of a picture's file and its header, None where it has none that is known.
+def chosen_file(given: str | Path) -> tuple[Path, PictureHeader]:
+    """The absolute path of a picture's file and its header.
 
     Raises
     ------
     ExportError
-        If there is no file that can be read, or one of a kind or with an ending that no reference has.
+        If there is no file that can be read, or one of a kind or with an ending that no reference has, or no picture.
     """
     try:
         return _file(given)
@@ -32,7 +32,7 @@ def chosen_file(given: str | Path) -> tuple[Path, PictureHeader | None]:
         ) from problem
 
 
-def _file(given: str | Path) -> tuple[Path, PictureHeader | None]:
+def _file(given: str | Path) -> tuple[Path, PictureHeader]:
     path = absolute(given)
     if path.is_dir():
         raise ExportError(f"The reference {path} is a folder: choose one picture in it.")
@@ -50,6 +50,10 @@ def _file(given: str | Path) -> tuple[Path, PictureHeader | None]:
             f"The reference {path.name} is not complete: wait until it is written, or choose another file."
         )
     header = read_header(path)
+    if header is None:
+        raise ExportError(
+            f"The reference '{path.name}' holds no picture of the kind that its name says: choose another file."
+        )
     refuse_kind(path, header)
     return path, header
 
@@ -70,10 +74,8 @@ def absolute(given: str | Path) -> Path:
     return Path(bpy.path.abspath(str(given)))
 
 
-def refuse_kind(path: Path, header: PictureHeader | None) -> None:
+def refuse_kind(path: Path, header: PictureHeader) -> None:
     """Raise `ExportError` for a scene-linear file with the name of a display picture, or the other way round."""
-    if header is None:
-        return
     is_linear = header.kind in ("OpenEXR", "Radiance HDR")
     if is_linear != (path.suffix.lower() in LINEAR_SUFFIXES):
         raise ExportError(f"The reference {path.name} is a {header.kind} file: give its name the ending of that kind.")

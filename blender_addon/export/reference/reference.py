@@ -100,13 +100,14 @@ def read_reference(
         return replace(found, part=reference) if found is not None else None
     stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
     rendered = picture_size(scene.render) if stretched else size
+    of_region = rendered != picture_size(scene.render)
     if isinstance(reference, bpy.types.Image):
         found = _from_image(reference, scene, size, rendered, made, alpha=alpha)
         return replace(found, notes=(*found.notes, *image_notes(reference)))
     path, header = chosen_file(reference)
     suffix = path.suffix.lower()
-    turn = header.orientation if header is not None and upright else 1
-    said = () if header is None or upright else turn_notes(path.name, header, rendered, f"reference{suffix}")
+    turn = header.orientation if upright else 1
+    said = () if upright else turn_notes(path.name, header, rendered, f"reference{suffix}")
     is_linear = suffix in LINEAR_SUFFIXES
     if stretched or turn != 1:
         image = bpy.data.images.load(str(path), check_existing=False)
@@ -116,12 +117,13 @@ def read_reference(
             found = _from_image(image, scene, size, rendered, made, turn, alpha=alpha)
         finally:
             bpy.data.images.remove(image)
-        if suffix == ".exr" and header is not None:
+        if suffix == ".exr":
             found = replace(found, space=header.space, primaries=header.primaries)
-    elif is_linear:
-        found = Reference(f"reference{suffix}", "linear", source=path)
     else:
-        found = Reference(f"reference{suffix}", "srgb", source=path, **_view(scene, path.name, made))
+        if header.width and header.height:  # of other files the backend knows them
+            refuse_size(path.name, (header.width, header.height), rendered, of_region=of_region)
+        view = {} if is_linear else _view(scene, path.name, made)
+        found = Reference(f"reference{suffix}", "linear" if is_linear else "srgb", source=path, **view)
     colours = file_notes(path, found.name, header, scene) if is_linear else ()
     return replace(found, notes=(*found.notes, *said, *colours))
 

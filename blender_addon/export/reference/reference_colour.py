@@ -16,9 +16,9 @@ _REC709_IDS = ("lin_rec709_scene", "lin_rec709", "lin_srgb_scene", "lin_srgb")
 _SAME = 2e-3  # of CIE xy: headers round to three or four digits
 
 
-def file_notes(path: Path, name: str, header: PictureHeader | None, scene: bpy.types.Scene) -> tuple[str, ...]:
+def file_notes(path: Path, name: str, header: PictureHeader, scene: bpy.types.Scene) -> tuple[str, ...]:
     """What a user should know of the colours of a scene-linear file that the job calls `name`."""
-    if header is None or header.kind != "OpenEXR":
+    if header.kind != "OpenEXR":
         return ()
     space = other_space(header)
     if space:  # in the backend's words, which does it and says it once

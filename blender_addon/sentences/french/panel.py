@@ -216,6 +216,7 @@ PANEL = {
     "Material {} waits for the fit that runs.": "Le matériau {} attend l'ajustement en cours.",
     "No object is active: select the object whose material is to be fitted, or give its name.": "Aucun objet n'est actif : sélectionner l'objet dont le matériau est à ajuster, ou donner son nom.",
     "No parameter is chosen: choose at least one, or All.": "Aucun paramètre n'est choisi : en choisir au moins un, ou Toutes.",
+    "The fit did not begin: the check above says what is to be mended.": "L'ajustement n'a pas commencé : la vérification ci-dessus dit ce qui est à corriger.",
     "No picture is used: tick one at least.": "Aucune image n'est utilisée : en cocher au moins une.",
     "No reference is chosen: choose an image of this file, or a picture on disk.": "Aucune référence n'est choisie : choisir une image de ce fichier, ou une image sur le disque.",
     "No reference is chosen: give the picture whose material is to be recovered.": "Aucune référence n'est choisie : donner l'image dont le matériau est à retrouver.",

@@ -216,6 +216,7 @@ PANEL = {
     "Material {} waits for the fit that runs.": "Material {} wartet auf die Anpassung, die läuft.",
     "No object is active: select the object whose material is to be fitted, or give its name.": "Kein Objekt ist aktiv: das Objekt auswählen, dessen Material angepasst werden soll, oder seinen Namen angeben.",
     "No parameter is chosen: choose at least one, or All.": "Kein Parameter ist ausgewählt: mindestens einen auswählen, oder Alle.",
+    "The fit did not begin: the check above says what is to be mended.": "Die Anpassung hat nicht begonnen: die Prüfung darüber sagt, was zu beheben ist.",
     "No picture is used: tick one at least.": "Kein Bild wird verwendet: mindestens eines ankreuzen.",
     "No reference is chosen: choose an image of this file, or a picture on disk.": "Keine Referenz ist gewählt: ein Bild dieser Datei wählen oder eines auf der Festplatte.",
     "No reference is chosen: give the picture whose material is to be recovered.": "Keine Referenz ist gewählt: das Bild angeben, dessen Material gefunden werden soll.",
