@@ -41,8 +41,9 @@ class Reference:
             _draw_path(column, context, settings, "reference_path")
         else:
             column.template_ID(settings, "reference_image", open="image.open")
-            if settings.reference_image is not None:
-                _draw_name(column, context, settings.reference_image.name, beside=_IMAGE)
+            image = settings.reference_image
+            if image is not None and not fits(context, room(context) - _IMAGE, image.name):
+                _draw_name(column, context, image.name)
         _draw_pictures(column, context, settings)
         shown = overlay.is_shown(context.scene.camera)
         row = buttons_side_by_side(layout, context, "Over the View", "") if shown else layout.row(align=True)
@@ -84,16 +85,11 @@ def _draw_path(
         _draw_name(layout, context, Path(given).name, taken=taken)
 
 
-def _draw_name(
-    layout: bpy.types.UILayout, context: bpy.types.Context, name: str, taken: float = 0.0, beside: float = 0.0
-) -> None:
-    """All of a name below a field that leaves `beside` of its width to others and would cut it."""
-    width = room(context) - taken - LABEL
-    if fits(context, width - beside, name):
-        return
+def _draw_name(layout: bpy.types.UILayout, context: bpy.types.Context, name: str, taken: float = 0.0) -> None:
+    """All of a name, below a field that cuts it."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for line in wrapped(context, name, width):
+    for line in wrapped(context, name, room(context) - taken - LABEL):
         column.label(text=line, translate=False)
 
 

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 ADDON_ID = "bl_ext.user_default.material_fit_mfo"
 PROGRAMS = [p for p in os.environ.get("MFO_BLENDER", "").split(os.pathsep) if p]
-PATIENCE = 400.0  # seconds; a walk through windows takes 60 on two quiet cores
+PATIENCE = 900.0  # seconds; a walk through windows takes 60 on two quiet cores, 400 and more with a load of 8
 WINDOWED = [p for p in os.environ.get("MFO_BLENDER_WINDOWS", "").split(os.pathsep) if p]
 
 
@@ -51,6 +51,7 @@ class RealBlender:
             stdout, stderr = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)  # the program may be a script that started Blender and a screen
+            process.communicate()
             raise
         done = subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
         if check:

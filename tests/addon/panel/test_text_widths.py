@@ -23,6 +23,7 @@ SCALES = (1.0, 1.25, 2.0)  # of hinted letters the widths change by up to 7 %
 LANGUAGES = ("en_US", "de_DE", "fr_FR")
 WITHIN = {"Cycles prepares the scene", "Values to Fit", "partial"}  # shown as part of a longer text, or as it is
 NUMBERS = [f"{value:.3g}" for value in (-0.3125, 0.0074321, 1234.5, 1.2345e-5, -0.0012345, 123456.0)]  # of results
+LONG = "kitchen espresso_machine_material_look_v002.png"  # files are told apart by its end
 NOT_NOW = {"new node"}  # for a moment after a node was made
 
 
@@ -266,9 +267,22 @@ def with_the_backend(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Itera
         yield
 
 
+def with_long_names(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    settings = scene.bpy.context.scene.mfo
+    settings.reference_path = f"/renders/{LONG}"
+    scene.bpy.ops.mfo.add_picture()
+    settings.pictures[0].path = f"//renders/{LONG}"
+    yield
+    settings.reference_source, settings.reference_image = "IMAGE", scene.bpy.data.images.new(LONG, 4, 4)
+    yield
+    scene.bpy.data.materials["Glaze"].name = "Glaze of the cup.001"
+    scene.bpy.ops.mfo.list_materials()
+    yield
+
+
 STATES = (
-    with_problems, with_questions, while_it_exports, while_it_runs, with_a_result, with_chosen_values, with_a_queue,
-    with_a_mix_and_motion, with_several_pictures, with_the_backend,
+    with_problems, with_long_names, with_questions, while_it_exports, while_it_runs, with_a_result, with_chosen_values,
+    with_a_queue, with_a_mix_and_motion, with_several_pictures, with_the_backend,
 )  # fmt: skip
 
 
@@ -316,3 +330,16 @@ def test_no_text_is_cut(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch,
             for scale in SCALES:
                 found |= {(each.text, width): each for each in cut(scene, language, width, scale)}
     assert not found, "\n".join(f"at {w}: {c.text!r} {c.width:.0f} > {c.room:.0f}" for (_, w), c in found.items())
+
+
+@pytest.mark.parametrize("width", [220, 280, 400, 1200])
+def test_all_of_a_name_is_below_a_field_that_cuts_it(
+    scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, width: float
+) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr(Layout, "label", lambda self, *, text="", **_: shown.append(text))
+    for _ in with_long_names(scene, monkeypatch):
+        shown.clear()
+        cut(scene, "en_US", width, 1.0)
+        whole = "".join(shown).replace(" ", "").count(LONG.replace(" ", ""))
+        assert whole == (0 if width == 1200 else 2)

@@ -57,11 +57,11 @@ class Screen:
 
     def move(self, x, y):
         self.test.XTestFakeMotionEvent(self.display, -1, int(x), int(y), c_ulong(0))
-        self.x11.XFlush(self.display)
+        self._send()
 
     def button(self, kind, *, down):
         self.test.XTestFakeButtonEvent(self.display, BUTTONS[kind], int(down), c_ulong(0))
-        self.x11.XFlush(self.display)
+        self._send()
 
     def key(self, name, *, down):
         """A key by what Blender or X calls it; a sign of the second row of a key with Shift."""
@@ -71,7 +71,7 @@ class Screen:
         self.test.XTestFakeKeyEvent(self.display, code, int(down), c_ulong(0))
         if is_upper and not down:
             self.test.XTestFakeKeyEvent(self.display, self._code("Shift_L")[0], 0, c_ulong(0))
-        self.x11.XFlush(self.display)
+        self._send()
 
     def drop(self, path, x, y):
         """Drag a file to a place and let it go there; True where the window has said that it took it."""
@@ -121,6 +121,10 @@ class Screen:
         event.message = Message(CLIENT_MESSAGE, 0, 1, None, window.value, self._atom(name).value, 32, values)
         self.x11.XSendEvent(self.display, window, 0, c_long(0), byref(event))
         self.x11.XFlush(self.display)
+
+    def _send(self):
+        """Wait for the server too: on busy cores a mouse that goes on would be seen here and there alone."""
+        self.x11.XSync(self.display, 0)
 
     def _window_at(self, x, y):
         """The window of a program at a place, which is the root's child where no window manager runs."""
