@@ -104,6 +104,11 @@ def refusal(context: bpy.types.Context, *, of_all: bool = False) -> str:
     return first_refused(_quick, of_all=of_all) if is_known else ""
 
 
+def lists(sentence: str) -> bool:
+    """Whether it is among what the panel lists."""
+    return any(finding.sentence == sentence for finding in findings)
+
+
 def rows() -> tuple[Finding, ...]:
     """The lines in the order the panel has them: what was mended where it stood, anything new at the end."""
     kept = [finding for finding in _before if finding in mended or finding in findings]

@@ -100,9 +100,9 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
                 return {"FINISHED"}
             self.start(fit)
         except FitError as error:
-            running_job.fail([str(error)])
             if not bpy.app.background:
                 thorough_check(context)  # lists everything that stops it, with buttons
+            running_job.fail([str(error)])
             self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
         if not self.blocks():

@@ -92,7 +92,7 @@ def _draw_cycles(layout: bpy.types.UILayout, context: bpy.types.Context, runtime
         failed = runtime.cycles_flip < 0.0
         line = column.column()
         line.alert = failed
-        draw_sentence(line, context, runtime.cycles_text, "ERROR" if failed else "CHECKMARK")
+        draw_sentence(line, context, runtime.cycles_text, "ERROR" if failed else "INFO")  # a figure, no verdict
     if previews.icon("cycles"):
         draw_pictures(column, context, ("reference", "cycles", "cycles_difference"), clickable=True)
     if previews.icon("engine"):

@@ -68,7 +68,7 @@ def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     box = layout.box()
     box.alert = failed or must_ask(runtime.verdict)
     icon = "ERROR" if failed else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")
-    is_listed = failed and any(finding.sentence == runtime.sentence for finding in preflight.findings)
+    is_listed = failed and preflight.lists(runtime.sentence)
     draw_sentence(box, context, REFUSED if is_listed else runtime.sentence, icon)
     for message in runtime.messages if failed else ():
         if message.icon == "ERROR":  # the others are notes of the export

@@ -53,6 +53,7 @@ class RunningJob:
 current: RunningJob | None = None
 unrecorded: list[tuple[JobResult, int]] = []  # results with their material's session_uid, not in its history yet
 _refused: object = None  # what was checked when a fit was refused last
+_is_listed = False  # whether the check listed why
 _patience = MODAL_LOOKS
 
 
@@ -179,13 +180,14 @@ def folders() -> list[Path]:
 
 
 def fail(sentences: Sequence[str]) -> None:
-    """Show errors that kept a fit from starting."""
-    global _refused
+    """Show errors that kept a fit from starting; make the check that lists them before."""
+    global _refused, _is_listed
     runtime = _runtime()
     if current is None:
         shown_result.clear(runtime)
         runtime.state = "FAILED"
         _refused = preflight.look(bpy.context.scene, bpy.context.view_layer)
+        _is_listed = any(map(preflight.lists, sentences))
     runtime.sentence = sentences[0] if sentences else ""
     for sentence in sentences[1:]:
         add_message(runtime, sentence, "ERROR")
@@ -204,8 +206,10 @@ def forget_refusal() -> None:
 def is_answered(context: bpy.types.Context) -> bool:
     """Whether the last fit was refused for what has been changed since, so that nothing of it need be said any more."""
     runtime = _runtime()
-    refused = runtime.state == "FAILED" and not runtime.job_folder
-    return refused and _refused != preflight.look(context.scene, context.view_layer)
+    if runtime.state != "FAILED" or runtime.job_folder:
+        return False
+    is_mended = _is_listed and not preflight.lists(runtime.sentence)
+    return is_mended or _refused != preflight.look(context.scene, context.view_layer)
 
 
 def record_results() -> int:
@@ -298,7 +302,7 @@ def _looks_for_a_start(event: Event) -> bool:
 
 
 def _finish(job: RunningJob, outcome: Outcome) -> None:
-    global current, _refused
+    global current, _refused, _is_listed
     runtime = _runtime()
     current = None
     atexit.unregister(close)
@@ -324,6 +328,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:
         shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were
         runtime.job_folder = ""
+        _is_listed = False
         _refused = preflight.look(bpy.context.scene, bpy.context.view_layer)
     if bpy.app.background:
         record_results()

@@ -78,6 +78,21 @@ def test_no_fit_starts_with_a_problem(unstarted: SimpleNamespace, spoil: Callabl
     assert "The fit did not begin: the check above says what is to be mended." in texts
 
 
+def test_nothing_is_said_of_a_refusal_whose_reason_was_mended(unstarted: SimpleNamespace) -> None:
+    """Also where nothing else that the panel looks at has changed."""
+    bpy = unstarted.bpy
+    bpy.data.objects["Väse"].hide_render = True
+    check_now(unstarted)
+    with pytest.raises(RuntimeError, match="'Väse' is hidden in the render"):
+        bpy.ops.mfo.fit(job_folder=unstarted.job)
+    said = runtime(unstarted).sentence
+    assert said in check_now(unstarted)
+    assert bpy.ops.mfo.mend(kind="show_in_render") == {"FINISHED"}
+    texts = drawn(unstarted)
+    assert texts.count(said) == 1  # the line of the check that was mended
+    assert "The fit did not begin: the check above says what is to be mended." not in texts
+
+
 @pytest.mark.parametrize(("spoil", "is_of_all"), [(another_size, True), (no_picture, True), (SPOILED[12][0], False)])
 def test_selected_objects_have_the_pictures_in_common(
     unstarted: SimpleNamespace, spoil: Callable[[SimpleNamespace], None], is_of_all: bool
