@@ -110,7 +110,7 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
         outcome = running_job.wait(lambda line: print(f"Material Fit: {line}", flush=True))
         running_job.record_results()
         runtime = context.window_manager.mfo_runtime
-        if runtime.state == "FAILED":
+        if runtime.state == "FAILED" or not runtime.has_result:
             self.report({"ERROR"}, translated(runtime.sentence))
             return {"CANCELLED"}
         self.report({"INFO"}, translated(f"{outcome.sentence} {_error_summary()}".strip()))

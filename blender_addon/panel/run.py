@@ -56,7 +56,9 @@ class Run:
 def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What the last fit came to: its verdict, or why it failed."""
     runtime = context.window_manager.mfo_runtime
-    if runtime.state == "IDLE" and runtime.sentence:  # of a file that was left, or of results that came back
+    if (
+        runtime.state == "IDLE" and runtime.sentence
+    ):  # of a file that was left, results that came back, or a fit cancelled early
         draw_sentence(layout.box(), context, runtime.sentence, "INFO")
     if running_job.current is not None and runtime.sentence:  # why another one could not begin
         box = layout.box()

@@ -39,6 +39,7 @@ MODAL_LOOKS = 60  # looks at a modal operator before a result goes into its hist
 _FIRST_STAGES = ("scan", "start")  # they look for a place to begin; every other stage refines
 _FIRST_GUESS = 0.05  # share from which on the time left is more than a guess
 _GOOD = {"converged", "stale", "unchanged", "max_iterations"}
+_CANCELLED = "cancelled"  # before there was a result, nothing has failed
 _ENDED = _GOOD | {"different"}  # the fit came to its end, whatever it found
 
 
@@ -307,7 +308,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
     current = None
     atexit.unregister(close)
     _remove_unfinished(job.process.folder)
-    runtime.state = "DONE" if outcome.status in _ENDED else "FAILED"
+    runtime.state = "DONE" if outcome.status in _ENDED else "IDLE" if outcome.status == _CANCELLED else "FAILED"
     runtime.sentence = outcome.sentence
     runtime.progress_text, runtime.detail = "", ""
     try:
@@ -323,7 +324,7 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
     if not runtime.has_result:
         kept_results.forget(job.process.folder)
-    icon = shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO") if runtime.state == "DONE" else "ERROR"
+    icon = "ERROR" if runtime.state == "FAILED" else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")
     fit_queue.ended(job.fit.material_name, runtime.sentence, icon)
     if outcome.status == "bad_input" and job.fit.is_new and not runtime.has_result:
         shutil.rmtree(job.process.folder, ignore_errors=True)  # bad input leaves things as they were

@@ -2,8 +2,8 @@
 """A stand-in for the backend's Python: takes the same command line, tells the same events, computes nothing.
 
 Run as a program it reads request.json and writes pictures and result.json. MFO_FAKE steers it: `seconds` it takes,
-`end` (finished, failed, crash, deaf; killed: by SIGKILL half way). Only the standard library, so that any Python of any
-machine can run it.
+`end` (finished, failed, crash, deaf; cancelled: before it began; killed: by SIGKILL half way). Only the standard
+library, so that any Python of any machine can run it.
 """
 
 from __future__ import annotations
@@ -101,6 +101,10 @@ def main(arguments: list[str]) -> int:
             sentence="Reference is 128x128 but the scene renders 256x256: render it anew.",
         )
         return 2
+    if control.get("end") == "cancelled":
+        cancelled.wait(60.0)
+        say(event="failed", status="cancelled", sentence="Cancelled before the fit had begun; nothing was changed.")
+        return 4
     if control.get("end") == "crash":
         print("Illegal instruction in a far away library", file=sys.stderr, flush=True)
         os.abort()

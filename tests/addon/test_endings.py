@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -32,6 +33,23 @@ def test_cancel_keeps_the_best_values(scene: SimpleNamespace, monkeypatch: pytes
     assert runtime(scene).has_result
     assert "best values so far" in runtime(scene).sentence
     assert scene.bpy.ops.mfo.apply() == {"FINISHED"}
+
+
+def test_a_fit_that_is_cancelled_before_it_began_has_not_failed(
+    scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from blender_addon.panel import run
+
+    monkeypatch.setattr("blender_addon.process.job_process.CANCEL_GRACE", 3600.0)
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"end": "cancelled"}))
+    assert fit(scene, wait=False) == {"FINISHED"}
+    assert scene.bpy.ops.mfo.cancel() == {"FINISHED"}
+    step_until(scene, lambda: runtime(scene).state != "CANCELLING")
+    drawn: list[tuple[str, str]] = []
+    monkeypatch.setattr(run, "draw_sentence", lambda _layout, _context, text, icon: drawn.append((text, icon)))
+    run._draw_end(MagicMock(), scene.bpy.context)
+    assert drawn == [("Cancelled before the fit had begun; nothing was changed.", "INFO")]
+    assert not runtime(scene).has_result
 
 
 def test_a_killed_backend_leaves_its_best_values(scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

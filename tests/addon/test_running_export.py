@@ -330,13 +330,14 @@ def test_one_that_cannot_be_exported_stops_no_other(three: SimpleNamespace, take
 def test_where_none_can_be_exported_it_is_said(three: SimpleNamespace, taken: list[object]) -> None:
     from blender_addon.running import fit_queue, running_export
 
-    three.bpy.context.scene.camera = None
+    for obj in three.bpy.context.selected_objects:
+        obj.hide_render = True
     three.bpy.ops.mfo.fit_selected(wait=False)
     while running_export.current is not None:
         running_export._tick()
     assert (three.started, fit_queue.finished) == ([], [])
     assert three.runtime().state == "FAILED"
-    assert "camera" in three.runtime().sentence
+    assert "hidden in the render" in three.runtime().sentence
     assert len(three.runtime().messages) == 2
 
 
