@@ -13,8 +13,20 @@ from ..check.ticked_slots import slot_of
 from ..pictures import overlay
 from ..running import running_job
 from ..sentences.translated import translated, word
-from ..text_width import wrapped
-from .layout import BOX, BUTTON, LABEL, NAMED_NUMBER, UNIT, buttons_side_by_side, fits, names_of, room, side_by_side
+from ..text_width import text_width, wrapped
+from .layout import (
+    BOX,
+    BUTTON,
+    ICON,
+    LABEL,
+    NAMED_NUMBER,
+    UNIT,
+    buttons_side_by_side,
+    fits,
+    names_of,
+    room,
+    side_by_side,
+)
 from .part import draw_part
 from .thumbnails import thumbnail
 
@@ -146,6 +158,15 @@ def _draw_target(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     layout.operator("mfo.list_materials", icon="MATERIAL")
 
 
+def _beside(box: bpy.types.UILayout, context: bpy.types.Context, first: str, second: str) -> bpy.types.UILayout:
+    """Where two names with icons belong: halves of a line, as much of one as each needs, or two lines."""
+    widths = [text_width(context, name) + ICON for name in (first, second)]
+    whole = room(context) - BOX
+    if max(widths) > 0.5 * whole and sum(widths) <= whole:
+        return box.split(factor=widths[0] / sum(widths), align=True)
+    return side_by_side(box, context, first, second, taken=BOX)
+
+
 def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """The materials that the camera sees, each with a box to tick, and the way back to one."""
     box = layout.box().column(align=True)
@@ -156,7 +177,7 @@ def _draw_targets(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     for entry in context.scene.mfo.targets:
         is_there = slot_of(context.scene, entry) is not None
         name = entry.material.name if entry.material is not None else word("No material")
-        row = side_by_side(box, context, name, entry.object.name if is_there else word("Not there"), taken=BOX)
+        row = _beside(box, context, name, entry.object.name if is_there else word("Not there"))
         row.alert = entry.use and not is_there
         row.prop(entry, "use", text=name, translate=False)
         if is_there:

@@ -275,9 +275,10 @@ def with_long_names(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Itera
     yield
     settings.reference_source, settings.reference_image = "IMAGE", scene.bpy.data.images.new(LONG, 4, 4)
     yield
-    scene.bpy.data.materials["Glaze"].name = "Glaze of the cup.001"
-    scene.bpy.ops.mfo.list_materials()
-    yield
+    for name in ("Glaze.001", "Glaze of cup", "Glaze of the cup.001"):  # in half a line, beside the object, above it
+        scene.bpy.data.materials[scene.bpy.context.object.active_material.name].name = name
+        scene.bpy.ops.mfo.list_materials()
+        yield
 
 
 STATES = (

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from blender_addon.export.images.picture_header import is_cut_off, read_header
-from mfo_backend.scene.image_file import write_exr
+from mfo_backend.scene.image_file import read_image, write_exr
 
 WIDTH, HEIGHT = 37, 21
 
@@ -81,6 +81,22 @@ def test_a_jpeg_with_long_data_before_its_size(tmp_path: Path) -> None:
         header = read_header(tmp_path / "picture.jpg")
         assert header is not None
         assert (header.kind, header.width) == ("JPEG", WIDTH if count == 3 else 0)
+
+
+def test_an_exr_has_the_size_of_its_display_window(tmp_path: Path) -> None:
+    """As the backend reads it: what a program cut off around the data is black."""
+    path = tmp_path / "cut.exr"
+    windows = {
+        "dataWindow": (np.array([4, 2], np.int32), np.array([12, 9], np.int32)),
+        "displayWindow": (np.zeros(2, np.int32), np.array([WIDTH - 1, HEIGHT - 1], np.int32)),
+    }
+    pixels = np.ones((8, 9, 3), np.float32)
+    OpenEXR.File({"type": OpenEXR.scanlineimage} | windows, {"RGB": pixels}).write(str(path))
+    header = read_header(path)
+    assert header is not None
+    assert (header.width, header.height) == (WIDTH, HEIGHT)
+    read = read_image(path, (WIDTH, HEIGHT)).pixels
+    assert (read.shape[:2], read.sum()) == ((HEIGHT, WIDTH), 8 * 9 * 3)
 
 
 def test_colours_of_an_exr(tmp_path: Path) -> None:
