@@ -139,7 +139,11 @@ class MFO_OT_apply(bpy.types.Operator):
         of_this_session = not self.material and uid
         found = shown_result.material_of(uid) if of_this_session else bpy.data.materials.get(name)
         if found is None:
-            raise WriteBackError(f"Material {name!r} is not in this file (any more): name the one to change.")
+            if self.material:
+                raise WriteBackError(f"Material {name!r} is not in this file (any more): name the one to change.")
+            raise WriteBackError(
+                f"Material {name!r} is not in this file (any more): undo what removed it, or take the values with Copy."
+            )
         return found
 
 

@@ -59,7 +59,11 @@ def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if (
         runtime.state == "IDLE" and runtime.sentence
     ):  # of a file that was left, results that came back, or a fit cancelled early
-        draw_sentence(layout.box(), context, runtime.sentence, "INFO")
+        box = layout.box()
+        draw_sentence(box, context, runtime.sentence, "INFO")
+        if runtime.job_folder:
+            box.operator_context = "EXEC_DEFAULT"  # without a question for the folder
+            box.operator("mfo.open_job", text="Load Result", icon="FILE_FOLDER").directory = runtime.job_folder
     if running_job.current is not None and runtime.sentence:  # why another one could not begin
         box = layout.box()
         box.alert = True

@@ -52,6 +52,7 @@ class RunningJob:
 
 
 current: RunningJob | None = None
+_left = ""  # folder of a fit that ended with its file, which was never saved
 unrecorded: list[tuple[JobResult, int]] = []  # results with their material's session_uid, not in its history yet
 _refused: object = None  # what was checked when a fit was refused last
 _is_listed = False  # whether the check listed why
@@ -151,6 +152,8 @@ def close_for_disable() -> None:
 
 def _close_and_say(why: str, blend: str) -> str:
     """`close`; what is to be said of the fits that end with it, whose values come back with the file `blend`."""
+    global _left
+    _left = ""
     job, waiting = current, len(fit_queue.waiting)
     close()
     if job is None:
@@ -161,6 +164,7 @@ def _close_and_say(why: str, blend: str) -> str:
     elif blend:
         said.append(f"Its best values so far are in the history when {Path(blend).name} is opened again.")
     else:
+        _left = str(job.process.folder)
         said.append(f"Load Result shows its best values so far, from its folder: {job.process.folder}")
     if waiting:
         said.insert(1, f"Fits of the queue that were not begun: {waiting}.")
@@ -171,7 +175,7 @@ def reset(sentence: str = "") -> None:
     """Forget the last fit: its result, pictures and messages; `sentence` is said of the file that was left."""
     runtime = _runtime()
     shown_result.clear(runtime)
-    runtime.sentence = sentence
+    runtime.sentence, runtime.job_folder = sentence, _left if sentence else ""
 
 
 def folders() -> list[Path]:
@@ -322,6 +326,8 @@ def _finish(job: RunningJob, outcome: Outcome) -> None:
             runtime.state = "FAILED" if died else "DONE"
     except (JobResultError, WriteBackError) as error:
         runtime.state, runtime.sentence = "FAILED", f"{outcome.sentence} {error}"
+    if runtime.state == "IDLE":
+        runtime.job_folder = ""  # there is nothing to load
     if not runtime.has_result:
         kept_results.forget(job.process.folder)
     icon = "ERROR" if runtime.state == "FAILED" else shown_result.VERDICT_ICONS.get(runtime.verdict, "INFO")

@@ -112,6 +112,28 @@ def test_opening_a_file_ends_the_running_fit(scene: SimpleNamespace, monkeypatch
     assert runtime(scene).state == "IDLE"
 
 
+def test_what_a_file_that_was_never_saved_leaves_is_one_press_away(
+    scene: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from blender_addon.panel import run
+
+    monkeypatch.setenv("MFO_FAKE", json.dumps({"seconds": 8}))
+    fit(scene, wait=False)
+    step_until(scene, lambda: runtime(scene).fraction > 0)
+    scene.bpy.ops.wm.read_factory_settings()
+    assert f"Load Result shows its best values so far, from its folder: {scene.job}" in runtime(scene).sentence
+    layout = MagicMock()
+    monkeypatch.setattr(run, "draw_sentence", lambda *_: None)  # a Blender without windows has no width
+    run._draw_end(layout, scene.bpy.context)
+    box = layout.box.return_value
+    box.operator.assert_called_once_with("mfo.open_job", text="Load Result", icon="FILE_FOLDER")
+    assert (box.operator_context, box.operator.return_value.directory) == ("EXEC_DEFAULT", scene.job)
+    assert scene.bpy.ops.mfo.open_job(directory=scene.job) == {"FINISHED"}
+    assert runtime(scene).has_result
+    scene.bpy.ops.wm.read_factory_settings()
+    assert (runtime(scene).sentence, runtime(scene).job_folder) == ("", "")
+
+
 def test_disable_and_enable_with_a_running_fit(scene: SimpleNamespace, addon, monkeypatch: pytest.MonkeyPatch) -> None:
     from blender_addon.running import running_job
 

@@ -211,6 +211,7 @@ PANEL = {
     "a sphere": "une sphère",
     "nothing": "rien",
     "save the file and add its folder as an asset library to find it in other files.": "enregistrer le fichier et ajouter son dossier comme bibliothèque d'assets pour le trouver dans d'autres fichiers.",
+    "Material {} is not in this file (any more): undo what removed it, or take the values with Copy.": "Le matériau {} n'est pas (ou plus) dans ce fichier : annuler ce qui l'a supprimé, ou prendre les valeurs avec Copier.",
     "Material {} is not in this file (any more): name the one to change.": "Le matériau {} n'est pas (ou plus) dans ce fichier : nommer celui à changer.",
     "Material {} is not in this file.": "Le matériau {} n'est pas dans ce fichier.",
     "Material {} waits for the fit that runs.": "Le matériau {} attend l'ajustement en cours.",

@@ -211,6 +211,7 @@ PANEL = {
     "a sphere": "eine Kugel",
     "nothing": "nichts",
     "save the file and add its folder as an asset library to find it in other files.": "die Datei speichern und ihren Ordner als Asset-Bibliothek hinzufügen, um es in anderen Dateien zu finden.",
+    "Material {} is not in this file (any more): undo what removed it, or take the values with Copy.": "Material {} ist nicht (mehr) in dieser Datei: rückgängig machen, was es entfernt hat, oder die Werte mit Kopieren mitnehmen.",
     "Material {} is not in this file (any more): name the one to change.": "Material {} ist nicht (mehr) in dieser Datei: das zu ändernde nennen.",
     "Material {} is not in this file.": "Material {} ist nicht in dieser Datei.",
     "Material {} waits for the fit that runs.": "Material {} wartet auf die Anpassung, die läuft.",
