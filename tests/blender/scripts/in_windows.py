@@ -81,6 +81,8 @@ def fit(seconds, **control):
     os.environ["MFO_FAKE"] = json.dumps({"seconds": seconds, **control})
     waiting_backend.close()  # one that waits has the environment of an earlier fit
     do(bpy.ops.mfo.fit)
+    while running_export.current is not None:  # on busy cores a press ends before the export
+        running_export._tick()
     return running_job.current.process
 
 
