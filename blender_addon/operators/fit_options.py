@@ -105,9 +105,8 @@ class FitOptions:
                 raise FitError(unwritable(each))
         if self.shader:
             choose_shader(material, self.shader)
-        reference = _reference(settings, self.reference)
-        if settings.pictures and not self.reference:
-            reference = _pictures(settings, reference)
+        several = settings.pictures and not self.reference
+        reference = _pictures(settings) if several else _reference(settings, self.reference)
         made = self.reference_view or settings.reference_view
         if made not in REFERENCE_VIEWS:
             raise FitError(f"reference_view is {made!r}: give 'scene' or 'standard'.")
@@ -276,7 +275,7 @@ def _chosen_inside(
     return found
 
 
-def _pictures(settings: bpy.types.PropertyGroup, first: Picture) -> list[PictureSetup]:
+def _pictures(settings: bpy.types.PropertyGroup) -> list[PictureSetup]:
     """All pictures of the list that are used, with what each shows."""
     found = []
     for number, entry in enumerate((settings.first_picture, *settings.pictures), 1):
@@ -284,7 +283,10 @@ def _pictures(settings: bpy.types.PropertyGroup, first: Picture) -> list[Picture
             continue
         if number > 1 and not entry.path:
             raise FitError(f"Picture {number} has no file: choose it, or do not use this picture.")
-        reference = first if number == 1 else counted_part(_absolute(entry.path, f"Picture {number}: "), entry.part)
+        if number == 1:
+            reference = _reference(settings, "")
+        else:
+            reference = counted_part(_absolute(entry.path, f"Picture {number}: "), entry.part)
         camera = entry.camera.name if entry.camera is not None else ""
         scene = entry.scene.name if entry.scene is not None else ""
         found.append(PictureSetup(reference, number, entry.frame, camera, scene, exposure=entry.exposure))

@@ -56,9 +56,8 @@ class Run:
 def _draw_end(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What the last fit came to: its verdict, or why it failed."""
     runtime = context.window_manager.mfo_runtime
-    if (
-        runtime.state == "IDLE" and runtime.sentence
-    ):  # of a file that was left, results that came back, or a fit cancelled early
+    # of a file that was left, of results that came back, or of a fit that was cancelled early
+    if runtime.state == "IDLE" and runtime.sentence:
         box = layout.box()
         draw_sentence(box, context, runtime.sentence, "INFO")
         if runtime.job_folder:

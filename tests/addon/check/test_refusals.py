@@ -141,6 +141,12 @@ def test_several_pictures_have_each_its_own_size_and_camera(scene: SimpleNamespa
     bpy.context.scene.camera = None
     assert check_now(scene) == []
     assert bpy.ops.mfo.fit(job_folder=scene.job) == {"FINISHED"}
+    settings.first_picture.use, settings.reference_path = False, ""  # which is asked for no more
+    bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 48
+    assert check_now(scene) == []
+    assert bpy.ops.mfo.fit(job_folder=scene.job + "2") == {"FINISHED"}
+    settings.first_picture.use, settings.reference_path = True, scene.reference
+    bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = 64, 64
     settings.pictures[0].use = False  # the first alone has the size of the scene
     bpy.context.scene.camera = settings.first_picture.camera
     assert "is 96x64, but the scene renders 64x64" in check_now(scene)[0]
