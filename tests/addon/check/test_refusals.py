@@ -17,7 +17,7 @@ from mfo_backend.scene.image_file import write_exr
 from ..panel.laid_out import Layout
 from ..test_operators import runtime
 from .found import check
-from .test_checks import SPOILED, another_size
+from .test_checks import SPOILED, another_size, no_material
 
 
 def no_picture(scene: SimpleNamespace) -> None:
@@ -93,7 +93,7 @@ def test_nothing_is_said_of_a_refusal_whose_reason_was_mended(unstarted: SimpleN
     assert "The fit did not begin: the check above says what is to be mended." not in texts
 
 
-@pytest.mark.parametrize(("spoil", "is_of_all"), [(another_size, True), (no_picture, True), (SPOILED[12][0], False)])
+@pytest.mark.parametrize(("spoil", "is_of_all"), [(another_size, True), (no_picture, True), (no_material, False)])
 def test_selected_objects_have_the_pictures_in_common(
     unstarted: SimpleNamespace, spoil: Callable[[SimpleNamespace], None], is_of_all: bool
 ) -> None:
