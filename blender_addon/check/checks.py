@@ -16,10 +16,10 @@ from ..export.findings import Findings, Fix
 from ..export.fitted_slot import FittedSlot
 from ..export.images.image_pixels import without_pixels
 from ..export.materials.read_material import read_target
+from ..export.meshes.read_mesh import MESH_TYPES
 from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 from ..export.render_state import instanced_objects, rendered_objects
-from ..export.scene.read_scene import MESH_TYPES
 from ..graph_values.mix_values import default_values, inside_values
 from ..properties import SOCKET_ITEMS, crossed_limits, node_value_key
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of

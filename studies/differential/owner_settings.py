@@ -54,15 +54,15 @@ def _lamp_of_instancer(**values: Any) -> Callable[[Rig, Draw], None]:
     return put
 
 
-def _lamp_of_collection(flag: str) -> Callable[[Rig, Draw], None]:
+def _lamp_of_collection(flag: str, x: float) -> Callable[[Rig, Draw], None]:
     def put(rig: Rig, _: Draw) -> None:
-        made = bpy.data.collections.new("Lights")
+        made = bpy.data.collections.new("Bulbs")
         rig.scene.collection.children.link(made)
         lamp = bpy.data.objects.new("Bulb", bpy.data.lights.new("Bulb", "POINT"))
-        lamp.data.energy, lamp.data.shadow_soft_size, lamp.location = 80.0, 0.3, (1.4, -1.0, 2.2)
+        lamp.data.energy, lamp.data.shadow_soft_size, lamp.location = 80.0, 0.3, (x, -1.0, 2.2)
         lamp.visible_camera = True
         made.objects.link(lamp)
-        setattr(bpy.context.view_layer.layer_collection.children["Lights"], flag, True)
+        setattr(bpy.context.view_layer.layer_collection.children[made.name], flag, True)
 
     return put
 
@@ -321,8 +321,8 @@ def _all() -> Iterator[Setting]:
     yield Setting("lamp of an instancer", _lamp_of_instancer())
     yield Setting("lamp's instancer hidden from camera", _lamp_of_instancer(visible_camera=False))
     yield Setting("lamp's instancer hidden from diffuse", _lamp_of_instancer(visible_diffuse=False), ("hidden from",))
-    yield Setting("lamp indirect only", _lamp_of_collection("indirect_only"))
-    yield Setting("lamp in a holdout collection", _lamp_of_collection("holdout"), ("holdout",))
+    yield Setting("lamp indirect only", _lamp_of_collection("indirect_only", 1.4))
+    yield Setting("lamp in a holdout collection", _lamp_of_collection("holdout", -1.4))
     yield Setting("mesh light linking", _linked_mesh("receiver_collection"), ("Light linking",))
     yield Setting("mesh shadow linking", _linked_mesh("blocker_collection"), ("Light linking",))
     yield Setting("screw", _screw)

@@ -79,3 +79,17 @@ def test_what_simplify_does_is_silent_without_simplify(scene: Any, export: Any) 
     item = ball(scene)
     limit_textures(scene, simplify=False)
     assert not export(item).notes
+
+
+def test_a_holdout_is_said_of_what_it_cuts_out(scene: Any, export: Any) -> None:
+    """Cycles lights with the lamps of such a collection as with any others."""
+    item = ball(scene)
+    made = bpy.data.collections.new("Cut")
+    scene.collection.children.link(made)
+    bpy.context.view_layer.layer_collection.children["Cut"].holdout = True
+    made.objects.link(next(each for each in scene.objects if each.type == "LIGHT"))
+    assert not export(item, "lamp").notes
+    made.objects.link(add_quad("Card", 0.5, 0.5, new_material("Card")))
+    assert export(item, "card").notes == (
+        "Collection 'Cut' is a holdout: Cycles cuts its objects out; in the fit they are objects.",
+    )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...versions import corner_normals, rounds_beside_flat_faces
 from .mesh_arrays import CornerMesh
 
+MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # of objects whose faces are rendered
 Number = TypeVar("Number", np.int32, np.bool_)
 
 

@@ -11,14 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...versions import (
-    cycles_settings,
     has_compositor,
     node_tree_of,
     overrides_of,
     shadow_terminator,
 )
-from ..audit.rules import name_settings
-from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.read_camera import read_camera
 from ..camera.render_region import Size
 from ..files.ply_file import TriangleMesh
@@ -34,12 +31,11 @@ from ..materials.unfinite_pixels import refuse_unfinite_pixels
 from ..meshes.face_notes import APART, MANY, MOST_BENT, MOST_BENT_OF_SMOOTH, note_bent_normals, note_coincident_faces
 from ..meshes.known_meshes import KnownMeshes
 from ..meshes.mesh_arrays import CornerMesh, Piece, joined
-from ..meshes.read_mesh import material_of_slot, read_mesh, slot_count
+from ..meshes.read_mesh import MESH_TYPES, material_of_slot, read_mesh, slot_count
 from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
 from ..render_state import (
     background_objects,
-    layer_collections,
     note_viewport,
     render_state,
     rendered_layer,
@@ -48,13 +44,12 @@ from ..render_state import (
 from ..steps import Steps
 from .origin import moved, note_far_scattering, scene_origin
 from .ray_visibility import camera_misses, hidden_from, note_visibility, shadow_transmission
-from .read_settings import read_settings
+from .read_settings import name_render_settings, read_settings
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
 from .scene_data import SceneData, Shape, Terminator, target_bsdf, target_shape
 from .visibility import check_visible, say_no_faces
 
-MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
 _NO_POINTS = np.zeros((0, 3), np.float32)
 NOT_PLACED = TriangleMesh(_NO_POINTS, _NO_POINTS, np.zeros((0, 2), np.float32), np.zeros((0, 3), np.int32))
@@ -140,7 +135,7 @@ def _read(
         described = [material for material in materials if material is not None]
         if camera is None or len(described) < len(materials):
             return None
-        _name_settings(scene, view_layer, findings)
+        name_render_settings(scene, view_layer, findings)
         world = read_world(scene, settings.exposure, findings, bakes) if view_layer.use_sky else BLACK
         origin = scene_origin(scene.camera, [each.object for each in fitted], depsgraph)
         data = SceneData(replace(camera, world=moved(camera.world, origin)), settings, world, origin=origin)
@@ -181,19 +176,6 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
             note_linking(shape.linked, findings)
     if not data.world.is_lit and not data.lights and not data.emitting:
         findings.error("The scene has no light: add a light or give the world a colour.")
-
-
-def _name_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, findings: Findings) -> None:
-    """Report what the scene's settings do to a picture and the fit does not."""
-    idle = () if scene.render.use_simplify else BY_SIMPLIFY
-    name_settings(SCENE_CYCLES, cycles_settings(scene), scene.name, findings, idle)
-    name_settings(RENDER, scene.render, scene.name, findings)
-    name_settings(VIEW_LAYER, view_layer, view_layer.name, findings)
-    for collection in layer_collections(view_layer):
-        name_settings(LAYER_COLLECTION, collection, collection.name, findings)
-    strips = getattr(scene.sequence_editor, "strips", None) or getattr(scene.sequence_editor, "sequences", ())
-    if scene.render.use_sequencer and len(strips):
-        findings.note("The render shows the strips of the Video Sequencer; the fit shows the scene.")
 
 
 class _Walk:

@@ -8,8 +8,12 @@ from typing import Any
 import bpy
 
 from ...versions import counts_passages_exactly, cycles_settings
+from ..audit.rules import name_settings
+from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.read_camera import read_pixel_filter
 from ..findings import Findings
+from ..meshes.read_mesh import MESH_TYPES
+from ..render_state import layer_collections
 from .scene_data import RenderSettings
 
 DEFAULT_SPP = 64
@@ -38,6 +42,25 @@ def read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
     exposure = cycles.film_exposure
     film = scene.render.film_transparent
     return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, cycles.use_light_tree)
+
+
+def name_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, findings: Findings) -> None:
+    """Report what the settings of a scene and its layers do to a picture and the fit does not."""
+    idle = () if scene.render.use_simplify else BY_SIMPLIFY
+    name_settings(SCENE_CYCLES, cycles_settings(scene), scene.name, findings, idle)
+    name_settings(RENDER, scene.render, scene.name, findings)
+    name_settings(VIEW_LAYER, view_layer, view_layer.name, findings)
+    for layer in layer_collections(view_layer):
+        idle = () if _shows_faces(layer.collection) else ("holdout",)  # Cycles cuts out no lamp
+        name_settings(LAYER_COLLECTION, layer, layer.name, findings, idle)
+    strips = getattr(scene.sequence_editor, "strips", None) or getattr(scene.sequence_editor, "sequences", ())
+    if scene.render.use_sequencer and len(strips):
+        findings.note("The render shows the strips of the Video Sequencer; the fit shows the scene.")
+
+
+def _shows_faces(collection: bpy.types.Collection) -> bool:
+    shown = (item for item in collection.all_objects if not item.hide_render)
+    return any(item.type in MESH_TYPES or item.instance_type != "NONE" for item in shown)
 
 
 def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> dict[str, Any]:
