@@ -3,13 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ..versions import active_output
 from .graph_copy import nodes_of
 
+Key = TypeVar("Key")
+FAR_SIDE = 1  # the depth at which the camera would see the far side of a target
+# subpixels along a pixel there, which mirrors and bounces show: with four a graph took 1.7 times as long, with one a
+# block of a mirror was at 4.1 deviations
+FAR_SCALE = 2
 LIGHT_PATH, DEPTH = "ShaderNodeLightPath", "Transparent Depth"
 
 
@@ -43,6 +51,32 @@ def peeled(tree: bpy.types.NodeTree, outputs: Sequence[tuple[str, bool]], depths
     tree.links.new(surface, mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
     return [(at_depth(name, depth), is_color) for name, is_color in outputs for depth in range(depths)]
+
+
+def joined_depths(
+    found: Mapping[str, NDArray[np.float32]], outputs: Sequence[tuple[str, bool]], depths: Sequence[int]
+) -> dict[str, NDArray[np.float32]]:
+    """The pictures of these depths, one below the other, by the outputs' own names."""
+    return {name: np.concatenate([found[at_depth(name, depth)] for depth in depths]) for name, _ in outputs}
+
+
+def with_far_side(
+    near: Mapping[Key, NDArray[np.float32]], far: Mapping[Key, NDArray[np.float32]]
+) -> dict[Key, NDArray[np.float32]]:
+    """Pictures (height, width, 1 or 3) with coarser ones of the far side below them."""
+    return {name: np.concatenate([picture, _finer(far[name], picture.shape)]) for name, picture in near.items()}
+
+
+def _finer(picture: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """A picture of this height and width, with bilinear interpolation."""
+    for axis in (0, 1):
+        size, coarse = shape[axis], picture.shape[axis]
+        place = np.clip((np.arange(size) + 0.5) * coarse / size - 0.5, 0.0, coarse - 1.0)
+        before = np.minimum(place.astype(int), max(coarse - 2, 0))
+        after = np.minimum(before + 1, coarse - 1)
+        part = (place - before).astype(np.float32).reshape((-1, 1, 1) if axis == 0 else (-1, 1))
+        picture = (1.0 - part) * picture.take(before, axis) + part * picture.take(after, axis)
+    return picture
 
 
 def _put_output(node: bpy.types.Node, depth: int) -> None:

@@ -7,7 +7,7 @@ Cycles evaluates the nodes itself: a copy of the material writes each socket's v
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from ..export.nodes.shader_graph import source_of
 from ..versions import active_output, bumps_look_at_pixels
 from .aov_render import Frame, frame_of, render_outputs, world_to_frame
 from .closure_tree import ClosureTree, Leaf
-from .depths import at_depth, peeled
+from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
 from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
 from .server import ProbeRequestError
@@ -59,7 +59,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     Requested are `scene`, `layer`, `object`, `slot`, for each of the `leaves` of its shaders the `node` (a path of
     names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples`
     of each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the
-    second what it would see were that away, and so on; files have one below the other. `region` is the left, top,
+    second what it would see were that away, and so on; files have one below the other, and `far_side` asks for a
+    coarser second one; how many `depths` there are is answered, too. `region` is the left, top,
     right and bottom of what the picture shows alone, in pixels of the frame, None for all; places count from
     `origin`, zero if it is absent. Answered are for each of the `leaves` the `sockets` by name and the `weight`,
     each a `file` and its `mean` over what the camera sees; the file `positions`, and `camera`, the (3, 4) matrix
@@ -86,16 +87,20 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
 
 def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
     target = Target.of(request)
-    material, depths = target.material, int(request.get("depths", 1))
-    outputs, found, frame = _rendered(target, request, request["scale"])
-    by_ray = bool(request.get("elsewhere")) and asks_ray(material.node_tree)
+    depths = range(int(request.get("depths", 1)))
+    outputs, found, frame = _rendered(target, request, request["scale"], depths)
+    by_ray = bool(request.get("elsewhere")) and asks_ray(target.material.node_tree)
     cosines = [cosine_of(angle) for angle in range(ANGLES)] if by_ray else []
-    elsewhere = [_rendered(target, request, ELSEWHERE_SCALE, cosine)[1] for cosine in cosines]
+    elsewhere = [_rendered(target, request, ELSEWHERE_SCALE, depths, cosine)[1] for cosine in cosines]
+    if request.get("far_side"):
+        found = with_far_side(found, _rendered(target, request, FAR_SCALE, (FAR_SIDE,))[1])
     mask = found[MASK]
     seen = mask[..., 0] > SEEN
-    first = seen & (np.arange(len(seen)) < len(seen) // depths)[:, None]
-    if not first.any():
+    if not seen.any():
         raise target.why_nothing(frame, request["samples"])
+    height = frame.bottom - frame.top
+    first = seen & (np.arange(len(seen)) < height)[:, None]
+    first = first if first.any() else seen  # all of it may be behind a pane
     folder = Path(request["folder"])
     leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
     for number, each in enumerate(outputs):
@@ -114,28 +119,31 @@ def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
     positions = np.where(seen[..., None], found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
     np.save(folder / "positions.npy", (positions - target.origin).astype(np.float32))
     camera = from_origin(world_to_frame(target.scene, frame), target.origin).tolist()
-    return {"leaves": leaves, "positions": "positions.npy", "camera": camera, "scale": frame.scale}
+    of_files = {"positions": "positions.npy", "camera": camera, "scale": frame.scale, "depths": len(seen) // height}
+    return {"leaves": leaves, **of_files}
 
 
 def _rendered(
-    target: Target, request: Mapping[str, Any], scale: int, cosine: float | None = None
+    target: Target, request: Mapping[str, Any], scale: int, depths: Sequence[int], cosine: float | None = None
 ) -> tuple[list[_Output], dict[str, NDArray[np.float32]], Frame]:
-    """The outputs, what Cycles writes into them for the camera's rays or for others at an angle, and their frame."""
-    copy, depths = own_copy(target.material), int(request.get("depths", 1))
+    """The outputs, what Cycles writes into them for the camera's rays or for others at an angle, and their frame.
+
+    There is a picture of each of the `depths`, one below the other.
+    """
+    copy = own_copy(target.material)
     try:
         if cosine is not None:
             see_from_elsewhere(copy.node_tree, cosine)
         outputs = _leaf_outputs(copy.node_tree, request["leaves"])
         make_opaque(copy, ours=True)
         wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
-        at_depths = peeled(copy.node_tree, wanted, depths)
+        at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
         frame = target.frame(scale, len(at_depths))
         widen_bumps(copy.node_tree, frame.scale)
         rendered = target.outputs(copy, at_depths, frame, request["samples"])
     finally:
         remove_copy(copy)
-    found = {name: np.concatenate([rendered[at_depth(name, k)] for k in range(depths)]) for name, _ in wanted}
-    return outputs, found, frame
+    return outputs, joined_depths(rendered, wanted, depths), frame
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ..export.nodes.displacement import SHADING_NORMAL
 from ..graph_values.place import Place, write
 from .aov_render import Frame, world_to_frame
 from .closure_tree import ClosureTree
+from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
 from .graph_copy import node_at, own_copy, remove_copy, variant_of
 from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
 from .server import ProbeRequestError
@@ -40,7 +41,7 @@ from .socket_pictures import (
 MOST_VARIANTS = 32
 
 _Sets = Sequence[tuple[Sequence[Any], Sequence[str]]]  # the values of a variant, and the sockets that are looked at
-_Found = tuple[dict[tuple[int, str], NDArray[np.float32]], NDArray[np.float32], NDArray[np.float32]]
+_Found = dict[tuple[int, str] | str, NDArray[np.float32]]  # by variant and socket; mask and position by their names
 
 
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -52,8 +53,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     mix, the `places` of the values (entries of request.json), `variants`, each with a number or colour for every
     place in `values` and with the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each
     subpixel and the `folder` for the files; `elsewhere` where the files of that name are asked for, too, for the
-    first variant. Answered are `files`, by socket for each variant, `elsewhere`, by socket as of the command
-    `sockets`, and of the target the file `positions`, NaN beside it, and the `camera` of that command.
+    first variant, and `far_side` as there. Answered are `files`, by socket for each variant, `elsewhere`, by socket as
+    of the command `sockets`, and of the target the file `positions`, NaN beside it, and the `camera` of that command.
 
     Raises
     ------
@@ -100,7 +101,11 @@ def _all(
     mask = positions = np.zeros((0, 0, 1), np.float32)
     for begin in range(0, len(variants), most):
         some = variants[begin : begin + most]
-        found, mask, positions = _rendered(target, request, places, some, frame)
+        found = _rendered(target, request, places, some, frame)
+        if request.get("far_side"):
+            coarse = target.frame(FAR_SCALE, _outputs_of(some))
+            found = with_far_side(found, _rendered(target, request, places, some, coarse, FAR_SIDE))
+        mask, positions = found[MASK], found[POSITION]
         seen = mask[..., 0] > SEEN
         if not seen.any():  # Cycles shows nothing of a material that is too large for it
             if most > 1:
@@ -124,8 +129,8 @@ def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], 
     frame = target.frame(ELSEWHERE_SCALE, len(names) + 2)
     ways = []
     for angle in range(ANGLES):
-        found, mask, _ = _rendered(target, request, places, variants, frame, cosine=cosine_of(angle))
-        ways.append({MASK: mask} | {name: found[0, name] for name in names})
+        found = _rendered(target, request, places, variants, frame, cosine=cosine_of(angle))
+        ways.append({MASK: found[MASK]} | {name: found[0, name] for name in names})
     files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(names)}
     for name, file in files.items():
         found_at = [whole(way, name, paths[name][-1], kinds[name]) for way in ways]
@@ -139,6 +144,7 @@ def _rendered(
     places: list[Place],
     variants: _Sets,
     frame: Frame,
+    depth: int = 0,
     *,
     cosine: float | None = None,
 ) -> _Found:
@@ -156,12 +162,13 @@ def _rendered(
             outputs = {name: _name(k, i) for i, name in enumerate(names)}
             kinds = _put_outputs(tree, request["sockets"], outputs)
             wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
-        found = target.outputs(copy, wanted, frame, request["samples"])
+        at_depths = peeled(copy.node_tree, wanted, depth + 1)
+        found = joined_depths(target.outputs(copy, at_depths, frame, request["samples"]), wanted, (depth,))
     finally:
         remove_copy(copy)
         remove_copy(base)
     outputs = {(k, name): found[_name(k, i)] for k, (_, names) in enumerate(variants) for i, name in enumerate(names)}
-    return outputs, found[MASK], found[POSITION]
+    return {**outputs, MASK: found[MASK], POSITION: found[POSITION]}
 
 
 def _name(variant: int, socket: int) -> str:

@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...probe.client import Probe, ProbeError
+from ...versions import node_tree_of
 from ..camera.camera_model import Region, edges_of
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material, Socket
+from ..nodes.dependence import tells_sides
 from ..nodes.target_shader import chosen_leaf, fitted_leaves, leaf_name, target_shader
 from ..steps import Pause, Steps
 from .read_material import read_target
@@ -137,6 +139,7 @@ def _send(
     depths: int = 1,
     *,
     elsewhere: bool = True,
+    far_side: bool = False,
     may_miss: bool = False,
     region: Region | None = None,
     origin: NDArray[np.float64] | None = None,
@@ -144,8 +147,9 @@ def _send(
     probe.send(
         "sockets",
         scene=context.scene.name, layer=context.view_layer.name, object=fitted.object.name, slot=fitted.slot,
-        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), depths=depths, elsewhere=elsewhere,
-        may_miss=may_miss, region=edges_of(region), origin=None if origin is None else origin.tolist(),
+        leaves=leaves, scale=scale, samples=SAMPLES, folder=str(folder), elsewhere=elsewhere, depths=depths,
+        far_side=far_side, may_miss=may_miss, region=edges_of(region),
+        origin=None if origin is None else origin.tolist(),
     )  # fmt: skip
 
 
@@ -186,8 +190,9 @@ def evaluate_graph(
     ]
     folder = probe.folder / f"target_{number}"
     folder.mkdir(exist_ok=True)
-    depths = DEPTHS if material.passes_light else 1
-    _send(probe, context, fitted, asked, SCALE, folder, depths, may_miss=may_miss, region=region, origin=origin)
+    depths, where = DEPTHS if material.passes_light else 1, {"may_miss": may_miss, "region": region, "origin": origin}
+    far_side = depths == 1 and _far_side_is_known(fitted.material)
+    _send(probe, context, fitted, asked, SCALE, folder, depths, far_side=far_side, **where)
     yield Pause(probe.is_answered)
     answer = probe.receive()
     if not answer.get("seen", True):
@@ -208,8 +213,18 @@ def evaluate_graph(
         return replace(leaf, sockets=sockets, weight=weight)
 
     first, *held = map(evaluated, leaves, answer["leaves"])
-    seen_by = NodeGraph(answer["camera"], files[0], tuple(files), depths, answer["scale"])
+    seen_by = NodeGraph(answer["camera"], files[0], tuple(files), answer["depths"], answer["scale"])
     return replace(first, leaves=tuple(held)), seen_by
+
+
+def _far_side_is_known(material: bpy.types.Material | None) -> bool:
+    """Whether the far side is from within, as the camera would see it, what it is from outside.
+
+    Mirrors and bounces show it. With the average of the near side a ball that is black behind and white before was
+    1.7 % too dark beside a mirror, a block at 16 deviations, and is 0.02 % and at 2.2.
+    """
+    tree = None if material is None else node_tree_of(material)
+    return tree is not None and not tells_sides(tree)
 
 
 def _perhaps_glowing(material: Material) -> Material:

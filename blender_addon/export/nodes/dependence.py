@@ -21,6 +21,14 @@ OF_VIEW = {
 }
 # differ between the two sides of a surface, while a bake looks at the front
 OF_SIDE = {"ShaderNodeNewGeometry": ("Backfacing",)}
+# differ between the two sides of a surface wherever it is looked at from
+OF_FACING = {
+    "ShaderNodeNewGeometry": ("Normal", "True Normal", "Incoming", "Backfacing"),
+    "ShaderNodeTexCoord": ("Normal", "Reflection"),
+    "ShaderNodeFresnel": ("Fac", "Factor"),
+    "ShaderNodeLayerWeight": ("Fresnel", "Facing"),
+    "ShaderNodeBevel": ("Normal",),
+}
 # instances of one object have each their own of
 OF_PLACE = {
     "ShaderNodeNewGeometry": ("Position", "Normal", "True Normal", "Tangent"),
@@ -63,6 +71,14 @@ def asked_of_place(tree: bpy.types.NodeTree) -> list[str]:
 def asked_of_instancer(tree: bpy.types.NodeTree) -> list[str]:
     """Labels of nodes that something asks for what particles, points or other instancers say of an instance."""
     return sorted({node.bl_label for node in _nodes(tree) if _asks_instancer(node)})
+
+
+def tells_sides(tree: bpy.types.NodeTree) -> bool:
+    """Whether nodes answer a ray that meets the back of a surface with other values than one that meets its front."""
+    kinds = ("ShaderNodeLightPath", *OF_SURROUNDINGS)
+    return bool(asked_for(tree, OF_FACING)) or any(
+        node.bl_idname in kinds or getattr(node, "projection", "") == "BOX" for node in _nodes(tree)
+    )
 
 
 def turns_with_camera(tree: bpy.types.NodeTree) -> list[str]:

@@ -96,6 +96,7 @@ class GraphBlender:
                 for values, names in variants
             ],
             "scale": scale, "samples": samples, "elsewhere": elsewhere, "folder": str(self._folder),
+            "far_side": elsewhere and graph.depths > 1,
         })  # fmt: skip
         pictures = [{socket: self._picture(file) for socket, file in files.items()} for files in answer["files"]]
         others = {socket: self._picture(file) for socket, file in answer.get("elsewhere", {}).items()}

@@ -62,7 +62,7 @@ class Shown:
 class Evaluate(Protocol):
     """Evaluates variants of a graph, `scale` squared subpixels to a pixel, and so many samples in each.
 
-    `elsewhere` says that the pictures of that name are asked for.
+    `elsewhere` says that the pictures of that name are asked for, and what lies behind what the camera sees first.
     """
 
     def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:

@@ -16,8 +16,8 @@ from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
 from mfo_backend.job.run.job_scene import request_materials  # noqa: E402
 
-from ..scenes import new_material  # noqa: E402
-from .test_node_graphs import ball, bump, lit_scene, noise_ramp, principled  # noqa: E402
+from ..scenes import add_quad, new_material, world_color  # noqa: E402
+from .test_node_graphs import ball, bump, coordinates, lit_scene, noise_ramp, principled  # noqa: E402
 
 
 def evaluator(request: Any, folder: Path) -> Any:
@@ -32,6 +32,7 @@ def evaluator(request: Any, folder: Path) -> Any:
         found = answer({
             **where, "places": [value.place for value in request.graph.values], "variants": asked,
             "scale": scale, "samples": samples, "elsewhere": elsewhere, "folder": str(folder),
+            "far_side": elsewhere and request.graph.depths > 1,
         })  # fmt: skip
         pictures = [{name: np.load(folder / file) for name, file in files.items()} for files in found["files"]]
         others = {name: np.load(folder / file) for name, file in found["elsewhere"].items()}
@@ -60,7 +61,7 @@ def masked(tree: Any, node: Any) -> None:
     tree.links.remove(node.inputs["Base Color"].links[0])
     mask = tree.nodes.new("ShaderNodeValToRGB")
     tree.links.new(next(n for n in tree.nodes if n.type == "TEX_NOISE").outputs[0], mask.inputs[0])
-    mask.color_ramp.elements[0].position, mask.color_ramp.elements[1].position = 0.45, 0.55
+    mask.color_ramp.elements[0].position, mask.color_ramp.elements[1].position = 0.3, 0.4
     diffuse, glossy = (tree.nodes.new(f"ShaderNodeBsdf{kind}") for kind in ("Diffuse", "Anisotropic"))
     glossy.inputs["Roughness"].default_value = 0.4
     tree.links.new(color, diffuse.inputs["Color"])
@@ -72,6 +73,29 @@ def masked(tree: Any, node: Any) -> None:
             tree.links.new(side.outputs[0], mix.inputs[number])
     tree.links.new(mask.outputs[0], outer.inputs[0])
     tree.links.new(outer.outputs[0], surface)
+
+
+def renderer_of_values(export: Any, render_cycles: Any, target: Any, folder: Path, parameters: list[str]) -> Any:
+    """The renderer of an exported job whose nodes are evaluated for any values inside them: all `parameters` but the
+    first."""
+    from mfo_backend.render.models.graph_pictures import GraphPictures
+    from mfo_backend.render.pictures.renderer import load_renderer
+    from mfo_backend.scene.image_file import write_exr
+
+    write_exr(folder / "reference.exr", render_cycles())
+    report = export(target, reference=folder / "reference.exr", fit={"parameters": parameters})
+    job = JobFolder.open(report.folder)
+    request = read_request(job)
+    assert request.graph is not None
+    assert {value.name for value in request.graph.values} == set(parameters[1:])
+    assert (report.folder / "graph" / "scene.blend").is_file()
+    linked = request.materials["target_bsdf"].graph_names
+    return load_renderer(
+        job.root / request.scene, request.target.shape_id, model="blender_principled",
+        parameters=request.fit.parameters, materials=request_materials(job, request),
+        light_paths=request.light_paths,
+        graph=GraphPictures(request.graph.values, evaluator(request, folder), linked),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -96,10 +120,7 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     from blender_addon.graph_values.place import write
     from blender_addon.graph_values.table import graph_values
     from blender_addon.versions import has_diffuse_roughness
-    from mfo_backend.render.models.graph_pictures import GraphPictures
     from mfo_backend.render.paths.recorded_scene import RecordedScene
-    from mfo_backend.render.pictures.mitsuba_renderer import MitsubaRenderer
-    from mfo_backend.render.pictures.renderer import load_renderer
 
     if build is masked and not has_diffuse_roughness():
         pytest.skip("a Diffuse BSDF of Blender 4.2 has no roughness to fit beside")
@@ -107,25 +128,7 @@ def test_the_recorded_picture_at_other_values_is_cycles(
     material = new_material("Target", **values)
     build(material.node_tree, principled(material))
     target = ball(material)
-    picture = tmp_path / "reference.exr"
-    from mfo_backend.scene.image_file import write_exr
-
-    write_exr(picture, render_cycles())
-    report = export(target, reference=picture, fit={"parameters": ["roughness", *change]})
-    folder = JobFolder.open(report.folder)
-    request = read_request(folder)
-    assert request.graph is not None
-    assert {value.name for value in request.graph.values} == set(change)
-    assert (report.folder / "graph" / "scene.blend").is_file()
-    linked = request.materials["target_bsdf"].graph_names
-    renderer = load_renderer(
-        folder.root / request.scene, request.target.shape_id, model="blender_principled",
-        parameters=request.fit.parameters, materials=request_materials(folder, request),
-        light_paths=request.light_paths,
-        graph=GraphPictures(request.graph.values, evaluator(request, tmp_path), linked),
-    )  # fmt: skip
-    assert isinstance(renderer, MitsubaRenderer)
-    assert renderer.graph is not None
+    renderer = renderer_of_values(export, render_cycles, target, tmp_path, ["roughness", *change])
     recorded = RecordedScene(renderer, int(renderer.target_mask().sum()))
     there = renderer.table.pack({**renderer.table.unpack(renderer.start), **change})
     paths = recorded.record(there, grid=4, seed=0, near=True)
@@ -158,6 +161,34 @@ def test_the_recorded_picture_at_other_values_is_cycles(
         # the difference is taken over a few per cent of the range, where normals turn
         assert np.corrcoef(change_of.ravel(), slope.ravel())[0, 1] > 0.98, renderer.table.names
         assert abs((change_of * slope).sum() / (slope**2).sum() - 1.0) < 0.06
+
+
+def test_a_mirror_shows_the_far_side_at_other_values(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, tmp_path: Path
+) -> None:
+    """A ball that is light above and dark below: with the average of what the camera sees 20 % too bright."""
+    lit_scene(scene)
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    scene.camera.data.lens, scene.cycles.max_bounces = 20.0, 2
+    scene.cycles.diffuse_bounces = scene.cycles.glossy_bounces = 2
+    world_color(scene, 1.0)
+    mirror = add_quad("Mirror", 2.6, 0.0, new_material("Mirror", Metallic=1.0, Roughness=0.1))
+    mirror.location, mirror.rotation_euler = (2.2, 0.0, 0.0), (0.0, -np.pi / 4, 0.0)
+    material = new_material("Target")
+    tree = material.node_tree
+    split, ramp = tree.nodes.new("ShaderNodeSeparateXYZ"), tree.nodes.new("ShaderNodeValToRGB")
+    tree.links.new(coordinates(tree), split.inputs[0])
+    tree.links.new(split.outputs["Z"], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], principled(material).inputs["Base Color"])
+    ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.3, 0.4
+    target, change = ball(material), {"Color Ramp/Stop 0": (0.9, 0.2, 0.1)}
+    renderer = renderer_of_values(export, render_cycles, target, tmp_path, ["roughness", *change])
+    there = renderer.table.pack({**renderer.table.unpack(renderer.start), **change})
+    image = slice(12, 20), slice(20, 27)  # of the ball in the mirror
+    for vector, color in ((renderer.start, (0.0, 0.0, 0.0)), (there, change["Color Ramp/Stop 0"])):
+        ramp.color_ramp.elements[0].color = (*color, 1.0)
+        found, truth = renderer.image(vector, seed=0, spp=64)[image], render_cycles()[image]
+        assert np.abs(found.mean(axis=(0, 1)) / truth.mean(axis=(0, 1)) - 1.0).max() < 0.05
 
 
 def halved(flat: np.ndarray) -> np.ndarray:

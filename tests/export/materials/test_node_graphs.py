@@ -76,10 +76,15 @@ def test_values_are_those_of_the_positions(scene: Any, export: Any) -> None:
     assert {name: len(getattr(bpy.data, name)) for name in before} == before
     assert report.notes == ()
     entry = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]
-    positions = np.load(report.folder / report.request["graph"]["positions"])
-    values = np.load(report.folder / entry["graph"])
-    seen = np.isfinite(positions).all(axis=2)
-    np.testing.assert_allclose(values[seen], (positions[seen] + 1.0) / 2.0, atol=2e-5)
+    both, given = (np.load(report.folder / file) for file in (report.request["graph"]["positions"], entry["graph"]))
+    there = np.isfinite(both).all(axis=2)
+    np.testing.assert_allclose(given[there], (both[there] + 1.0) / 2.0, atol=2e-5)
+    # the near side, and what the camera would see were that away
+    positions, far = np.split(both, 2)
+    assert np.nanmin(positions[..., 2]) > 0.2
+    assert -1.0 < np.nanmin(far[..., 2]) < -0.95
+    assert np.nanmax(far[..., 2]) < 0.3
+    seen, values = there[: len(positions)], given[: len(positions)]
     np.testing.assert_allclose(entry["value"], values[seen].mean(axis=0), rtol=1e-4)
     assert np.linalg.norm(positions[seen], axis=1).max() < 1.001  # nothing of the other object
     # the camera's matrix leads from each position back to its subpixel
