@@ -13,18 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .color_space import linear_to_srgb, srgb_to_linear
-from .image_pixels import SRGB_NAMES, is_data, read_encoded, read_pixels
+from .image_pixels import SRGB_NAMES, UnreadableImageError, is_data, read_encoded, read_pixels
 
 MOST_PIXELS = 1 << 22  # of a finer grid; 2048 squared, 50 MB of colours
 FINEST = 8  # points of the finer grid along a pixel: a black and white checker is 0.3 % off, with 4 points 1 %
+# Of a colour that is divided by its alpha: a floor whose picture had colours at alpha 0 was 20 to 90 % too dark, by how
+# near Cycles' samples came to alpha 0
+MOST_DIVIDED, LEAST_COLOUR = 100.0, 1e-3
 
 Pixels = NDArray[np.float32]
 
 
-def filtered_pixels(image: bpy.types.Image, interpolation: str, wrap: str, *, alpha_read: bool) -> Pixels:
+def filtered_pixels(
+    image: bpy.types.Image, interpolation: str, wrap: str, *, alpha_read: bool, bends: bool = False
+) -> Pixels:
     """Return float32 (height, width, 4), first row at the top, linear Rec.709 or raw, perhaps on a finer grid.
 
-    `alpha_read` says whether the texture node's Alpha is linked.
+    `alpha_read` says whether the texture node's Alpha is linked, and `bends` whether nodes after it are no straight
+    lines: these see interpolated numbers.
 
     Raises
     ------
@@ -33,10 +39,11 @@ def filtered_pixels(image: bpy.types.Image, interpolation: str, wrap: str, *, al
     """
     encoded = not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
     pixels = read_encoded(image) if encoded and not image.is_float else read_pixels(image)
-    if encoded and image.is_float:  # of which Blender keeps linear numbers; with alpha they are taken as they are
-        encoded = bool((pixels[:, :, 3] == 1.0).all())
-        if encoded:
-            pixels[:, :, :3] = linear_to_srgb(pixels[:, :, :3])
+    if image.is_float and _is_multiplied(image, pixels):
+        pixels[:, :, :3] = _multiplied_floats(image, pixels)
+        encoded &= _is_read_by_cycles(image)  # what Blender gives it is decoded
+    if encoded and image.is_float:  # of which Blender keeps linear numbers
+        pixels[:, :, :3] = linear_to_srgb(pixels[:, :, :3])
     pixels = _with_alpha(image, pixels, alpha_read)
     divided = alpha_read and interpolation != "Closest" and _is_multiplied(image, pixels)
     if divided:
@@ -44,7 +51,7 @@ def filtered_pixels(image: bpy.types.Image, interpolation: str, wrap: str, *, al
     steps = _steps(pixels)
     if steps > 1 and interpolation in ("Cubic", "Smart"):
         pixels = _finer(pixels, steps, wrap, _cubic)
-    elif steps > 1 and (encoded or divided) and interpolation == "Linear":
+    elif steps > 1 and (encoded or divided or bends) and interpolation == "Linear":
         pixels = _finer(pixels, steps, wrap, _linear)
     elif encoded:
         pixels = pixels.copy()
@@ -69,6 +76,31 @@ def equirectangular_pixels(image: bpy.types.Image, interpolation: str) -> Pixels
     return np.ascontiguousarray(np.repeat(np.repeat(pixels, steps, axis=0), steps, axis=1))
 
 
+def divides_by_nothing(image: bpy.types.Image, interpolation: str) -> bool:
+    """Whether Cycles, where a node's Alpha is linked, divides colours that are there by an alpha that is almost 0."""
+    if not image.is_float or interpolation == "Closest":  # bytes are multiplied, and there is nothing between pixels
+        return False
+    try:
+        pixels = read_encoded(image)
+    except UnreadableImageError:
+        return False
+    if not _is_multiplied(image, pixels):
+        return False
+    color = _multiplied_floats(image, pixels).max(axis=2)
+    return bool(((color > LEAST_COLOUR) & (color > MOST_DIVIDED * pixels[:, :, 3])).any())
+
+
+def _is_read_by_cycles(image: bpy.types.Image) -> bool:
+    """Whether Cycles reads the file of an image itself, and does not ask Blender for pixels."""
+    return image.source == "FILE" and image.packed_file is None
+
+
+def _multiplied_floats(image: bpy.types.Image, pixels: Pixels) -> Pixels:
+    """The colours of floats that Cycles takes for multiplied by alpha: of a file as it holds them, whatever its Alpha
+    says to Blender."""
+    return _as_stored(image) if _is_read_by_cycles(image) else pixels[:, :, :3]
+
+
 def _with_alpha(image: bpy.types.Image, pixels: Pixels, alpha_read: bool) -> Pixels:
     """Colours as Cycles' node gives them: times alpha unless its Alpha is linked."""
     mode = image.alpha_mode
@@ -78,10 +110,10 @@ def _with_alpha(image: bpy.types.Image, pixels: Pixels, alpha_read: bool) -> Pix
     if not _is_multiplied(image, pixels):
         return pixels
     color = pixels[:, :, :3]
-    # Cycles reads such a file itself, as if its colours were not multiplied; Blender divides, and clips to 1
-    if mode == "PREMUL" and not image.is_float and image.source == "FILE" and image.packed_file is None:
+    # Cycles takes the file's colours as if they were not multiplied; Blender divides, and clips to 1
+    if mode == "PREMUL" and not image.is_float and _is_read_by_cycles(image):
         color = _as_stored(image)
-    if image.is_float and alpha_read:  # what Blender keeps as floats is multiplied by alpha already
+    if image.is_float and alpha_read:  # floats are multiplied by alpha already
         color = np.divide(color, alpha, out=color.copy(), where=alpha > 0.0)
     elif not image.is_float and not alpha_read:
         color = color * alpha
@@ -99,7 +131,7 @@ def _as_stored(image: bpy.types.Image) -> Pixels:
     copy = image.copy()
     try:
         copy.alpha_mode = "CHANNEL_PACKED"
-        return read_encoded(copy)[:, :, :3]
+        return (read_pixels if image.is_float else read_encoded)(copy)[:, :, :3]
     finally:
         bpy.data.images.remove(copy)
 

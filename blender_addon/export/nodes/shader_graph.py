@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -31,6 +31,18 @@ MATH = {
     "MAXIMUM": np.maximum,
     "MINIMUM": np.minimum,
 }
+
+
+# those that bend a picture's numbers, which Cycles interpolates before them
+BENDING = ("POWER", "MAXIMUM", "MINIMUM")
+
+
+@dataclass(frozen=True)
+class _Way:
+    """From a socket towards a picture: each node takes one of `left`; `bends` says that one was no straight line."""
+
+    left: Iterator[int]
+    bends: bool = False
 
 
 class UnsupportedNodeError(Exception):
@@ -138,7 +150,7 @@ def read_socket(socket: bpy.types.NodeSocket) -> Socket:
     source = source_of(socket)
     if source is None:
         return Socket(plain_value(socket))
-    found = _evaluate(source, iter(range(MOST_NODES)))
+    found = _evaluate(source, _Way(iter(range(MOST_NODES))))
     is_color = socket.type == "RGBA"
     if isinstance(found, Texture):
         pixels = found.pixels
@@ -155,10 +167,10 @@ def read_socket(socket: bpy.types.NodeSocket) -> Socket:
     return Socket(value, True)
 
 
-def _evaluate(output: bpy.types.NodeSocket, left: Iterator[int]) -> Texture | NDArray[np.float64]:
-    """Return a picture, or a constant of one or three numbers, for an output socket; each node takes one of `left`."""
+def _evaluate(output: bpy.types.NodeSocket, way: _Way) -> Texture | NDArray[np.float64]:
+    """Return a picture, or a constant of one or three numbers, for an output socket."""
     node = output.node
-    if next(left, None) is None:
+    if next(way.left, None) is None:
         raise UnsupportedNodeError(f"the node '{node.name}' among more than {MOST_NODES}")
     kind = node.bl_idname
     if node.mute:
@@ -168,34 +180,34 @@ def _evaluate(output: bpy.types.NodeSocket, left: Iterator[int]) -> Texture | ND
     if kind == "ShaderNodeRGB":
         return to_rec709(list(output.default_value)[:3])
     if kind == "ShaderNodeTexImage":
-        return _image(node, output.name)
+        return _image(node, output.name, bends=way.bends)
     if kind == "ShaderNodeGamma":
-        gamma = _constant(node.inputs["Gamma"], left)
-        return _apply(_input(node.inputs["Color"], left), lambda a: np.where(a > 0.0, np.maximum(a, 0.0) ** gamma, a))
+        gamma, way = _constant(node.inputs["Gamma"], way), replace(way, bends=True)
+        return _apply(_input(node.inputs["Color"], way), lambda a: np.where(a > 0.0, np.maximum(a, 0.0) ** gamma, a))
     if kind == "ShaderNodeInvert":
-        factor = _constant(node.inputs[0], left)
-        return _apply(_input(node.inputs[1], left), lambda a: a + factor * (1.0 - 2.0 * a))
+        factor = _constant(node.inputs[0], way)
+        return _apply(_input(node.inputs[1], way), lambda a: a + factor * (1.0 - 2.0 * a))
     if kind == "ShaderNodeRGBToBW":
-        return _apply(_input(node.inputs[0], left), lambda a: (a @ LUMINANCE)[..., None] if a.shape[-1] == 3 else a)
+        return _apply(_input(node.inputs[0], way), lambda a: (a @ LUMINANCE)[..., None] if a.shape[-1] == 3 else a)
     if kind in ("ShaderNodeSeparateColor", "ShaderNodeSeparateRGB"):
         if getattr(node, "mode", "RGB") != "RGB":
             raise UnsupportedNodeError(f"the node '{node.name}' in mode {node.mode}")
         channel = list(node.outputs).index(output)
-        return _apply(_input(node.inputs[0], left), lambda a: a[..., min(channel, a.shape[-1] - 1)][..., None])
+        return _apply(_input(node.inputs[0], way), lambda a: a[..., min(channel, a.shape[-1] - 1)][..., None])
     if kind == "ShaderNodeMath" and node.operation in MATH:
-        return _math(node, left)
+        return _math(node, way)
     raise UnsupportedNodeError(f"the node '{node.name}' ({node.bl_label})")
 
 
-def _input(socket: bpy.types.NodeSocket, left: Iterator[int]) -> Texture | NDArray[np.float64]:
+def _input(socket: bpy.types.NodeSocket, way: _Way) -> Texture | NDArray[np.float64]:
     source = source_of(socket)
     if source is None:
         return np.atleast_1d(np.asarray(plain_value(socket), dtype=np.float64))
-    return _evaluate(source, left)
+    return _evaluate(source, way)
 
 
-def _constant(socket: bpy.types.NodeSocket, left: Iterator[int]) -> float:
-    value = _input(socket, left)
+def _constant(socket: bpy.types.NodeSocket, way: _Way) -> float:
+    value = _input(socket, way)
     if isinstance(value, Texture):
         raise UnsupportedNodeError(f"a picture on '{socket.name}' of the node '{socket.node.name}'")
     return float(value[0])
@@ -207,8 +219,10 @@ def _apply(value: Texture | NDArray[np.float64], function: Any) -> Texture | NDA
     return function(value)
 
 
-def _math(node: bpy.types.Node, left: Iterator[int]) -> Texture | NDArray[np.float64]:
-    first, second = _input(node.inputs[0], left), _input(node.inputs[1], left)
+def _math(node: bpy.types.Node, way: _Way) -> Texture | NDArray[np.float64]:
+    by_picture = node.operation == "DIVIDE" and node.inputs[1].is_linked
+    way = replace(way, bends=way.bends or node.use_clamp or node.operation in BENDING or by_picture)
+    first, second = _input(node.inputs[0], way), _input(node.inputs[1], way)
     if isinstance(first, Texture) and isinstance(second, Texture):
         raise UnsupportedNodeError(f"the node '{node.name}' with two pictures")
     picture = first if isinstance(first, Texture) else second if isinstance(second, Texture) else None
@@ -223,7 +237,7 @@ def _math(node: bpy.types.Node, left: Iterator[int]) -> Texture | NDArray[np.flo
     return result if picture is None else replace(picture, pixels=result.astype(np.float32))
 
 
-def _image(node: bpy.types.Node, output: str) -> Texture:
+def _image(node: bpy.types.Node, output: str, *, bends: bool) -> Texture:
     if node.image is None:
         raise UnsupportedNodeError(f"the node '{node.name}' without an image")
     if node.projection != "FLAT":
@@ -236,7 +250,8 @@ def _image(node: bpy.types.Node, output: str) -> Texture:
             f"the node '{node.name}' with extension Extend and {node.interpolation} interpolation"
         )
     try:
-        pixels = filtered_pixels(node.image, node.interpolation, wrap, alpha_read=_is_read(node.outputs["Alpha"]))
+        alpha_read = _is_read(node.outputs["Alpha"])
+        pixels = filtered_pixels(node.image, node.interpolation, wrap, alpha_read=alpha_read, bends=bends)
     except UnreadableImageError as problem:
         raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     chosen = pixels[:, :, 3:4] if output == "Alpha" else pixels[:, :, :3]

@@ -10,34 +10,45 @@ import bpy
 import numpy as np
 import pytest
 
-from blender_addon.export.images.image_filter import filtered_pixels
+from blender_addon.export.images.image_filter import divides_by_nothing, filtered_pixels
+from blender_addon.export.nodes.shader_graph import read_socket
 
 from ..scenes import add_camera, add_quad, new_material
 
 MODES = ("STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE")
 
 
-def picture(path: Path, size: int = 8) -> Any:
-    """A file of random colours and two alphas below 1 on its right half, 8 bits."""
+def picture(path: Path, size: int = 8, *, floats: bool = False) -> Any:
+    """A file of random colours and two alphas below 1 on its right half, of 8 bits or of floats."""
     values = np.ones((size, size, 4), np.float32)
     values[..., :3] = np.random.default_rng(3).uniform(0.0, 1.0, (size, size, 3))
     values[:, size // 2 :, 3] = 0.5
     values[: size // 4, size // 2 :, 3] = 0.25
-    image = bpy.data.images.new("made", size, size, alpha=True)
+    image = bpy.data.images.new("made", size, size, alpha=True, float_buffer=floats)
     image.pixels.foreach_set(values.ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.filepath_raw, image.file_format = str(path), "OPEN_EXR" if floats else "PNG"
     image.save()
     return bpy.data.images.load(str(path))
 
 
-def shown_by_cycles(scene: Any, image: Any, interpolation: str, alpha_read: bool, render: Any) -> np.ndarray:
-    """What a plane that fills the frame glows with."""
+def shown_by_cycles(
+    scene: Any, image: Any, interpolation: str, alpha_read: bool, render: Any, after: str = "", **values: Any
+) -> np.ndarray:
+    """What a plane that fills the frame glows with, perhaps by a node after the texture."""
     material = new_material("Target", Emission_Strength=1.0, Base_Color=(0, 0, 0), Specular_IOR_Level=0.0)
     tree = material.node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image, texture.interpolation = image, interpolation
     principled = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
-    tree.links.new(texture.outputs["Color"], principled.inputs["Emission Color"])
+    given = texture.outputs["Color"]
+    if after:
+        node = tree.nodes.new(after)
+        for name, value in values.items():
+            setattr(node, name, value)
+        node.inputs[1].default_value = 3.0
+        tree.links.new(given, node.inputs[0])
+        given = node.outputs[0]
+    tree.links.new(given, principled.inputs["Emission Color"])
     if alpha_read:
         tree.links.new(texture.outputs["Alpha"], principled.inputs["Roughness"])
     item = add_quad("Target", 2.0, 0.0, material)
@@ -66,6 +77,22 @@ def test_colours_have_the_alpha_cycles_gives_them(
     theirs = shown_by_cycles(scene, image, "Closest", alpha_read, render_cycles)
     ours = filtered_pixels(image, "Closest", "repeat", alpha_read=alpha_read)
     assert blocks(theirs, 8) == pytest.approx(blocks(ours, 8), abs=0.02)  # Cycles rounds to 8 bits in between
+
+
+@pytest.mark.parametrize("mode", ["STRAIGHT", "PREMUL"])
+@pytest.mark.parametrize("alpha_read", [False, True])
+@pytest.mark.parametrize("packed", [False, True])
+def test_floats_are_multiplied_as_cycles_takes_them(
+    packed: bool, mode: str, alpha_read: bool, scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    """Of a file Straight means nothing to Cycles; of a packed one Blender has multiplied."""
+    image = picture(tmp_path / "picture.exr", floats=True)
+    if packed:
+        image.pack()
+    image.alpha_mode = mode
+    theirs = shown_by_cycles(scene, image, "Closest", alpha_read, render_cycles)
+    ours = filtered_pixels(image, "Closest", "repeat", alpha_read=alpha_read)
+    assert blocks(theirs, 8) == pytest.approx(blocks(ours, 8), rel=2e-3)  # half floats; Straight was a quarter
 
 
 def test_floats_in_srgb_are_filtered_as_they_are_stored(scene: Any, render_cycles: Any, tmp_path: Path) -> None:
@@ -106,3 +133,58 @@ def test_between_pixels_it_is_cycles(
         assert (interpolation, space) == ("Linear", "Non-Color")
         return
     assert blocks(theirs, 16) == pytest.approx(blocks(ours, 16), abs=0.015)  # decoded before filtering 0.2
+
+
+@pytest.mark.parametrize(
+    ("after", "values"),
+    [
+        ("ShaderNodeGamma", {}),
+        ("ShaderNodeMath", {"operation": "POWER"}),
+        ("ShaderNodeMath", {"operation": "MULTIPLY", "use_clamp": True}),
+    ],
+)
+def test_nodes_that_bend_numbers_see_interpolated_ones(
+    after: str, values: dict[str, Any], scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    image = picture(tmp_path / "picture.png")
+    image.alpha_mode, image.colorspace_settings.name = "NONE", "Non-Color"
+    theirs = shown_by_cycles(scene, image, "Linear", False, render_cycles, after, **values)
+    shader = bpy.data.materials["Target"].node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    texture = read_socket(shader.inputs["Emission Color"]).texture
+    assert texture is not None
+    assert blocks(theirs, 16) == pytest.approx(blocks(texture.pixels, 16), abs=0.015)  # bent before 0.2 and more
+
+
+def glow_of_floats(path: Path, color: float) -> Any:
+    """Random pixels with alpha 1, the others with alpha 0 and a colour all the same."""
+    values = np.ones((8, 8, 4), np.float32)
+    values[..., 3] = np.random.default_rng(5).random((8, 8)) < 0.6
+    values[..., :3] = np.where(values[..., 3:] > 0.0, 0.5, color)
+    image = bpy.data.images.new("made", 8, 8, alpha=True, float_buffer=True)
+    image.pixels.foreach_set(values.ravel())
+    image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
+    image.save()
+    return bpy.data.images.load(image.filepath_raw)
+
+
+@pytest.mark.parametrize(
+    ("color", "mode", "interpolation", "divides"),
+    [
+        (0.5, "PREMUL", "Linear", True),
+        (0.5, "STRAIGHT", "Cubic", True),
+        (0.0, "PREMUL", "Linear", False),
+        (0.5, "PREMUL", "Closest", False),
+        (0.5, "CHANNEL_PACKED", "Linear", False),
+    ],
+)
+def test_colours_that_cycles_divides_by_nothing_are_named(
+    color: float, mode: str, interpolation: str, divides: bool, scene: Any, render_cycles: Any, export: Any, tmp_path
+) -> None:
+    """No colour is above 0.5, and Cycles shows such as are."""
+    image = glow_of_floats(tmp_path / "glow.exr", color)
+    image.alpha_mode = mode
+    shown = shown_by_cycles(scene, image, interpolation, True, render_cycles)
+    assert (shown.max() > 0.6) == divides
+    assert divides_by_nothing(image, interpolation) == divides
+    target = bpy.data.objects["Target"]
+    assert any("has colours where its alpha is 0" in note for note in export(target).notes) == divides
