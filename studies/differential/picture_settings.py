@@ -153,6 +153,7 @@ def _without_map(rig: Rig, draw: Draw) -> None:
     """A picture on a mesh that has no UV map."""
     while len(rig.box.data.uv_layers):
         rig.box.data.uv_layers.remove(rig.box.data.uv_layers[0])
+    rig.box.data.update_tag()  # removing a map by a script does not
     node = _node(rig, draw, rig.box)
     rig.box.data.materials[0].node_tree.links.new(node.outputs["Color"], principled(rig.box).inputs["Base Color"])
 
