@@ -17,6 +17,8 @@ from .light_path import SCATTERED, answer_light_paths, light_path_outputs
 
 # by the angle between the ray and the normal; by the ray's direction
 OF_ANGLE = {"ShaderNodeFresnel": ("Fac", "Factor"), "ShaderNodeLayerWeight": ("Fresnel", "Facing")}
+# Cycles rounds no edges for rays that a rough surface has scattered (kernel/svm/bevel.h)
+BEVEL = {"ShaderNodeBevel": ("Normal",)}
 OF_DIRECTION = {"ShaderNodeNewGeometry": ("Incoming",), "ShaderNodeTexCoord": ("Reflection",)}
 ELSEWHERE_SCALE = 1  # subpixels along a pixel: bounces are blurred
 # From along the surface to the normal, in even steps of the cosine. A ramp over Layer Weight on a head was 0.70 % too
@@ -29,9 +31,14 @@ def cosine_of(angle: int) -> float:
     return (angle + 0.5) / ANGLES
 
 
+def cosines_of(tree: bpy.types.NodeTree) -> list[float]:
+    """The cosines between ray and normal that nodes of a tree are asked at: one where they do not tell them apart."""
+    return [cosine_of(angle) for angle in range(ANGLES if asked_for(tree, OF_ANGLE | OF_DIRECTION) else 1)]
+
+
 def asks_ray(tree: bpy.types.NodeTree) -> bool:
     """Whether nodes of a tree or of its groups answer another ray than the camera's with other values."""
-    return bool(light_path_outputs(tree)) or bool(asked_for(tree, OF_ANGLE | OF_DIRECTION))
+    return bool(light_path_outputs(tree)) or bool(asked_for(tree, OF_ANGLE | OF_DIRECTION | BEVEL))
 
 
 def see_from_elsewhere(tree: bpy.types.NodeTree, cosine: float) -> None:
@@ -43,8 +50,19 @@ def see_from_elsewhere(tree: bpy.types.NodeTree, cosine: float) -> None:
         if node.bl_idname in OF_ANGLE:
             incoming = node.id_data.nodes.new("ShaderNodeNewGeometry").outputs["Incoming"]
             node.id_data.links.new(_turned(incoming, cosine), node.inputs["Normal"])
+        if node.bl_idname in BEVEL:
+            _pass_normal(node)
         for name in OF_DIRECTION.get(node.bl_idname, ()):
             _put_direction(node.outputs[name], cosine, reflected=name == "Reflection")
+
+
+def _pass_normal(bevel: bpy.types.Node) -> None:
+    """Let what a Bevel is linked to have the normal that it would round."""
+    tree = bevel.id_data
+    own = [link.from_socket for link in bevel.inputs["Normal"].links]
+    normal = own[0] if own else tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
+    for target in [link.to_socket for link in bevel.outputs["Normal"].links]:
+        tree.links.new(normal, target)
 
 
 def _put_direction(output: bpy.types.NodeSocket, cosine: float, *, reflected: bool) -> None:

@@ -26,7 +26,7 @@ from .aov_render import Frame, frame_of, render_outputs, world_to_frame
 from .closure_tree import ClosureTree, Leaf
 from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
-from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
+from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
 from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
@@ -68,7 +68,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     world or zero.
 
     Where `elsewhere` is requested and nodes ask for the ray, sockets and weights have a file of that name, too: one
-    below the other what rays from elsewhere find at `other_views.ANGLES` angles, a place a pixel.
+    below the other what rays from elsewhere find at the angles of `other_views.cosines_of`, a place a pixel.
 
     Where `may_miss` is requested and the camera does not see the target, `seen` is answered alone, as false.
 
@@ -90,7 +90,7 @@ def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
     depths = range(int(request.get("depths", 1)))
     outputs, found, frame = _rendered(target, request, request["scale"], depths)
     by_ray = bool(request.get("elsewhere")) and asks_ray(target.material.node_tree)
-    cosines = [cosine_of(angle) for angle in range(ANGLES)] if by_ray else []
+    cosines = cosines_of(target.material.node_tree) if by_ray else []
     elsewhere = [_rendered(target, request, ELSEWHERE_SCALE, depths, cosine)[1] for cosine in cosines]
     if request.get("far_side"):
         found = with_far_side(found, _rendered(target, request, FAR_SCALE, (FAR_SIDE,))[1])

@@ -21,7 +21,7 @@ from .aov_render import Frame, world_to_frame
 from .closure_tree import ClosureTree
 from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
 from .graph_copy import node_at, own_copy, remove_copy, variant_of
-from .other_views import ANGLES, ELSEWHERE_SCALE, asks_ray, cosine_of, see_from_elsewhere
+from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
 from .server import ProbeRequestError
 from .socket_pictures import (
     MASK,
@@ -128,8 +128,8 @@ def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], 
     kinds = _kinds(target.material, paths)
     frame = target.frame(ELSEWHERE_SCALE, len(names) + 2)
     ways = []
-    for angle in range(ANGLES):
-        found = _rendered(target, request, places, variants, frame, cosine=cosine_of(angle))
+    for cosine in cosines_of(target.material.node_tree):
+        found = _rendered(target, request, places, variants, frame, cosine=cosine)
         ways.append({MASK: found[MASK]} | {name: found[0, name] for name in names})
     files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(names)}
     for name, file in files.items():

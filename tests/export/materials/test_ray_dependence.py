@@ -11,6 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from blender_addon.export.job import check_export  # noqa: E402
 from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
 
@@ -129,3 +130,29 @@ def test_a_normal_map_is_turned_on_the_side_that_the_camera_does_not_see(
         found = np.asarray(recorded.pictures(paths, groups)(renderer.start))[:, :, 0]
         levels.append(found.mean() / truth.reshape(-1, 3)[groups.pixels].mean())
     assert abs(np.mean(levels) - 1.0) < 0.003
+
+
+def test_bounces_find_no_rounded_edges(scene: Any, export: Any) -> None:
+    """Cycles rounds them for the camera and for mirrors alone; few rays of a Bevel node are named."""
+    lit_scene(scene)
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    material = new_material("Target")
+    tree, shader = material.node_tree, principled(material)
+    bevel = tree.nodes.new("ShaderNodeBevel")
+    bevel.inputs["Radius"].default_value, bevel.samples = 0.3, 4
+    tree.links.new(bevel.outputs[0], shader.inputs["Normal"])
+    bpy.ops.mesh.primitive_cube_add()
+    target = bpy.context.object
+    target.data.materials.append(material)
+    report = export(target)
+    assert len(report.notes) == 1
+    assert "draws another normal from the 4 rays of the node 'Bevel'" in report.notes[0]
+    entry = report.request["materials"]["target_bsdf"]["sockets"]["Normal"]
+    near, others = (np.load(report.folder / entry[name]) for name in ("graph", "elsewhere"))
+    up = np.array([0.0, 0.0, 1.0])
+    met = near[np.linalg.norm(near, axis=2) > 0.5]
+    assert (met @ up).min() < 0.9
+    others = others[np.linalg.norm(others, axis=2) > 0.5]
+    np.testing.assert_allclose(others @ up, 1.0, atol=1e-3)
+    bevel.samples = 16
+    assert not any(check_export(bpy.context, target))
