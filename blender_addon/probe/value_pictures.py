@@ -7,7 +7,8 @@ in all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,6 @@ from .socket_pictures import (
     cleaned,
     from_origin,
     make_opaque,
-    whole,
     widen_bumps,
     write_outputs,
     write_weight,
@@ -40,8 +40,19 @@ from .socket_pictures import (
 # of the nodes in one render: more overflow the memory that Cycles has for a material's nodes, at 128 noises all of it
 MOST_VARIANTS = 32
 
-_Sets = Sequence[tuple[Sequence[Any], Sequence[str]]]  # the values of a variant, and the sockets that are looked at
-_Found = dict[tuple[int, str] | str, NDArray[np.float32]]  # by variant and socket; mask and position by their names
+_Picture = NDArray[np.float32]
+_Found = dict[tuple[int, str] | str, _Picture]  # by variant and socket; mask and position by their names
+_Take = Callable[[int, str, _Picture], None]  # of a variant's number and a socket's name
+
+
+@dataclass(frozen=True)
+class _Variant:
+    """A value for every place, the names of the sockets that are looked at, and for rays that do not come from the
+    camera the cosine of their angle to the normal."""
+
+    values: Sequence[Any]
+    names: Sequence[str]
+    cosine: float | None = None
 
 
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -63,103 +74,121 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     """
     target = Target.of(request)
     places = [Place.of_request(entry) for entry in request["places"]]
-    variants: _Sets = [(variant["values"], variant["sockets"]) for variant in request["variants"]]
-    most = max(min(len(variants), MOST_VARIANTS), 1)
-    while True:
-        frame = target.frame(request["scale"], _outputs_of(variants[:most]))
-        if frame.scale < request["scale"] and most > 1:  # all answers of a fit have one size
-            most //= 2
-            continue
-        try:
-            files, mask, positions = _all(target, request, places, variants, frame, most)
-            break
-        except _TooManyError:
-            most //= 2
-    seen = mask[..., 0] > SEEN
-    positions = np.where(seen[..., None], positions / np.maximum(mask, SEEN), np.float32(np.nan))
-    np.save(Path(request["folder"]) / "positions.npy", (positions - target.origin).astype(np.float32))
+    variants = [_Variant(variant["values"], variant["sockets"]) for variant in request["variants"]]
+    folder, far_side = Path(request["folder"]), bool(request.get("far_side"))
+    files: list[dict[str, str]] = [{} for _ in variants]
+
+    def take(k: int, name: str, values: _Picture) -> None:
+        files[k][name] = f"value_{k:02d}_{len(files[k]):02d}.npy"
+        np.save(folder / files[k][name], values)
+
+    found, frame = _evaluated(target, request, places, variants, request["scale"], take, far_side=far_side)
+    mask = found[MASK]
+    positions = np.where(mask > SEEN, found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
+    np.save(folder / "positions.npy", (positions - target.origin).astype(np.float32))
     camera = from_origin(world_to_frame(target.scene, frame), target.origin).tolist()
     elsewhere = {}
     if request.get("elsewhere") and asks_ray(target.material.node_tree):
-        elsewhere = _elsewhere(target, request, places, variants[:1])
+        elsewhere = _elsewhere(target, request, places, variants[0])
     of_target = {"positions": "positions.npy", "camera": camera, "scale": frame.scale}
     return {"files": files, "elsewhere": elsewhere, **of_target}
 
 
-def _outputs_of(variants: _Sets) -> int:
-    return sum(len(names) for _, names in variants) + 2  # mask and position
+def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], variant: _Variant) -> dict[str, str]:
+    """Files by socket of what rays from elsewhere find of a variant, at each angle."""
+    ways: dict[str, list[_Picture]] = {name: [] for name in variant.names}
+    angles = [replace(variant, cosine=cosine) for cosine in cosines_of(target.material.node_tree)]
+    _evaluated(target, request, places, angles, ELSEWHERE_SCALE, lambda _, name, values: ways[name].append(values))
+    files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(ways)}
+    for name, file in files.items():
+        np.save(Path(request["folder"]) / file, np.concatenate(ways[name]))
+    return files
+
+
+def _evaluated(
+    target: Target,
+    request: Mapping[str, Any],
+    places: list[Place],
+    variants: Sequence[_Variant],
+    scale: int,
+    take: _Take,
+    *,
+    far_side: bool = False,
+) -> tuple[_Found, Frame]:
+    """Render the variants and hand on what each socket holds, in their order; returns mask and positions, and the
+    frame."""
+    most = max(min(len(variants), MOST_VARIANTS), 1)
+    while True:
+        frame = target.frame(scale, _outputs_of(variants[:most]))
+        if frame.scale < scale and most > 1:  # all answers of a fit have one size
+            most //= 2
+            continue
+        try:
+            return _in_parts(target, request, places, variants, frame, most, take, far_side=far_side), frame
+        except _TooManyError:  # of the first part, which is as large as any
+            most //= 2
+
+
+def _outputs_of(variants: Sequence[_Variant]) -> int:
+    return sum(len(variant.names) for variant in variants) + 2  # mask and position
 
 
 class _TooManyError(Exception):
     """So many variants do not fit into one render."""
 
 
-def _all(
-    target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets, frame: Frame, most: int
-) -> tuple[list[dict[str, str]], NDArray[np.float32], NDArray[np.float32]]:
-    files: list[dict[str, str]] = []
-    mask = positions = np.zeros((0, 0, 1), np.float32)
+def _in_parts(
+    target: Target,
+    request: Mapping[str, Any],
+    places: list[Place],
+    variants: Sequence[_Variant],
+    frame: Frame,
+    most: int,
+    take: _Take,
+    *,
+    far_side: bool,
+) -> _Found:
+    found: _Found = {}
     for begin in range(0, len(variants), most):
         some = variants[begin : begin + most]
         found = _rendered(target, request, places, some, frame)
-        if request.get("far_side"):
+        if far_side:
             coarse = target.frame(FAR_SCALE, _outputs_of(some))
             found = with_far_side(found, _rendered(target, request, places, some, coarse, FAR_SIDE))
-        mask, positions = found[MASK], found[POSITION]
+        mask = found[MASK]
         seen = mask[..., 0] > SEEN
         if not seen.any():  # Cycles shows nothing of a material that is too large for it
             if most > 1:
                 raise _TooManyError
             raise target.why_nothing(frame, request["samples"])
         kinds = _kinds(target.material, request["sockets"])
-        for k, (_, names) in enumerate(some):
-            files.append({})
-            for name in names:
+        for k, variant in enumerate(some):
+            for name in variant.names:
                 own = request["sockets"][name][-1]
-                values = cleaned(found[k, name] / np.maximum(mask, SEEN), seen, own, kinds[name])
-                files[-1][name] = f"value_{begin + k:02d}_{len(files[-1]):02d}.npy"
-                np.save(Path(request["folder"]) / files[-1][name], values)
-    return files, mask, positions
-
-
-def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], variants: _Sets) -> dict[str, str]:
-    """Files by socket of what rays from elsewhere find of a variant, at each angle."""
-    names, paths = variants[0][1], request["sockets"]
-    kinds = _kinds(target.material, paths)
-    frame = target.frame(ELSEWHERE_SCALE, len(names) + 2)
-    ways = []
-    for cosine in cosines_of(target.material.node_tree):
-        found = _rendered(target, request, places, variants, frame, cosine=cosine)
-        ways.append({MASK: found[MASK]} | {name: found[0, name] for name in names})
-    files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(names)}
-    for name, file in files.items():
-        found_at = [whole(way, name, paths[name][-1], kinds[name]) for way in ways]
-        np.save(Path(request["folder"]) / file, np.concatenate(found_at))
-    return files
+                take(begin + k, name, cleaned(found[k, name] / np.maximum(mask, SEEN), seen, own, kinds[name]))
+    return found
 
 
 def _rendered(
     target: Target,
     request: Mapping[str, Any],
     places: list[Place],
-    variants: _Sets,
+    variants: Sequence[_Variant],
     frame: Frame,
     depth: int = 0,
-    *,
-    cosine: float | None = None,
 ) -> _Found:
     copy, base = own_copy(target.material), own_copy(target.material)
     try:
-        if cosine is not None:
-            see_from_elsewhere(base.node_tree, cosine)
         make_opaque(copy)
         widen_bumps(base.node_tree, frame.scale)
         wanted = [(MASK, False), (POSITION, True)]
-        for k, (values, names) in enumerate(variants):
+        for k, variant in enumerate(variants):
             tree = variant_of(base.node_tree)
             copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
-            _put(tree, places, values, target.material.name)
-            outputs = {name: _name(k, i) for i, name in enumerate(names)}
+            if variant.cosine is not None:
+                see_from_elsewhere(tree, variant.cosine)
+            _put(tree, places, variant.values, target.material.name)
+            outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
             kinds = _put_outputs(tree, request["sockets"], outputs)
             wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
         at_depths = peeled(copy.node_tree, wanted, depth + 1)
@@ -167,7 +196,7 @@ def _rendered(
     finally:
         remove_copy(copy)
         remove_copy(base)
-    outputs = {(k, name): found[_name(k, i)] for k, (_, names) in enumerate(variants) for i, name in enumerate(names)}
+    outputs = {(k, name): found[_name(k, i)] for k, each in enumerate(variants) for i, name in enumerate(each.names)}
     return {**outputs, MASK: found[MASK], POSITION: found[POSITION]}
 
 
