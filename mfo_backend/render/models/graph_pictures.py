@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from ...material.principled.principled_dict import DIRECTIONS
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, WEIGHT
@@ -23,17 +24,20 @@ from ...types.parameter import Value, Vector
 Picture = NDArray[np.float32]  # (height, width, 1 or 3)
 Variant = tuple[Sequence[Value], Sequence[str]]  # all values of a graph, and the sockets that are looked at
 
-# Subpixels along a pixel, and samples in each, of the pictures that a solve looks at: small pictures, and larger ones,
-# whose evaluation takes the longer; a scene's textures have those of the export
-SMALL, LARGE = (4, 1), (2, 4)
+# Subpixels along a pixel of the pictures that a solve looks at: small pictures, and larger ones, whose evaluation takes
+# the longer. Each subpixel has one sample: four take half as long again and say no more (docs/notebook/graph_values.md)
+SMALL, LARGE = 4, 2
 MOST_SUBPIXELS = 400_000  # of a small picture at its scale
 # Where normals change two subpixels are too few, and certainty does not know: values were 2 to 3 % off. Up to 256 x 256
 MOST_SUBPIXELS_OF_NORMALS = 1_050_000
-FINE_SCALE, FINE_SAMPLES = 4, 4  # of a scene's textures; the scale of the export's, where that is smaller
+FINE_SCALE, FINE_SAMPLES = 4, 4  # of a scene's textures, as of the export's; its scale, where that is smaller
 KEPT_ANSWERS = 6  # answers that are kept
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
 # square: a tenth of what is seen, and a third of what a noisy reference hides
 EXTRAPOLATED = 1e-3
+LOOKED_AT = 20_000  # rows of two pictures whose slopes are compared
+HELD_TO = 0.1  # weight of what is held of an entry that never moved alone, beside 1 for a move
+MOST_TURNS = 10_000  # of the least squares; as many as there are entries are usual
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,7 @@ class GraphPictures:
         self._fine_scale = fine
         turns = any(name in DIRECTIONS for value in values for name in value.sockets)
         most = MOST_SUBPIXELS_OF_NORMALS if turns else MOST_SUBPIXELS
-        self._scale, self._samples = SMALL if pixels * SMALL[0] ** 2 <= most else LARGE
+        self._scale = SMALL if pixels * SMALL**2 <= most else LARGE
         self.table = table_of(values)
         self._values, self._evaluate = tuple(values), evaluate
         changed = {name for value in values for name in value.sockets}
@@ -129,8 +133,8 @@ class GraphPictures:
         self._width = self.table.upper - self.table.lower
         self._states: OrderedDict[bytes, GraphState] = OrderedDict()
         self._exact: list[tuple[Vector, GraphState]] = []  # those that were evaluated, the newest last
-        # how much the slope along each entry changes over the width of the box, at most; unknown before two states are
-        self._bend: Vector | None = None
+        self._moves: list[tuple[Vector, Vector]] = []  # between two states, in widths of the box, and how slopes change
+        self._bend: NDArray[np.float64] | None = None  # see `_bend_of`; unknown before two states are
         self._fine: OrderedDict[bytes, Mapping[str, Shown]] = OrderedDict()
         self._seen: tuple[Picture, NDArray[np.float64]] | None = None
         self.renders = 0
@@ -199,9 +203,11 @@ class GraphPictures:
 
     def _evaluated(self, vector: Vector) -> GraphState:
         state = self._state(vector)
-        for known, other in self._exact[-1:]:
-            bend = _bend(state, other, self._width, (vector - known) / self._width)
-            self._bend = bend if self._bend is None else np.maximum(self._bend, bend)
+        for known, other in self._exact:
+            way = np.abs(vector - known) / self._width
+            self._moves.append((way, _change(state, other) * self._width))
+        if self._moves:
+            self._bend = _bend_of(self._moves)
         self._exact = [*self._exact[1 - KEPT_ANSWERS :], (vector.copy(), state)]
         return state
 
@@ -210,7 +216,7 @@ class GraphPictures:
         if self._bend is None:
             return None
         ways = [(vector - known) / self._width for known, _ in self._exact]
-        errors = [0.5 * float(np.linalg.norm(way) * (np.abs(way) @ self._bend)) for way in ways]
+        errors = [0.5 * float(np.abs(way) @ self._bend @ np.abs(way)) for way in ways]
         best = int(np.argmin(errors))
         if errors[best] > EXTRAPOLATED:
             return None
@@ -247,7 +253,7 @@ class GraphPictures:
             there[j] += step
             variants.append((self._as_values(there), self._components[j][0].sockets))
         self.renders += 1
-        found = self._evaluate(variants, scale=self._scale, samples=self._samples)
+        found = self._evaluate(variants, scale=self._scale, samples=1)
         self._seen = found.positions, found.camera
         seen = np.isfinite(found.positions).all(axis=2).ravel()
         here = {socket: _flat(picture, seen) for socket, picture in found.pictures[0].items()}
@@ -264,17 +270,34 @@ class GraphPictures:
         return list(self.table.unpack(vector).values())
 
 
-def _bend(a: GraphState, b: GraphState, width: Vector, way: Vector) -> Vector:
-    """How much the slope along each entry changes between two states by their distance `way`, in widths of the box.
-
-    It is 0 along entries that all pictures are linear in, whatever the others are.
-    """
-    bend, apart = np.zeros(len(width)), max(float(np.linalg.norm(way)), 1e-9)
+def _change(a: GraphState, b: GraphState) -> Vector:
+    """How much the slope along each entry differs between two states, root mean square, of the picture where it is
+    most."""
+    change = np.zeros(1 + max(j for slopes in a.slopes.values() for j in slopes))
     for name, slopes in a.slopes.items():
         for j, slope in slopes.items():
-            change = float(np.sqrt(np.mean(np.square(slope - b.slopes[name][j])))) * width[j] / apart
-            bend[j] = max(bend[j], change)
-    return bend
+            rows = slice(None, None, max(len(slope) // LOOKED_AT, 1))
+            change[j] = max(change[j], float(np.sqrt(np.mean(np.square(slope[rows] - b.slopes[name][j][rows])))))
+    return change
+
+
+def _bend_of(moves: Sequence[tuple[Vector, Vector]]) -> NDArray[np.float64]:
+    """How much the slope along each entry (row) changes by a move along each entry (column) over the width of the box.
+
+    `moves` are told with the changes that they made, which are shared out to the entries that moved by non-negative
+    least squares. An entry that never moved alone is held to change a slope as much as the middle one of the moves.
+    """
+    ways = np.array([way for way, _ in moves])
+    apart = np.maximum(np.linalg.norm(ways, axis=1), 1e-9)
+    changes = np.array([change for _, change in moves]) / apart[:, None]
+    entries = ways.shape[1]
+    known = np.concatenate([ways / apart[:, None], HELD_TO * np.eye(entries)])
+    found = np.empty((entries, entries))
+    for j, change in enumerate(changes.T):
+        found[j] = nnls(
+            known, np.concatenate([change, np.full(entries, HELD_TO * np.median(change))]), maxiter=MOST_TURNS
+        )[0]
+    return found
 
 
 def name_of(socket: str) -> str:

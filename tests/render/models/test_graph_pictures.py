@@ -107,6 +107,31 @@ def test_what_is_not_linear_is_extrapolated_nearby_alone() -> None:
     assert len(nodes.variants) == 4  # of 7
 
 
+def test_a_color_is_linear_although_its_slope_changes_with_another_value() -> None:
+    """Noise to a power is the share of a colour: where the power stays the pictures are linear."""
+    asked = []
+
+    def nodes(variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
+        asked.append(len(variants))
+        pictures = [
+            {"Base Color": (NOISE**power * np.array(color)).astype(np.float32)} for (color, power), _ in variants
+        ]
+        return Evaluated(pictures, np.zeros((*NOISE.shape[:2], 3), np.float32), np.zeros((3, 4)))
+
+    sockets = ("Base Color",)
+    values = (value("Mix/A", (0.2, 0.3, 0.4), sockets), value("Math/Value", 1.5, sockets, 3.0))
+    pictures = GraphPictures(values, nodes, sockets)
+    for color, power in ((0.2, 0.5), (0.4, 2.5), (0.9, 2.5)):  # the third says which of the two it was
+        pictures.state(np.array([color, color, color, power]))
+    assert len(asked) == 3
+    for color in (0.1, 0.6, 1.0):
+        found = pictures.state(np.array([color, 0.3, 0.9 * color, 2.5])).pictures["base_color"][:-1]
+        np.testing.assert_allclose(found[:, 0], color * NOISE.ravel() ** 2.5, atol=1e-4)
+    assert len(asked) == 3
+    pictures.state(np.array([0.9, 0.9, 0.9, 2.0]))
+    assert len(asked) == 4
+
+
 def test_coarser_pictures_are_means_of_four_subpixels_where_the_camera_sees_all() -> None:
     pictures = graph(Nodes())
     state = pictures.state(np.array([0.2, 0.3, 0.5, 2.0]))
@@ -156,4 +181,4 @@ def test_normals_are_looked_at_more_finely() -> None:
         pictures = GraphPictures([value("Bump/Strength", 0.5, (socket,))], evaluate, (socket,), pixels=200 * 200)
         with pytest.raises(BadInputError):
             pictures.state(np.array([0.5]))
-    assert asked == [(2, 4), (4, 1)]
+    assert asked == [(2, 1), (4, 1)]
