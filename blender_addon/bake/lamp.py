@@ -142,8 +142,7 @@ def _lamp_stage(
     scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, asked: Mapping[str, Any]
 ) -> Iterator[tuple[bpy.types.Scene, bpy.types.Object]]:
     """A scene with a white copy of the instance's lamp, without a radius, a soft rim and shadows, and nothing else."""
-    original, matrix = instance.object.original, instance.matrix_world.copy()
-    data = original.data.copy()
+    matrix, data = instance.matrix_world.copy(), instance.object.original.data.copy()
     lamp = bpy.data.objects.new(NAME, data)
     try:
         # far from zero the kernel's places are coarse
@@ -154,7 +153,7 @@ def _lamp_stage(
         data.color, data.energy, data.use_shadow = (1.0, 1.0, 1.0), 1.0, False
         if hasattr(data, "use_temperature"):  # Blender 4.5
             data.use_temperature = False
-        with alone(scene, original, lamp) as stage:
+        with alone(scene, instance.object, lamp) as stage:
             stage.cycles.samples, stage.cycles.light_sampling_threshold = 1, 0.0
             settings = stage.render.bake
             settings.target = "VERTEX_COLORS"

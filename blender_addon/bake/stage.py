@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import bpy
 
@@ -24,14 +24,13 @@ def staged(
     scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph
 ) -> Iterator[Stage]:
     """A scene with a copy of the instance's evaluated object, whose coordinates are those of the original."""
-    original = instance.object.original
-    layers = original.type == "MESH"
+    layers = instance.object.original.type == "MESH"
     matrix = instance.matrix_world.copy()
     mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
     item = bpy.data.objects.new(NAME, mesh)
     try:
         item.matrix_world = matrix
-        with alone(scene, original, item) as stage:
+        with alone(scene, instance.object, item) as stage:
             yield Stage(stage, item)
     finally:
         bpy.data.objects.remove(item)
@@ -39,15 +38,16 @@ def staged(
 
 
 @contextmanager
-def alone(scene: bpy.types.Scene, original: bpy.types.Object, item: bpy.types.Object) -> Iterator[bpy.types.Scene]:
-    """A scene with nothing but `item`, whose nodes find what those of the original do, for Cycles to bake in.
+def alone(scene: bpy.types.Scene, shown: bpy.types.Object, item: bpy.types.Object) -> Iterator[bpy.types.Scene]:
+    """A scene with nothing but `item`, whose nodes find what those of a depsgraph's object do, for Cycles to bake in.
 
-    Its name is the original's meanwhile.
+    Its name is that of the original meanwhile.
     """
+    original = shown.original
     window, stage = bpy.context.window, bpy.data.scenes.new(NAME)
     before, view_layer, name = window.scene, window.view_layer, original.name
     try:
-        _copy_what_nodes_ask_for(original, item)
+        _copy_what_nodes_ask_for(shown, item)
         stage.collection.objects.link(item)
         stage.camera = scene.camera
         copy_properties((scene.world, scene, view_layer), stage)
@@ -89,20 +89,22 @@ def copy_properties(owners: Iterable[bpy.types.ID | bpy.types.ViewLayer | None],
                 into[key] = owner[key]
 
 
-def _copy_what_nodes_ask_for(original: bpy.types.Object, item: bpy.types.Object) -> None:
+def _copy_what_nodes_ask_for(shown: bpy.types.Object, item: bpy.types.Object) -> None:
     """Give `item` generated coordinates, if it is a mesh, Object Info and attributes of the object.
 
     Its name becomes that of the original, which is to get it back.
     """
-    mesh: Any = item.data
+    original, mesh = shown.original, item.data
     # of a metaball Cycles takes that of the faces, whatever its data say
     if item.type == "MESH" and hasattr(original.data, "texspace_location") and original.type != "META":
         mesh.use_auto_texspace = False
         mesh.texspace_location = original.data.texspace_location
         mesh.texspace_size = original.data.texspace_size
-    item.pass_index, item.color = original.pass_index, original.color
+    item.pass_index, item.color = original.pass_index, shown.color  # an instance has its instancer's colour
+    # Attribute finds those of the data after those of the object; a modifier that makes a new mesh has none
+    data = shown.data if len(original.modifiers) else original.data
     copy_properties((original,), item)
-    copy_properties((original.data,), item.data)  # which Attribute finds after those of the object
+    copy_properties((data,), item.data)
     name = original.name  # Object Info's Random is made of it
     original.name = "material_fit_original"
     item.name = name

@@ -36,6 +36,8 @@ OF_PLACE = {
     "ShaderNodeVectorTransform": ("Vector",),
     "ShaderNodeBevel": ("Normal",),
 }
+# that of what shows an instance: of an instancer, whatever the object's own is
+OF_INSTANCER_COLOR = {"ShaderNodeObjectInfo": ("Color",)}
 # bend normals by slopes, which are others where an instance is stretched in another way; those of a bump, whose
 # distance is in metres, also where it is larger
 OF_SIZE = {"ShaderNodeBump": ("Normal",)}

@@ -32,7 +32,14 @@ from ..materials.read_context import read_context
 from ..materials.read_material import volume_sockets
 from ..meshes.mesh_arrays import Piece
 from ..meshes.read_mesh import material_of_slot
-from ..nodes.dependence import OF_SIZE, OF_STRETCH, asked_for, asked_of_instancer, asked_of_place
+from ..nodes.dependence import (
+    OF_INSTANCER_COLOR,
+    OF_SIZE,
+    OF_STRETCH,
+    asked_for,
+    asked_of_instancer,
+    asked_of_place,
+)
 from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
@@ -139,7 +146,12 @@ class SceneBakes:
             )
         own = _own(surface)
         if own not in known and len(known) == MOST_PLACES:
-            if not asked_of_place(node_tree_of(material)):  # else `_put_surface` names it
+            if asked_for(node_tree_of(material), OF_INSTANCER_COLOR):
+                findings.note(
+                    f"Material '{material.name}' asks for the colour of each instance of '{item.name}'; beyond "
+                    f"{MOST_PLACES} bakes all have that of the first."
+                )
+            elif not asked_of_place(node_tree_of(material)):  # else `_put_surface` names it
                 findings.note(
                     f"Material '{material.name}' bends normals of '{item.name}' by the size of each instance; beyond "
                     f"{MOST_PLACES} sizes all have those of the first."
@@ -264,8 +276,14 @@ def _is_uniform(radiance: NDArray[np.float32]) -> bool:
 
 
 def _own(surface: Surface) -> Own:
-    """What a bake of a surface hangs on of its instance: all, or for bent normals proportions, size, and mirroring."""
+    """What a bake of a surface hangs on of its instance: its colour, and all, or for bent normals proportions, size,
+    and mirroring."""
     tree = node_tree_of(surface.material)
+    color = tuple(surface.instance.object.color) if asked_for(tree, OF_INSTANCER_COLOR) else ()
+    return (*color, *_own_of_place(surface, tree))
+
+
+def _own_of_place(surface: Surface, tree: bpy.types.NodeTree) -> Own:
     if asked_of_place(tree):
         return (*map(float, surface.piece.matrix.ravel()), float(surface.instance.random_id))
     by_size = bool(asked_for(tree, OF_SIZE)) or bends_normals(surface.material)

@@ -176,6 +176,7 @@ SCENE = {
     "Material '{}': {} is shown as black.": "Matériau '{}' : {} est montré noir.",
     "Material '{}': {} is taken for white.": "Matériau '{}' : {} est pris pour blanc.",
     "Material '{}': {} may differ between the {} instances of '{}'; all have the bake of the first.": "Matériau '{}' : {} peut différer entre les {} instances de '{}' ; toutes ont le précalcul de la première.",
+    "Material '{}' asks for the colour of each instance of '{}'; beyond {} bakes all have that of the first.": "Le matériau '{}' demande la couleur de chaque instance de '{}' ; au-delà de {} bakes, toutes ont celle de la première.",
     "Material '{}' bends normals of '{}' by the size of each instance; beyond {} sizes all have those of the first.": "Le matériau '{}' courbe les normales de '{}' selon la taille de chaque instance ; au-delà de {} tailles, toutes ont celles de la première.",
     "Material '{}': what {} tell of each instance of '{}' is left out: in the fit it is as of the object alone.": "Matériau '{}' : ce que {} dit de chaque instance de '{}' est omis : dans l'ajustement, c'est comme pour l'objet seul.",
     "Material '{}' asks for Backfacing: in the fit both sides are as its front is.": "Le matériau '{}' demande Face arrière (Backfacing) : dans l'ajustement, les deux faces sont comme sa face avant.",

@@ -177,6 +177,7 @@ SCENE = {
     "Material '{}': {} is shown as black.": "Material '{}': {} wird schwarz gezeigt.",
     "Material '{}': {} is taken for white.": "Material '{}': {} gilt als weiß.",
     "Material '{}': {} may differ between the {} instances of '{}'; all have the bake of the first.": "Material '{}': {} kann sich zwischen den {} Instanzen von '{}' unterscheiden; alle haben das Gebackene der ersten.",
+    "Material '{}' asks for the colour of each instance of '{}'; beyond {} bakes all have that of the first.": "Material '{}' fragt nach der Farbe jeder Instanz von '{}'; ab {} Bakes haben alle die der ersten.",
     "Material '{}' bends normals of '{}' by the size of each instance; beyond {} sizes all have those of the first.": "Material '{}' biegt die Normalen von '{}' je nach Größe jeder Instanz; ab {} Größen haben alle die der ersten.",
     "Material '{}': what {} tell of each instance of '{}' is left out: in the fit it is as of the object alone.": "Material '{}': was {} von jeder Instanz von '{}' sagt, wird weggelassen: In der Anpassung ist es wie beim Objekt allein.",
     "Material '{}' asks for Backfacing: in the fit both sides are as its front is.": "Material '{}' fragt nach Rückseite (Backfacing): In der Anpassung sind beide Seiten wie die Vorderseite.",

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes are told of the object and the mesh that they are on, against Cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from ..scenes import add_camera, add_quad, new_material, world_color
+
+CENTRE = np.s_[16, 16]  # of a picture of 32 x 32 pixels
+
+
+@pytest.fixture
+def stage(scene: Any) -> tuple[Any, Any]:
+    """A target at a side, and a box in the middle of the picture."""
+    world_color(scene, 1.0)
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    add_camera("ORTHO", ortho_scale=4.0)
+    target = add_quad("Target", 0.5, 1.5, new_material("Target"))
+    target.location.x = 1.2
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    box = bpy.context.object
+    box.name = "Box"
+    box.data.materials.append(new_material("Box"))
+    return target, box
+
+
+def shown_and_baked(told: Any, target: Any, export: Any, render_cycles: Any) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Cycles' picture of what a node's Color is told, shining, and what it is as Base Color in each baked material."""
+    tree = told.id_data
+    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    surface, glow = tree.get_output_node("CYCLES").inputs["Surface"], tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(told.outputs["Color"], glow.inputs["Color"])
+    tree.links.new(glow.outputs[0], surface)
+    picture = render_cycles()
+    tree.links.new(principled.outputs[0], surface)
+    tree.nodes.remove(glow)
+    tree.links.new(told.outputs["Color"], principled.inputs["Base Color"])
+    materials = export(target).request["materials"]
+    baked = {name: found["sockets"]["Base Color"]["value"] for name, found in materials.items() if "baked" in name}
+    return picture, [np.array(baked[name]) for name in sorted(baked)]
+
+
+@pytest.mark.parametrize("modifier", [None, "SMOOTH", "TRIANGULATE"])
+def test_a_property_of_the_mesh_is_gone_where_a_modifier_makes_a_new_one(
+    modifier: str | None, stage: Any, export: Any, render_cycles: Any
+) -> None:
+    target, box = stage
+    box.data["tint"] = (0.2, 0.5, 0.8)
+    box.data.update_tag()
+    if modifier is not None:
+        box.modifiers.new("Modifier", modifier)
+    told = box.data.materials[0].node_tree.nodes.new("ShaderNodeAttribute")
+    told.attribute_type, told.attribute_name = "OBJECT", "tint"
+    picture, (baked,) = shown_and_baked(told, target, export, render_cycles)
+    np.testing.assert_allclose(baked, picture[CENTRE][:3], atol=1e-4)
+    assert (baked.max() < 1e-4) == (modifier == "TRIANGULATE")
+
+
+def test_an_instance_has_the_colour_of_its_instancer(stage: Any, export: Any, render_cycles: Any) -> None:
+    """Three instances of a box, two of them of one colour, which share a bake."""
+    target, box = stage
+    box.color = (0.9, 0.9, 0.1, 1.0)
+    prefab = bpy.data.collections.new("Prefab")
+    prefab.objects.link(box)
+    bpy.context.scene.collection.objects.unlink(box)
+    for x, color in ((-1.2, (0.8, 0.2, 0.1, 1.0)), (0.0, (0.1, 0.3, 0.9, 1.0)), (0.0, (0.1, 0.3, 0.9, 1.0))):
+        empty = bpy.data.objects.new("Instance", None)
+        empty.instance_type, empty.instance_collection, empty.color = "COLLECTION", prefab, color
+        empty.location = (x, 1.2 * len(bpy.data.objects) - 6.0, 0.0)
+        bpy.context.scene.collection.objects.link(empty)
+    told = box.data.materials[0].node_tree.nodes.new("ShaderNodeObjectInfo")
+    picture, baked = shown_and_baked(told, target, export, render_cycles)
+    assert len(baked) == 2
+    seen = picture.reshape(-1, picture.shape[-1])[:, :3]
+    for color in baked:
+        assert np.abs(seen - color).max(axis=1).min() < 1e-3
