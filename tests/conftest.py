@@ -16,13 +16,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from mfo_backend.render.machine.cache_folder import use_kernel_cache
-from mfo_backend.types.processors import processors
 
 use_kernel_cache()  # the one of the commands that tests start: what either has compiled is there for both
-# Several processes of tests share the cores, and a thread of Dr.Jit that finds none free is busy with waiting: a fit of
-# 64 x 64 pixels takes 20 processor seconds instead of 25. No bit depends on it (tests/stability/test_same_bits.py).
-if (_workers := int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))) > 1:
-    os.environ.setdefault("MFO_THREADS", str(max(1, processors() // _workers)))
 
 # a machine under load is slow, so no example has a deadline; the database would write into the working folder
 _ALWAYS = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}
