@@ -17,6 +17,8 @@ from mfo_backend.material.principled.blender_principled import blender_principle
 from .. import parity
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="the bpy module is not installed")
+# of single precision: glass seen through is below 3e-5 on processors with AVX-512 and at 3.4e-5 without
+ROUNDING = 4e-5
 MATERIALS = 60
 COLOUR = {"base_color": "Color", "roughness": "Roughness"}
 CLEAR = {**COLOUR, "ior": "IOR"}
@@ -131,6 +133,6 @@ def test_value_is_that_of_cycles(node: Node) -> None:
     model = cycles_model((5, 0), distribution, node.shader)
     ours = np.array(blender_principled(parameters, view, light, model=model), float).T
     error = parity.relative_difference(ours, theirs)
-    assert np.quantile(error, 0.99) < max(node.group.most, 3e-5), np.sort(error)[-20:]
+    assert np.quantile(error, 0.99) < max(node.group.most, ROUNDING), np.sort(error)[-20:]
     assert error.max() < 3e-4
     assert (theirs.max() > 0.0) == (node.group.name != "refraction, above")
