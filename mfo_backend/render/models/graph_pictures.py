@@ -13,7 +13,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from ...material.principled.principled_dict import DIRECTIONS
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, WEIGHT
@@ -287,6 +286,8 @@ def _bend_of(moves: Sequence[tuple[Vector, Vector]]) -> NDArray[np.float64]:
     `moves` are told with the changes that they made, which are shared out to the entries that moved by non-negative
     least squares. An entry that never moved alone is held to change a slope as much as the middle one of the moves.
     """
+    from scipy.optimize import nnls  # 280 modules, which other fits need not load
+
     ways = np.array([way for way, _ in moves])
     apart = np.maximum(np.linalg.norm(ways, axis=1), 1e-9)
     changes = np.array([change for _, change in moves]) / apart[:, None]

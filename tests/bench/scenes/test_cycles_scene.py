@@ -22,7 +22,8 @@ TASK = Task("cycles", 0, "fast")
 
 @pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the bpy module")
 def test_a_material_is_recovered_from_cycles_pictures(tmp_path, monkeypatch):
-    scenario = replace(SCENARIOS["cycles"], reference_spp=16)
+    # with 16 samples the last bits of the rays decided where the fit ended: 0.030 or 0.119
+    scenario = replace(SCENARIOS["cycles"], reference_spp=64)
     monkeypatch.setitem(fit_runner.SCENARIOS, "cycles", scenario)
     row = FitRunner(tmp_path, 32, Assets(None), host=find_blender_host(), warm_up=False)(TASK, lambda: False)
     assert row.flip < 0.25 * row.start_flip
