@@ -73,138 +73,126 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         If the camera does not see the target, a value's node is gone, or Blender cannot render.
     """
     target = Target.of(request)
-    places = [Place.of_request(entry) for entry in request["places"]]
+    renders = _Renders(
+        target, [Place.of_request(entry) for entry in request["places"]], request["sockets"], request["samples"]
+    )
     variants = [_Variant(variant["values"], variant["sockets"]) for variant in request["variants"]]
-    folder, far_side = Path(request["folder"]), bool(request.get("far_side"))
+    folder = Path(request["folder"])
     files: list[dict[str, str]] = [{} for _ in variants]
 
     def take(k: int, name: str, values: _Picture) -> None:
         files[k][name] = f"value_{k:02d}_{len(files[k]):02d}.npy"
         np.save(folder / files[k][name], values)
 
-    found, frame = _evaluated(target, request, places, variants, request["scale"], take, far_side=far_side)
+    found, frame = renders.pictures(variants, request["scale"], take, far_side=bool(request.get("far_side")))
     mask = found[MASK]
     positions = np.where(mask > SEEN, found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
     np.save(folder / "positions.npy", (positions - target.origin).astype(np.float32))
     camera = from_origin(world_to_frame(target.scene, frame), target.origin).tolist()
     elsewhere = {}
     if request.get("elsewhere") and asks_ray(target.material.node_tree):
-        elsewhere = _elsewhere(target, request, places, variants[0])
+        elsewhere = _elsewhere(renders, variants[0], folder)
     of_target = {"positions": "positions.npy", "camera": camera, "scale": frame.scale}
     return {"files": files, "elsewhere": elsewhere, **of_target}
 
 
-def _elsewhere(target: Target, request: Mapping[str, Any], places: list[Place], variant: _Variant) -> dict[str, str]:
+def _elsewhere(renders: _Renders, variant: _Variant, folder: Path) -> dict[str, str]:
     """Files by socket of what rays from elsewhere find of a variant, at each angle."""
     ways: dict[str, list[_Picture]] = {name: [] for name in variant.names}
-    angles = [replace(variant, cosine=cosine) for cosine in cosines_of(target.material.node_tree)]
-    _evaluated(target, request, places, angles, ELSEWHERE_SCALE, lambda _, name, values: ways[name].append(values))
+    angles = [replace(variant, cosine=cosine) for cosine in cosines_of(renders.target.material.node_tree)]
+    renders.pictures(angles, ELSEWHERE_SCALE, lambda _, name, values: ways[name].append(values))
     files = {name: f"elsewhere_{number:02d}.npy" for number, name in enumerate(ways)}
     for name, file in files.items():
-        np.save(Path(request["folder"]) / file, np.concatenate(ways[name]))
+        np.save(folder / file, np.concatenate(ways[name]))
     return files
-
-
-def _evaluated(
-    target: Target,
-    request: Mapping[str, Any],
-    places: list[Place],
-    variants: Sequence[_Variant],
-    scale: int,
-    take: _Take,
-    *,
-    far_side: bool = False,
-) -> tuple[_Found, Frame]:
-    """Render the variants and hand on what each socket holds, in their order; returns mask and positions, and the
-    frame."""
-    most = max(min(len(variants), MOST_VARIANTS), 1)
-    while True:
-        frame = target.frame(scale, _outputs_of(variants[:most]))
-        if frame.scale < scale and most > 1:  # all answers of a fit have one size
-            most //= 2
-            continue
-        try:
-            return _in_parts(target, request, places, variants, frame, most, take, far_side=far_side), frame
-        except _TooManyError:  # of the first part, which is as large as any
-            most //= 2
-
-
-def _outputs_of(variants: Sequence[_Variant]) -> int:
-    return sum(len(variant.names) for variant in variants) + 2  # mask and position
 
 
 class _TooManyError(Exception):
     """So many variants do not fit into one render."""
 
 
-def _in_parts(
-    target: Target,
-    request: Mapping[str, Any],
-    places: list[Place],
-    variants: Sequence[_Variant],
-    frame: Frame,
-    most: int,
-    take: _Take,
-    *,
-    far_side: bool,
-) -> _Found:
-    found: _Found = {}
-    for begin in range(0, len(variants), most):
-        some = variants[begin : begin + most]
-        found = _rendered(target, request, places, some, frame)
-        if far_side:
-            coarse = target.frame(FAR_SCALE, _outputs_of(some))
-            found = with_far_side(found, _rendered(target, request, places, some, coarse, FAR_SIDE))
-        mask = found[MASK]
-        seen = mask[..., 0] > SEEN
-        if not seen.any():  # Cycles shows nothing of a material that is too large for it
-            if most > 1:
-                raise _TooManyError
-            raise target.why_nothing(frame, request["samples"])
-        kinds = _kinds(target.material, request["sockets"])
-        for k, variant in enumerate(some):
-            for name in variant.names:
-                own = request["sockets"][name][-1]
-                take(begin + k, name, cleaned(found[k, name] / np.maximum(mask, SEEN), seen, own, kinds[name]))
-    return found
+@dataclass(frozen=True)
+class _Renders:
+    """Renders of a target's material with other values at `places`; `paths` are those of its sockets by name."""
+
+    target: Target
+    places: Sequence[Place]
+    paths: Mapping[str, Sequence[str]]
+    samples: int
+
+    def pictures(
+        self, variants: Sequence[_Variant], scale: int, take: _Take, *, far_side: bool = False
+    ) -> tuple[_Found, Frame]:
+        """Render the variants and hand on what each socket holds, in their order; returns mask and positions, and the
+        frame."""
+        most = max(min(len(variants), MOST_VARIANTS), 1)
+        while True:
+            frame = self.target.frame(scale, _outputs_of(variants[:most]))
+            if frame.scale < scale and most > 1:  # all answers of a fit have one size
+                most //= 2
+                continue
+            try:
+                return self._in_parts(variants, frame, most, take, far_side=far_side), frame
+            except _TooManyError:  # of the first part, which is as large as any
+                most //= 2
+
+    def _in_parts(
+        self, variants: Sequence[_Variant], frame: Frame, most: int, take: _Take, *, far_side: bool
+    ) -> _Found:
+        found: _Found = {}
+        kinds = _kinds(self.target.material, self.paths)
+        for begin in range(0, len(variants), most):
+            some = variants[begin : begin + most]
+            found = self._rendered(some, frame)
+            if far_side:
+                coarse = self.target.frame(FAR_SCALE, _outputs_of(some))
+                found = with_far_side(found, self._rendered(some, coarse, FAR_SIDE))
+            mask = found[MASK]
+            seen = mask[..., 0] > SEEN
+            if not seen.any():  # Cycles shows nothing of a material that is too large for it
+                if most > 1:
+                    raise _TooManyError
+                raise self.target.why_nothing(frame, self.samples)
+            for k, variant in enumerate(some):
+                for name in variant.names:
+                    values, own = found[k, name] / np.maximum(mask, SEEN), self.paths[name][-1]
+                    take(begin + k, name, cleaned(values, seen, own, kinds[name]))
+        return found
+
+    def _rendered(self, variants: Sequence[_Variant], frame: Frame, depth: int = 0) -> _Found:
+        material = self.target.material
+        copy, base = own_copy(material), own_copy(material)
+        try:
+            make_opaque(copy)
+            widen_bumps(base.node_tree, frame.scale)
+            wanted = [(MASK, False), (POSITION, True)]
+            for k, variant in enumerate(variants):
+                tree = variant_of(base.node_tree)
+                copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
+                if variant.cosine is not None:
+                    see_from_elsewhere(tree, variant.cosine)
+                _put(tree, self.places, variant.values, material.name)
+                outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
+                kinds = _put_outputs(tree, self.paths, outputs)
+                wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
+            at_depths = peeled(copy.node_tree, wanted, depth + 1)
+            found = joined_depths(self.target.outputs(copy, at_depths, frame, self.samples), wanted, (depth,))
+        finally:
+            remove_copy(copy)
+            remove_copy(base)
+        of_each = [(k, name, _name(k, i)) for k, each in enumerate(variants) for i, name in enumerate(each.names)]
+        return {(k, name): found[output] for k, name, output in of_each} | {key: found[key] for key in (MASK, POSITION)}
 
 
-def _rendered(
-    target: Target,
-    request: Mapping[str, Any],
-    places: list[Place],
-    variants: Sequence[_Variant],
-    frame: Frame,
-    depth: int = 0,
-) -> _Found:
-    copy, base = own_copy(target.material), own_copy(target.material)
-    try:
-        make_opaque(copy)
-        widen_bumps(base.node_tree, frame.scale)
-        wanted = [(MASK, False), (POSITION, True)]
-        for k, variant in enumerate(variants):
-            tree = variant_of(base.node_tree)
-            copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
-            if variant.cosine is not None:
-                see_from_elsewhere(tree, variant.cosine)
-            _put(tree, places, variant.values, target.material.name)
-            outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
-            kinds = _put_outputs(tree, request["sockets"], outputs)
-            wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
-        at_depths = peeled(copy.node_tree, wanted, depth + 1)
-        found = joined_depths(target.outputs(copy, at_depths, frame, request["samples"]), wanted, (depth,))
-    finally:
-        remove_copy(copy)
-        remove_copy(base)
-    outputs = {(k, name): found[_name(k, i)] for k, each in enumerate(variants) for i, name in enumerate(each.names)}
-    return {**outputs, MASK: found[MASK], POSITION: found[POSITION]}
+def _outputs_of(variants: Sequence[_Variant]) -> int:
+    return sum(len(variant.names) for variant in variants) + 2  # mask and position
 
 
 def _name(variant: int, socket: int) -> str:
     return f"mfo {variant} {socket}"
 
 
-def _put(tree: bpy.types.NodeTree, places: list[Place], values: Sequence[Any], material: str) -> None:
+def _put(tree: bpy.types.NodeTree, places: Sequence[Place], values: Sequence[Any], material: str) -> None:
     for place, value in zip(places, values, strict=True):
         try:
             write(tree, place, value)

@@ -29,7 +29,7 @@ Vector = NDArray[np.float64]
 # Of a sentence on another material
 TOLD_FROM = 0.05  # its probability; rarer ones still widen the deviations
 SEEN_CHANGE = 0.05  # of a value's range
-MOST_NAMED = 4
+MOST_NAMED = 4  # values in its sentence; no measurement
 
 
 @dataclass(frozen=True)

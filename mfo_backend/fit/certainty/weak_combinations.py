@@ -16,7 +16,7 @@ Vector = NDArray[np.float64]
 WEAK_DIRECTION = 0.05  # standard deviation along it, in widths of the box, from which it is named
 PART = 0.35  # of the largest one: smaller components of a direction are not named
 ALONE = 0.9  # share of one value in a direction that makes it that value's own uncertainty, which has its own column
-MOST_DIRECTIONS = 3
+MOST_DIRECTIONS = 3  # named; no measurement
 LEAST_VARIANCE = 1e-8  # of the box; channels of a grey that move as one would have none against each other
 # Lobes that differ in how they change towards the silhouette
 _GRAZING = ("sheen", "coat", "clearcoat", "specular", "spec_tint", "ior", "eta", "flatness")
