@@ -22,7 +22,8 @@ from mfo_backend.metrics.losses.loss import make_loss
 from mfo_backend.types.image import Encoding, Image
 from tests.fit.traced.glass import TRUTH, fit, load
 
-OTHER = {"base_color": (0.2, 0.5, 0.7), "roughness": 0.1, "ior": 1.2, "transmission_weight": 0.2}
+# Far enough from the truth: over four pictures FLIP fell by 3 to 8 %, then by 16 to 20 %.
+OTHER = {"base_color": (0.05, 0.3, 0.9), "roughness": 0.1, "ior": 1.2, "transmission_weight": 0.2}
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +53,8 @@ def test_flip_is_lower_where_no_values_give_the_picture(blend, fits):
         assert f"'{last[-1]}'" in instead
         found = renderer.image(renderer.table.pack(result.recovered), seed=9, spp=512)
         errors[preset] = flip.value(found)
-    assert errors["balanced"] < 0.98 * errors["fast"]  # 5 % lower when this was written
-    assert errors["best"] < 0.98 * errors["balanced"]  # another 5 %
+    assert errors["balanced"] < 0.98 * errors["fast"]
+    assert errors["best"] < 0.9 * errors["balanced"]
 
 
 class Given:
@@ -125,7 +126,8 @@ def test_values_that_are_kept_stay(blend):
     residuals = finishing_residuals(settings, Encoding.LINEAR, reference.pixels, mask, view)
     tiles = TracedTiles(TracedPaths(renderer), reference.pixels, mask, None, lambda: False)
     course = Course(renderer, ("itp", "pu21", "flip"), lambda event: None, lambda: False, 0.0)
-    start, kept = renderer.table.pack(TRUTH), renderer.table.mask_of(["base_color"])
+    start = renderer.table.pack({**TRUTH, "base_color": (0.5, 0.45, 0.6)})
+    kept = renderer.table.mask_of(["base_color"])
     pictures = LinearPictures(tiles, 1)
     assert pictures.are_worth_it(start, reference, view)
     end = traced_perception.lower_seen_error(pictures, judge, residuals, start, kept, course, flip=True)
