@@ -30,6 +30,7 @@ from .run import leave
 
 REFERENCE_VIEWS = ("scene", "standard")
 NOT_APPLIED = "Nothing was applied or saved, as the result does not match the reference; --force applies it anyway."
+RESULT_IS_KEPT = "The fit itself is done: `mfo apply {result} BLEND` puts its values on a file."
 _ERRORS = {Status.BAD_INPUT: BadInputError, Status.SETUP: SetupError}
 
 
@@ -122,6 +123,9 @@ def run(arguments: argparse.Namespace) -> int:
     if len(targets) > 1 and arguments.make_local:
         raise BadInputError("--make-local is for one material: make the others local in Blender first.")
     FitSettings.from_request(options)  # a wrong option is known before Blender is started
+    saved_at = arguments.save_as or arguments.file
+    if arguments.apply:
+        _check_may_be_written(saved_at)
     host = find_blender_host(arguments.blender)
     stream = take_stdout() if arguments.json else None
     job = arguments.out or Path(tempfile.mkdtemp(prefix="mfo-")) / "job"
@@ -140,16 +144,19 @@ def run(arguments: argparse.Namespace) -> int:
     )
     saved, notes = None, tuple(fit.result["notes"])
     if arguments.apply and may_apply(fit.result, forced=arguments.force):
-        saved = arguments.save_as or arguments.file
-        notes += apply_result(
-            host,
-            arguments.file,
-            fit.job,
-            saved,
-            force=arguments.force,
-            animated=arguments.animated,
-            make_local=arguments.make_local,
-        )
+        try:
+            notes += apply_result(
+                host,
+                arguments.file,
+                fit.job,
+                saved_at,
+                force=arguments.force,
+                animated=arguments.animated,
+                make_local=arguments.make_local,
+            )
+        except MfoError as error:
+            raise type(error)(f"{error} {RESULT_IS_KEPT.format(result=fit.job / 'result.json')}") from error
+        saved = saved_at
     elif arguments.apply:
         notes += (NOT_APPLIED,)
     if stream is not None:
@@ -160,6 +167,20 @@ def run(arguments: argparse.Namespace) -> int:
         lines = [*(f"note: {note}" for note in notes), result_text(fit.result), f"Report: {fit.job / 'index.html'}"]
         print("\n".join([*lines, *([f"Saved: {saved}"] if saved else []), fit.result["sentence"]]))
     return leave(Status(fit.result["status"]))
+
+
+def _check_may_be_written(blend: Path) -> None:
+    """Refuse a place where no file can be saved, which is better known before a fit than after it."""
+    try:
+        with tempfile.TemporaryFile(dir=blend.absolute().parent):  # Blender writes beside the file and renames
+            pass
+        if blend.exists():
+            with blend.open("r+b"):
+                pass
+    except OSError as error:
+        raise BadInputError(
+            f"{blend} cannot be written ({error.strerror}): give another place with --save-as. Nothing was fitted."
+        ) from error
 
 
 def may_apply(result: Mapping[str, Any], *, forced: bool) -> bool:

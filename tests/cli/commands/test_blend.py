@@ -12,6 +12,7 @@ import pytest
 from mfo_backend.cli.commands import apply as apply_command
 from mfo_backend.cli.commands import blend
 from mfo_backend.cli.main import main
+from mfo_backend.types.errors import BadInputError
 
 
 @pytest.fixture
@@ -31,6 +32,10 @@ def fitted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
     monkeypatch.setattr(blend, "fit_blend", lambda *_, **__: blend.BlendFit(tmp_path, result))
     monkeypatch.setattr(blend, "apply_result", apply)
     return SimpleNamespace(result=result, applied=applied)
+
+
+def _fails(*_: object, **__: object) -> tuple[str, ...]:
+    raise BadInputError("The disk is full.")
 
 
 WORDS = ["blend", "a.blend", "--object", "Ball", "--reference", "r.exr", "--apply"]
@@ -58,6 +63,32 @@ def test_a_mismatch_is_applied_by_force(fitted: SimpleNamespace) -> None:
     fitted.result |= {"status": "different", "verdict": "different"}
     assert main([*WORDS, "--force"]) == 5
     assert fitted.applied == [True]
+
+
+@pytest.mark.parametrize("place", ["nowhere/new.blend", "."], ids=["no such folder", "a folder"])
+def test_a_place_where_nothing_can_be_saved_is_known_before_the_fit(
+    fitted: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, place: str, capsys
+) -> None:
+    monkeypatch.setattr(blend, "fit_blend", lambda *_, **__: pytest.fail("it was fitted"))
+    assert main([*WORDS, "--save-as", str(tmp_path / place)]) == 2
+    assert "--save-as" in capsys.readouterr().err
+
+
+def test_looking_whether_a_file_can_be_saved_leaves_it_as_it_is(fitted: SimpleNamespace, tmp_path: Path) -> None:
+    (tmp_path / "old.blend").write_bytes(b"BLENDER")
+    assert main([*WORDS, "--save-as", str(tmp_path / "old.blend")]) == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["old.blend"]
+    assert (tmp_path / "old.blend").read_bytes() == b"BLENDER"
+
+
+def test_a_fit_that_cannot_be_applied_says_where_its_result_is(
+    fitted: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys
+) -> None:
+    monkeypatch.setattr(blend, "apply_result", _fails)
+    assert main(WORDS) == 2
+    said = capsys.readouterr().err
+    assert "The disk is full." in said
+    assert f"mfo apply {tmp_path / 'result.json'}" in said
 
 
 def test_a_result_goes_onto_another_file_and_material(
