@@ -73,6 +73,8 @@ def shelf_folder() -> Path:
 
 def _default_root() -> str:
     try:
-        return bpy.utils.extension_path_user(ADDON_ID, path="jobs", create=True)
+        # empty where Blender cannot make it, which would be the folder that Blender was started in
+        made = bpy.utils.extension_path_user(ADDON_ID, path="jobs", create=True)
     except ValueError:  # not installed as an extension
-        return str(Path(tempfile.gettempdir()) / "material_fit_jobs")
+        made = ""
+    return made or str(Path(tempfile.gettempdir()) / "material_fit_jobs")

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -104,6 +105,14 @@ def test_two_blenders_choose_two_folders(scene: SimpleNamespace, monkeypatch: py
         monkeypatch.setattr(os, "getpid", lambda pid=pid: pid)
         names.add(new_job_folder(context, "Glaze").name[20:])  # after the time
     assert names == {f"Glaze_{first}", f"Glaze_{first + 1}"}
+
+
+def test_jobs_lie_among_temporary_files_where_blender_has_no_folder_for_them(scene, monkeypatch) -> None:
+    from blender_addon.backend.preferences import new_job_folder
+
+    monkeypatch.setattr(scene.bpy.utils, "extension_path_user", lambda *_, **__: "")
+    folder = new_job_folder(scene.bpy.context, "Glaze")
+    assert folder.parent == Path(tempfile.gettempdir()) / "material_fit_jobs"
 
 
 def test_two_blenders_at_once(scene: SimpleNamespace, tmp_path: Path) -> None:
