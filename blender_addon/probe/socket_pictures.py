@@ -6,51 +6,14 @@ Cycles evaluates the nodes itself: a copy of the material writes each socket's v
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from ..export.camera.camera_model import Region
-from ..export.images.color_space import to_rec709
-from ..export.nodes.closure_leaves import OUTPUT
-from ..export.nodes.displacement import SHADING_NORMAL, displacement_in
-from ..export.nodes.shader_graph import source_of
-from ..versions import active_output, bumps_look_at_pixels
-from .aov_render import Frame, frame_of, render_outputs, world_to_frame
-from .closure_tree import ClosureTree, Leaf
-from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
-from .graph_copy import node_at, nodes_of, own_copy, remove_copy
-from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
-from .server import ProbeRequestError
-
-MASK, POSITION = "mfo mask", "mfo position"
-BUMP = "ShaderNodeBump"
-TANGENT = "Tangent"
-DIRECTIONS = (SHADING_NORMAL, "Normal", "Coat Normal", TANGENT)
-NOT_SEEN = "The camera does not see '{obj}': move it into the frame."
-# Cycles says so on its stderr alone, and shows nothing
-TOO_MANY = "The nodes of '{material}' are too many for Cycles to evaluate at once: leave nodes out."
-SEEN = 0.05  # share of a subpixel's samples on the target from which on it has a value
-
-
-class NotSeenError(ProbeRequestError):
-    """The camera does not see the target."""
-
-
-@dataclass(frozen=True)
-class _Output:
-    """One AOV, its socket's kind, and what it is called in the answer: a leaf's number and a socket, or its weight."""
-
-    name: str
-    kind: str
-    leaf: int
-    socket: str | None
+from .target import SEEN, NotSeenError, Target
+from .variant_pictures import Picture, Variant, VariantPictures, write_surface
 
 
 def answer(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,273 +49,41 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
-    target = Target.of(request)
+    target, folder = Target.of(request), Path(request["folder"])
     depths = range(int(request.get("depths", 1)))
-    outputs, found, frame = _rendered(target, request, request["scale"], depths)
-    by_ray = bool(request.get("elsewhere")) and asks_ray(target.material.node_tree)
-    cosines = cosines_of(target.material.node_tree) if by_ray else []
-    elsewhere = [_rendered(target, request, ELSEWHERE_SCALE, depths, cosine)[1] for cosine in cosines]
-    if request.get("far_side"):
-        found = with_far_side(found, _rendered(target, request, FAR_SCALE, (FAR_SIDE,))[1])
-    mask = found[MASK]
-    seen = mask[..., 0] > SEEN
-    if not seen.any():
-        raise target.why_nothing(frame, request["samples"])
-    height = frame.bottom - frame.top
+    paths = {
+        f"{number} {socket}": [*leaf["node"], socket]
+        for number, leaf in enumerate(request["leaves"])
+        for socket in [*leaf["sockets"], *([""] if leaf["weight"] else [])]
+    }
+    renders, variant = VariantPictures(target, paths, request["samples"]), Variant(tuple(paths))
+    found: dict[str, Picture] = {}
+    elsewhere: dict[str, Picture] = {}
+    surface = renders.take(
+        [variant],
+        request["scale"],
+        lambda _, name, values: found.__setitem__(name, values),
+        depths=depths,
+        far_side=bool(request.get("far_side")),
+    )
+    if request.get("elsewhere"):
+        renders.take_elsewhere(variant, elsewhere.__setitem__, depths)
+    seen = surface.mask[..., 0] > SEEN
+    height = surface.frame.bottom - surface.frame.top
     first = seen & (np.arange(len(seen)) < height)[:, None]
     first = first if first.any() else seen  # all of it may be behind a pane
-    folder = Path(request["folder"])
     leaves: list[dict[str, Any]] = [{"sockets": {}} for _ in request["leaves"]]
-    for number, each in enumerate(outputs):
-        values = whole(found, each.name, each.socket or "", each.kind)
-        file = f"socket_{number:02d}.npy"
-        np.save(folder / file, values)
-        said: dict[str, Any] = {"file": file, "mean": values[first].mean(axis=0, dtype=np.float64).tolist()}
-        if elsewhere:
-            said["elsewhere"] = f"elsewhere_{number:02d}.npy"
-            ways = [whole(way, each.name, each.socket or "", each.kind) for way in elsewhere]
-            np.save(folder / said["elsewhere"], np.concatenate(ways))
-        if each.socket is None:
-            leaves[each.leaf]["weight"] = said
+    for k, (name, values) in enumerate(found.items()):
+        said: dict[str, Any] = {"file": f"socket_{k:02d}.npy"}
+        said["mean"] = values[first].mean(axis=0, dtype=np.float64).tolist()
+        np.save(folder / said["file"], values)
+        if name in elsewhere:
+            said["elsewhere"] = f"elsewhere_{k:02d}.npy"
+            np.save(folder / said["elsewhere"], elsewhere[name])
+        number, _, socket = name.partition(" ")
+        leaf = leaves[int(number)]
+        if socket:
+            leaf["sockets"][socket] = said
         else:
-            leaves[each.leaf]["sockets"][each.socket] = said
-    positions = np.where(seen[..., None], found[POSITION] / np.maximum(mask, SEEN), np.float32(np.nan))
-    np.save(folder / "positions.npy", (positions - target.origin).astype(np.float32))
-    camera = from_origin(world_to_frame(target.scene, frame), target.origin).tolist()
-    of_files = {"positions": "positions.npy", "camera": camera, "scale": frame.scale, "depths": len(seen) // height}
-    return {"leaves": leaves, **of_files}
-
-
-def _rendered(
-    target: Target, request: Mapping[str, Any], scale: int, depths: Sequence[int], cosine: float | None = None
-) -> tuple[list[_Output], dict[str, NDArray[np.float32]], Frame]:
-    """The outputs, what Cycles writes into them for the camera's rays or for others at an angle, and their frame.
-
-    There is a picture of each of the `depths`, one below the other.
-    """
-    copy = own_copy(target.material)
-    try:
-        if cosine is not None:
-            see_from_elsewhere(copy.node_tree, cosine)
-        outputs = _leaf_outputs(copy.node_tree, request["leaves"])
-        make_opaque(copy, ours=True)
-        wanted = [*((each.name, each.kind != "VALUE") for each in outputs), (MASK, False), (POSITION, True)]
-        at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
-        frame = target.frame(scale, len(at_depths))
-        widen_bumps(copy.node_tree, frame.scale)
-        rendered = target.outputs(copy, at_depths, frame, request["samples"])
-    finally:
-        remove_copy(copy)
-    return outputs, joined_depths(rendered, wanted, depths), frame
-
-
-@dataclass(frozen=True)
-class Target:
-    """The slot of an object whose material is looked at."""
-
-    scene: bpy.types.Scene
-    layer: bpy.types.ViewLayer
-    obj: bpy.types.Object
-    slot: bpy.types.MaterialSlot
-    region: Region | None = None
-    origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))  # that positions are told from
-
-    @staticmethod
-    def of(request: Mapping[str, Any]) -> Target:
-        """That of a request's `scene`, `layer`, `object` and `slot`, which are the window's from now on.
-
-        So are the camera, frame and size of its `view`, where it has one. It or the view may have the `region` of the
-        frame that the picture shows alone.
-        """
-        scene = bpy.data.scenes[request["scene"]]
-        layer = scene.view_layers[request["layer"]]
-        if bpy.context.window is not None:
-            bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
-        if request.get("view"):
-            _show(scene, request["view"])
-        obj = scene.objects[request["object"]]
-        shown = request.get("view") or request
-        region = Region(*shown["region"]) if shown.get("region") else None
-        origin = np.array(shown.get("origin") or (0.0, 0.0, 0.0))
-        return Target(scene, layer, obj, obj.material_slots[request["slot"]], region, origin)
-
-    @property
-    def material(self) -> bpy.types.Material:
-        """The material that is looked at."""
-        return self.slot.material
-
-    def frame(self, scale: int, outputs: int) -> Frame:
-        """See `frame_of`; raises `NotSeenError` where there is none."""
-        frame = frame_of(self.scene, self.obj, scale, outputs, self.region)
-        if frame is None:
-            raise NotSeenError(NOT_SEEN.format(obj=self.obj.name))
-        return frame
-
-    def why_nothing(self, frame: Frame, samples: int) -> ProbeRequestError:
-        """Why Cycles has shown nothing of it: nothing is seen without its nodes either, or they are too many."""
-        copy = own_copy(self.material)
-        try:
-            make_opaque(copy)
-            mask = self.outputs(copy, [(MASK, False), (POSITION, True)], frame, samples)[MASK]
-        finally:
-            remove_copy(copy)
-        if (mask > SEEN).any():
-            return ProbeRequestError(TOO_MANY.format(material=self.material.name))
-        return NotSeenError(NOT_SEEN.format(obj=self.obj.name))
-
-    def outputs(
-        self, copy: bpy.types.Material, wanted: list[tuple[str, bool]], frame: Frame, samples: int
-    ) -> dict[str, NDArray[np.float32]]:
-        """What Cycles writes into the outputs of `copy`, which stands in for the material meanwhile."""
-        material, was_link = self.slot.material, self.slot.link
-        try:
-            self.slot.link = "OBJECT"  # the mesh may belong to other objects too
-            self.slot.material = copy
-            by_pixels = bumps_look_at_pixels() and asks_beside(copy.node_tree)
-            return render_outputs(self.scene, self.layer, wanted, frame, samples, by_pixels=by_pixels).values
-        except RuntimeError as error:
-            raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{material.name}': {error}") from error
-        finally:
-            self.slot.material = material
-            self.slot.link = was_link
-
-
-def from_origin(camera: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A (3, 4) camera matrix for places that count from an origin."""
-    return np.concatenate([camera[:, :3], camera[:, 3:] + camera[:, :3] @ origin[:, None]], axis=1)
-
-
-def _show(scene: bpy.types.Scene, view: Mapping[str, Any]) -> None:
-    """Let the scene show what a picture does: `camera`, `frame`, and `width` and `height` in pixels."""
-    if scene.frame_current_final != view["frame"]:
-        whole = math.floor(view["frame"])
-        scene.frame_set(whole, subframe=view["frame"] - whole)
-    camera, render = scene.objects.get(view["camera"]), scene.render
-    if camera is None:
-        raise ProbeRequestError(f"The copy of the file has no camera '{view['camera']}' any more.")
-    scene.camera = camera
-    render.resolution_percentage, render.resolution_x, render.resolution_y = 100, view["width"], view["height"]
-
-
-def make_opaque(copy: bpy.types.Material, *, ours: bool = False) -> None:
-    """Give a copied material a surface of its own, with outputs for mask and position.
-
-    The user's outputs go, unless those that are there are `ours` already.
-    """
-    tree = copy.node_tree
-    if not ours:
-        remove_outputs(tree)
-    one = tree.nodes.new("ShaderNodeValue")
-    one.outputs[0].default_value = 1.0
-    _output(tree, MASK, one.outputs[0], False)
-    _output(tree, POSITION, tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], True)
-    # opaque, and no shader that Cycles would fold away: outputs of a surface that is not there add up along the ray
-    grey = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    output = active_output(tree)
-    assert output is not None  # the shader is linked to it
-    tree.links.new(grey.outputs[0], output.inputs["Surface"])
-    for link in list(output.inputs["Volume"].links):
-        tree.links.remove(link)
-
-
-def remove_outputs(tree: bpy.types.NodeTree) -> None:
-    """Remove the user's own outputs, perhaps of the same names, from a copied tree and its groups."""
-    for node in list(nodes_of(tree)):
-        if node.bl_idname == "ShaderNodeOutputAOV":
-            node.id_data.nodes.remove(node)
-
-
-def _leaf_outputs(tree: bpy.types.NodeTree, leaves: list[Mapping[str, Any]]) -> list[_Output]:
-    """Put output nodes on sockets and weights of leaves; a leaf that is reached in several ways has their sum."""
-    remove_outputs(tree)
-    outputs: list[_Output] = []
-    closures = ClosureTree(tree, own_groups=False) if any(leaf["weight"] for leaf in leaves) else None
-    for number, leaf in enumerate(leaves):
-        names = {name: f"mfo {number} {name}" for name in leaf["sockets"]}
-        for name, kind in write_outputs(tree, leaf["node"], names).items():
-            outputs.append(_Output(names[name], kind, number, name))
-        if not leaf["weight"] or closures is None:
-            continue
-        name = f"mfo {number} weight"
-        outputs.append(_Output(name, write_weight(tree, closures, leaf["node"], name), number, None))
-    return outputs
-
-
-def write_weight(tree: bpy.types.NodeTree, closures: ClosureTree, path: list[str], output: str) -> str:
-    """Put an output node of the given name on the weight of a shader, the sum over all ways to it; returns its type."""
-    ways = [each.weight for each in closures.leaves if _path(each) == path]
-    total = tree.nodes.new("ShaderNodeValue").outputs[0]
-    total.default_value = sum(way for way in ways if isinstance(way, float))
-    for way in ways:
-        if not isinstance(way, float):
-            node = tree.nodes.new("ShaderNodeMath")  # an Add: not clamped
-            tree.links.new(total, node.inputs[0])
-            tree.links.new(way, node.inputs[1])
-            total = node.outputs[0]
-    _output(tree, output, total, False)
-    return "VALUE"
-
-
-def _path(leaf: Leaf) -> list[str]:
-    return [node.name for node in (*leaf.path, leaf.node)]
-
-
-def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[str, str]) -> dict[str, str]:
-    """Put an output node of the given name on each of a shader's sockets; returns the sockets' types."""
-    inner, shader = node_at(tree, path)
-    kinds = {}
-    for name, output in outputs.items():
-        if name == SHADING_NORMAL:
-            kinds[name] = "VECTOR"
-            _output(inner, output, inner.nodes.new("ShaderNodeNewGeometry").outputs["Normal"], True)
-            continue
-        if name.startswith(OUTPUT):
-            kinds[name] = "RGBA"
-            given = next(s for s in shader.outputs if s.identifier == name.removeprefix(OUTPUT))
-            _output(inner, output, given, True)
-            continue
-        socket = shader.inputs[name]
-        source = source_of(socket)
-        if source is None and name == TANGENT:  # Cycles' own: about the object's Z axis, as a new Tangent node has it
-            source = inner.nodes.new("ShaderNodeTangent").outputs[0]
-        if source is None:
-            raise ProbeRequestError(f"{name} of '{shader.name}' has no link any more.")
-        kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type
-        _output(inner, output, source, kinds[name] != "VALUE")
-    return kinds
-
-
-def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, is_color: bool) -> None:
-    node = tree.nodes.new("ShaderNodeOutputAOV")
-    node.aov_name = name
-    tree.links.new(source, node.inputs["Color" if is_color else "Value"])
-
-
-def asks_beside(tree: bpy.types.NodeTree) -> bool:
-    """Whether nodes look at points beside the one that they are asked for, for a bump."""
-    return displacement_in(tree) is not None or any(node.bl_idname == BUMP for node in nodes_of(tree))
-
-
-def widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
-    """Let Bump nodes take their differences over the width of a pixel, which is `scale` subpixels."""
-    for node in nodes_of(tree):
-        width = node.inputs.get("Filter Width") if node.bl_idname == BUMP else None
-        if width is not None and not width.is_linked:
-            width.default_value *= scale
-
-
-def whole(found: Mapping[Any, NDArray[np.float32]], key: Any, name: str, kind: str) -> NDArray[np.float32]:
-    """The clean values of a socket from rendered outputs, as if each place were all on the target."""
-    mask = found[MASK]
-    return cleaned(found[key] / np.maximum(mask, SEEN), mask[..., 0] > SEEN, name, kind)
-
-
-def cleaned(values: NDArray[np.float32], seen: NDArray[np.bool_], name: str, kind: str) -> NDArray[np.float32]:
-    """Finite values; colours of the working space as linear Rec.709, directions at unit length."""
-    finite = np.where(seen[..., None] & np.isfinite(values), values, 0.0).astype(np.float64)
-    if kind == "RGBA":
-        finite = to_rec709(finite)
-    if name in DIRECTIONS:
-        length = np.linalg.norm(finite, axis=-1, keepdims=True)
-        finite = np.divide(finite, length, out=np.zeros_like(finite), where=length > 0.1)
-    return np.ascontiguousarray(finite, dtype=np.float32)
+            leaf["weight"] = said
+    return {"leaves": leaves, **write_surface(target, surface, folder), "depths": len(seen) // height}

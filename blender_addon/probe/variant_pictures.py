@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of what a target's sockets hold, of several variants of its nodes in one render.
+
+Each variant is a copy of the material's whole tree; Cycles merges what is the same in all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..graph_values.place import Place, write
+from .aov_render import Frame, world_to_frame
+from .closure_tree import ClosureTree
+from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
+from .graph_copy import own_copy, remove_copy, variant_of
+from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
+from .server import ProbeRequestError
+from .target import (
+    MASK,
+    POSITION,
+    SEEN,
+    Target,
+    cleaned,
+    from_origin,
+    make_opaque,
+    remove_outputs,
+    widen_bumps,
+    write_outputs,
+    write_weight,
+)
+
+# of the nodes in one render: more overflow the memory that Cycles has for a material's nodes, at 128 noises all of it
+MOST_VARIANTS = 32
+
+Picture = NDArray[np.float32]
+_Found = dict[tuple[int, str] | str, Picture]  # by variant and socket; mask and position by their names
+_Take = Callable[[int, str, Picture], None]  # of a variant's number and a socket's name
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The names of the sockets that are looked at, a value for every place, and for rays that do not come from the
+    camera the cosine of their angle to the normal."""
+
+    names: Sequence[str]
+    values: Sequence[Any] = ()
+    cosine: float | None = None
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What the camera sees of the target, of all variants: mask, positions, and the frame."""
+
+    mask: Picture
+    position: Picture
+    frame: Frame
+
+
+def write_surface(target: Target, surface: Surface, folder: Path) -> dict[str, Any]:
+    """Write the target's `positions`, NaN beside it; returns that file, the `camera` of its pictures and their `scale`.
+
+    The camera is the (3, 4) matrix from the world to columns and rows of the files.
+    """
+    mask = surface.mask
+    positions = np.where(mask > SEEN, surface.position / np.maximum(mask, SEEN), np.float32(np.nan))
+    np.save(folder / "positions.npy", (positions - target.origin).astype(np.float32))
+    camera = from_origin(world_to_frame(target.scene, surface.frame), target.origin).tolist()
+    return {"positions": "positions.npy", "camera": camera, "scale": surface.frame.scale}
+
+
+class _TooManyError(Exception):
+    """So many variants do not fit into one render."""
+
+
+@dataclass(frozen=True)
+class VariantPictures:
+    """Renders of a target's material with other values at `places`.
+
+    `paths` are those of its sockets by name: of the shader's names and the socket's, or an empty one for the weight of
+    the shader in a mix.
+    """
+
+    target: Target
+    paths: Mapping[str, Sequence[str]]
+    samples: int
+    places: Sequence[Place] = ()
+
+    def take(
+        self,
+        variants: Sequence[Variant],
+        scale: int,
+        take: _Take,
+        *,
+        depths: Sequence[int] = (0,),
+        far_side: bool = False,
+    ) -> Surface:
+        """Render the variants and hand on what each socket holds, in their order.
+
+        A picture shows `depths` one below the other, or with `far_side` a coarser one of it below the first.
+
+        Raises
+        ------
+        ProbeRequestError
+            If a value's node is gone, the nodes are too many for Cycles, or it shows nothing of the target.
+        """
+        most = max(min(len(variants), MOST_VARIANTS), 1)
+        while True:
+            frame = self.target.frame(scale, _outputs_of(variants[:most]) * (depths[-1] + 1))
+            if frame.scale < scale and most > 1:  # all answers of a fit have one size
+                most //= 2
+                continue
+            try:
+                found = self._in_parts(variants, frame, most, take, depths, far_side=far_side)
+                return Surface(found[MASK], found[POSITION], frame)
+            except _TooManyError:  # of the first part, which is as large as any
+                most //= 2
+
+    def take_elsewhere(
+        self, variant: Variant, take: Callable[[str, Picture], None], depths: Sequence[int] = (0,)
+    ) -> None:
+        """Hand on what rays from elsewhere find in each socket where nodes ask for the ray, else nothing.
+
+        A picture has the angles of `other_views.cosines_of` one below the other, a place a pixel.
+        """
+        tree = self.target.material.node_tree
+        if not asks_ray(tree):
+            return
+        ways: dict[str, list[Picture]] = {name: [] for name in variant.names}
+        angles = [replace(variant, cosine=cosine) for cosine in cosines_of(tree)]
+        self.take(angles, ELSEWHERE_SCALE, lambda _, name, values: ways[name].append(values), depths=depths)
+        for name, pictures in ways.items():
+            take(name, np.concatenate(pictures))
+
+    def _in_parts(
+        self,
+        variants: Sequence[Variant],
+        frame: Frame,
+        most: int,
+        take: _Take,
+        depths: Sequence[int],
+        *,
+        far_side: bool,
+    ) -> _Found:
+        found: _Found = {}
+        for begin in range(0, len(variants), most):
+            some = variants[begin : begin + most]
+            found, kinds = self._rendered(some, frame, depths)
+            if far_side:
+                coarse = self.target.frame(FAR_SCALE, _outputs_of(some) * (FAR_SIDE + 1))
+                found = with_far_side(found, self._rendered(some, coarse, (FAR_SIDE,))[0])
+            mask = found[MASK]
+            seen = mask[..., 0] > SEEN
+            if not seen.any():  # Cycles shows nothing of a material that is too large for it
+                if most > 1:
+                    raise _TooManyError
+                raise self.target.why_nothing(frame, self.samples)
+            for k, variant in enumerate(some):
+                for name in variant.names:
+                    values, own = found[k, name] / np.maximum(mask, SEEN), self.paths[name][-1]
+                    take(begin + k, name, cleaned(values, seen, own, kinds[name]))
+        return found
+
+    def _rendered(
+        self, variants: Sequence[Variant], frame: Frame, depths: Sequence[int]
+    ) -> tuple[_Found, dict[str, str]]:
+        """What Cycles writes into the outputs of some variants, and the types of their sockets."""
+        material = self.target.material
+        copy, base = own_copy(material), own_copy(material)
+        try:
+            make_opaque(copy)
+            widen_bumps(base.node_tree, frame.scale)
+            wanted, kinds = [(MASK, False), (POSITION, True)], {}
+            for k, variant in enumerate(variants):
+                tree = variant_of(base.node_tree)
+                copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
+                if variant.cosine is not None:
+                    see_from_elsewhere(tree, variant.cosine)
+                _put(tree, self.places, variant.values, material.name)
+                outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
+                kinds |= _put_outputs(tree, self.paths, outputs)
+                wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
+            at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
+            found = joined_depths(self.target.outputs(copy, at_depths, frame, self.samples), wanted, depths)
+        finally:
+            remove_copy(copy)
+            remove_copy(base)
+        of_each = [(k, name, _name(k, i)) for k, each in enumerate(variants) for i, name in enumerate(each.names)]
+        pictures: _Found = {(k, name): found[output] for k, name, output in of_each}
+        return pictures | {key: found[key] for key in (MASK, POSITION)}, kinds
+
+
+def _outputs_of(variants: Sequence[Variant]) -> int:
+    return sum(len(variant.names) for variant in variants) + 2  # mask and position
+
+
+def _name(variant: int, socket: int) -> str:
+    return f"mfo {variant} {socket}"
+
+
+def _put(tree: bpy.types.NodeTree, places: Sequence[Place], values: Sequence[Any], material: str) -> None:
+    for place, value in zip(places, values, strict=True):
+        try:
+            write(tree, place, value)
+        except (KeyError, IndexError, AttributeError, StopIteration) as error:
+            raise ProbeRequestError(
+                f"The node '{place.path[-1]}' of material '{material}' is not what it was when the fit began."
+            ) from error
+
+
+def _put_outputs(
+    tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]
+) -> dict[str, str]:
+    """Put an output node of the given name on each of these sockets of a variant; returns the sockets' types."""
+    closures = ClosureTree(tree, own_groups=False) if not all(paths[name][-1] for name in outputs) else None
+    remove_outputs(tree)
+    for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial"]:
+        tree.nodes.remove(node)
+    kinds = {}
+    for name, output in outputs.items():
+        *shader, socket = paths[name]
+        if socket:
+            kinds[name] = write_outputs(tree, shader, {socket: output})[socket]
+        else:
+            assert closures is not None
+            kinds[name] = write_weight(tree, closures, shader, output)
+    return kinds
