@@ -43,6 +43,15 @@ RUNS_ALREADY = "Its fit runs already: press Fit when it has ended, to fit it aga
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
 
+def _why_none_begins() -> str:
+    """Why no fit may begin now, whatever it is of; empty: one may."""
+    if running_job.current is not None and bpy.app.background:
+        return "A fit is running; cancel it first"
+    if running_export.current is not None:
+        return "The scene is being exported for a fit"
+    return "" if bpy.app.background else why_no_fit()
+
+
 class MFO_OT_fit(FitOptions, bpy.types.Operator):
     """Recover the values of the object's active material from the reference picture"""
 
@@ -56,13 +65,7 @@ class MFO_OT_fit(FitOptions, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with an object and a material; anything else is said by name when it starts."""
-        if running_job.current is not None and bpy.app.background:
-            cls.poll_message_set(translated("A fit is running; cancel it first"))
-            return False
-        if running_export.current is not None:
-            cls.poll_message_set(translated("The scene is being exported for a fit"))
-            return False
-        if not bpy.app.background and (reason := why_no_fit()):
+        if reason := _why_none_begins():
             cls.poll_message_set(translated(reason))
             return False
         by_active = not bpy.app.background and not context.scene.mfo.targets
@@ -144,13 +147,7 @@ class MFO_OT_fit_selected(FitOptions, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """In windows only with more than one material to fit."""
-        if running_job.current is not None and bpy.app.background:
-            cls.poll_message_set(translated("A fit is running; cancel it first"))
-            return False
-        if running_export.current is not None:
-            cls.poll_message_set(translated("The scene is being exported for a fit"))
-            return False
-        if not bpy.app.background and (reason := why_no_fit()):
+        if reason := _why_none_begins():
             cls.poll_message_set(translated(reason))
             return False
         if not bpy.app.background and len(selected_targets(context, most=2)) < 2:
