@@ -6,6 +6,7 @@ The export itself checks more (geometry, lights, visibility): `mfo.check` adds w
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import replace
 
 import bpy
@@ -32,6 +33,16 @@ from .ticked_slots import NONE_TICKED, left_out, ticked_slots
 REGION_ALONE = "Render Region is on, and the picture shows the region alone."
 REGION_IN_FRAME = "Render Region is on: where the picture is empty beside the region, the region alone counts."
 SHOWN_INSIDE = 3  # values of nodes that the check names
+# details of a lobe, and the socket that says how much there is of it
+AMOUNT_OF = {
+    **dict.fromkeys(("Coat Roughness", "Coat IOR", "Coat Tint"), "Coat Weight"),
+    **dict.fromkeys(("Sheen Roughness", "Sheen Tint"), "Sheen Weight"),
+    **dict.fromkeys(("Subsurface Radius", "Subsurface Scale"), "Subsurface Weight"),
+    "Thin Film IOR": "Thin Film Thickness",
+    "Anisotropic Rotation": "Anisotropic",
+    "Emission Color": "Emission Strength",
+    "Absorption Color": "Absorption Density",
+}
 _FITTED = {name for _, name, *_ in SOCKET_ITEMS}
 
 
@@ -147,6 +158,7 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
             fix = (Fix("all_parameters"),)
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
+        found += _without_effect(target, chosen)
         for name in crossed_limits(settings):
             found.append(Finding(STOPS, f"The limits of {name} leave nothing: the least must be below the most."))
     linked = [target.own_name(name) for name in linked if f"{target.own_name(name)} of material" not in said]
@@ -157,6 +169,20 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
     elif linked:
         sentence = f"Kept as nodes give it, not fitted: {', '.join(linked)}."
         found.append(Finding(FINE, sentence, tuple(Fix("unlink", name) for name in linked[:3])))
+    return found
+
+
+def _without_effect(target: TargetShader, chosen: Container[str]) -> list[Finding]:
+    """Chosen details of a lobe that has no weight and gets none."""
+    found = []
+    for detail, amount in AMOUNT_OF.items():
+        lobe = target.sockets.get(amount)
+        if detail not in chosen or amount in chosen or lobe is None or source_of(lobe) is not None:
+            continue
+        if lobe.default_value == 0.0:
+            names = target.own_name(detail), target.own_name(amount)
+            sentence = "{} has no effect while {} is 0: give that a value, or choose it too.".format(*names)
+            found.append(Finding(STOPS, sentence, (Fix("all_parameters"),)))
     return found
 
 

@@ -17,6 +17,7 @@ from ..export.fitted_slot import FittedSlot
 from ..export.job import ExportError, export_steps
 from ..export.meshes.known_meshes import KnownMeshes
 from ..export.nodes.closure_leaves import ClosureError
+from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import leaf_called, target_shader
 from ..export.reference.chosen_file import absolute
 from ..export.reference.counted_part import CountedPart
@@ -26,7 +27,7 @@ from ..export.reference.reference_view import REFERENCE_VIEWS
 from ..export.steps import Steps
 from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
-from ..properties import chosen_of, crossed_limits, node_value_key
+from ..properties import PARAMETER_ITEMS, SOCKET_ITEMS, crossed_limits, node_value_key
 from ..result.local_copy import unwritable
 from ..result.write_back import WriteBackError, fitted_shader
 from ..running import fit_queue, running_job
@@ -135,8 +136,9 @@ class FitOptions:
         model = self.model or settings.model
         parameters: object = self.parameters or settings.parameter_set
         if parameters == "chosen":
-            inside = _chosen_inside(targets or [FittedSlot.active(obj)], settings, model, several=bool(targets))
-            parameters = [*_chosen(settings, model), *inside]
+            fitted = targets or [FittedSlot.active(obj)]
+            inside = _chosen_inside(fitted, settings, model, several=bool(targets))
+            parameters = [*_chosen(fitted, settings, model), *inside]
             if not parameters:
                 raise FitError("No parameter is chosen: choose at least one, or All.")
         elif parameters not in ("all", "reduced"):
@@ -149,7 +151,8 @@ class FitOptions:
             "parameters": parameters,
             "max_iterations": self.max_iterations or settings.max_iterations,
         }
-        chosen = {bound.name: [bound.lower, bound.upper] for bound in settings.bounds if bound.name in parameters}
+        fitted_names = {name.rpartition("/")[2] for name in parameters}  # of several materials, each name after its own
+        chosen = {bound.name: [bound.lower, bound.upper] for bound in settings.bounds if bound.name in fitted_names}
         if settings.parameter_set == "chosen" and not self.parameters and chosen:
             if crossed_limits(settings):
                 name = crossed_limits(settings)[0]
@@ -295,8 +298,25 @@ def _pictures(settings: bpy.types.PropertyGroup) -> list[PictureSetup]:
     return found
 
 
-def _chosen(settings: bpy.types.PropertyGroup, model: str) -> list[str]:
-    """The chosen parameters of a model in the order of its list; the property itself is a set."""
-    name = chosen_of(model)
-    items = settings.bl_rna.properties[name].enum_items
-    return [item.identifier for item in items if item.identifier in getattr(settings, name)]
+def _chosen(fitted: Sequence[FittedSlot], settings: bpy.types.PropertyGroup, model: str) -> list[str]:
+    """The chosen parameters of a model in the order of its list; the property itself is a set.
+
+    Of Blender's sockets those that have no link, for the panel shows no box for others: with the material's name before
+    where not all of these materials have the same.
+    """
+    if model != "blender_principled":
+        return [key for key, *_ in PARAMETER_ITEMS if key in settings.parameters]
+    free = [
+        [key for key, name, *_ in SOCKET_ITEMS if key in settings.sockets and _is_free(each, name)] for each in fitted
+    ]
+    if all(names == free[0] for names in free):
+        return free[0]
+    of_each = zip(fitted, free, strict=True)
+    return [f"{each.material.name}/{name}" for each, names in of_each if each.material for name in names]
+
+
+def _is_free(fitted: FittedSlot, socket: str) -> bool:
+    """Whether the fitted shader has such a socket without a link."""
+    target = target_shader(fitted.material)
+    found = target.sockets.get(socket) if target is not None else None
+    return found is not None and source_of(found) is None

@@ -8,6 +8,7 @@ from itertools import groupby
 import bpy
 
 from ..check.ticked_slots import ticked_slots
+from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import ALL, TargetShader, fits_all_leaves, fitted_leaves, leaf_name, target_shader
 from ..graph_values.mix_values import MixValue, inside_values
 from ..graph_values.place import holder_of, is_there
@@ -90,8 +91,8 @@ def _draw_value(
     if target is not None and socket is None:
         return  # not in this version of Blender, or not of this node
     name = target.own_name(name) if target is not None else name
-    box, value = _cells(layout, context, room(context), word(name))
-    is_linked = socket is not None and socket.is_linked
+    box, value = _cells(layout, context, room(context), word(name), beside=UNIT)
+    is_linked = socket is not None and source_of(socket) is not None  # a muted link gives nothing
     icon = "LINKED" if is_linked else "CHECKBOX_HLT" if key in settings.sockets else "LOCKED"
     box.enabled = not is_linked
     box.prop_enum(settings, "sockets", key, text=name, icon=icon)
@@ -111,11 +112,14 @@ def _draw_value(
 
 
 def _cells(
-    layout: bpy.types.UILayout, context: bpy.types.Context, width: float, name: str
+    layout: bpy.types.UILayout, context: bpy.types.Context, width: float, name: str, *, beside: float = 0.0
 ) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:
-    """Layouts for the name as it is shown and its value, beside each other or below in a width."""
+    """Layouts for the name as it is shown and its value, in a width, `beside` which something else may stand.
+
+    They are beside each other, or where that has no room one below the other.
+    """
     names = _NAMES * width
-    if fits(context, names - ICON, name) and width - names - UNIT >= NUMBER:
+    if fits(context, names - ICON, name) and width - names - beside >= NUMBER:
         split = layout.split(factor=_NAMES, align=True)
         return split.row(align=True), split.row(align=True)
     return layout.row(align=True), layout.row(align=True)

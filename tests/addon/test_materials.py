@@ -113,7 +113,20 @@ def test_values_inside_nodes_are_chosen_for_each_material(two: SimpleNamespace) 
         found[request["target"]["material"]] = (request["fit"]["parameters"], inside)
     assert found == {"Wood": ([], ["Color Ramp/Stop 0"]), "Glaze": ([], ["Color Ramp/Stop 1"])}
 
+    # one of them has a link there, and its own value is fitted nowhere
+    tree = bpy.data.materials["Wood"].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], shader.inputs["Roughness"])
+    settings.sockets = {"roughness", "metallic"}
+    bpy.ops.mfo.limit_value(name="metallic")
+    assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
+    requests = [json.loads(path.read_text("utf-8")) for path in Path(two.job).glob("targets/*/request.json")]
+    asked = {each["target"]["material"]: each["fit"]["parameters"] for each in requests}
+    assert asked == {"Wood": ["metallic"], "Glaze": ["metallic", "roughness"]}
+    assert all(each["fit"]["bounds"] == {"metallic": [0.0, 1.0]} for each in requests)
+
     settings.targets[0].use = False  # the cube is the active object and alone
+    settings.sockets = set()
     bpy.context.view_layer.objects.active = bpy.data.objects["Väse"]
     assert bpy.ops.mfo.fit(job_folder=two.job) == {"FINISHED"}
     request = json.loads((Path(two.job) / "request.json").read_text("utf-8"))

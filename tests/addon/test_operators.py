@@ -159,6 +159,20 @@ def test_request_follows_operator_and_settings(scene: SimpleNamespace) -> None:
     assert (asked["parameters"], asked["max_iterations"], asked["range"]) == (["metallic", "eta"], 9, "ldr")
 
 
+def test_a_chosen_value_with_a_link_is_left_out_as_its_box_in_the_panel_says(scene: SimpleNamespace) -> None:
+    bpy, settings = scene.bpy, scene.bpy.context.scene.mfo
+    tree = bpy.data.materials["Glaze"].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    link = tree.links.new(noise.outputs[0], shader.inputs["Roughness"])
+    settings.parameter_set, settings.sockets = "chosen", {"roughness", "metallic"}
+    for name, muted, expected in (("linked", False, ["metallic"]), ("muted", True, ["metallic", "roughness"])):
+        link.is_muted = muted
+        fit(scene, job_folder=scene.job + name)
+        asked = json.loads(Path(scene.job + name, "request.json").read_text("utf-8"))["fit"]
+        assert asked["parameters"] == expected
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -42,6 +42,7 @@ PANEL = {
     "Object '{}' is hidden in the render: show it.": "Objekt '{}' ist im Rendering verborgen: es zeigen.",
     "Material '{}' is also on {}: applied values change it there too.": "Material '{}' ist auch auf {}: angewendete Werte ändern es dort ebenfalls.",
     "No value is chosen that has no link: choose at least one, or All.": "Kein Wert ohne Verbindung ist ausgewählt: mindestens einen auswählen, oder Alle.",
+    "{} has no effect while {} is 0: give that a value, or choose it too.": "{} hat keine Wirkung, solange {} 0 ist: dort einen Wert eingeben, oder es auch wählen.",
     "The limits of {} leave nothing: the least must be below the most.": "Die Grenzen von {} lassen nichts übrig: das Mindeste muss unter dem Höchsten liegen.",
     "Fitted inside nodes: {}.": "In Nodes angepasst: {}.",
     "Fitted {}: {}{}.": "Angepasst {}: {}{}.",

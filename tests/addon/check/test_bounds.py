@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from mfo_backend.fit.settings import FitSettings
+from mfo_backend.material.principled import blender_selection
 
 from ..test_operators import fit
 
@@ -47,3 +48,33 @@ def test_limits_the_wrong_way_round_are_named_by_the_check(scene: SimpleNamespac
     assert found == ["The limits of Roughness leave nothing: the least must be below the most."]
     with pytest.raises(RuntimeError, match="limits of Roughness"):
         fit(scene)
+
+
+def test_details_of_a_lobe_without_weight_are_named_before_the_fit(scene: SimpleNamespace) -> None:
+    from blender_addon.check.checks import quick_check
+
+    bpy, context = scene.bpy, scene.bpy.context
+    settings = context.scene.mfo
+    settings.reference_path, settings.parameter_set = scene.reference, "chosen"
+    coat = next(n for n in bpy.data.materials["Glaze"].node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs[
+        "Coat Weight"
+    ]
+
+    def stops() -> list[str]:
+        return [f.sentence for f in quick_check(context.scene, context.view_layer) if f.level == "stops"]
+
+    settings.sockets, coat.default_value = {"roughness", "coat_roughness"}, 0.0
+    assert stops() == ["Coat Roughness has no effect while Coat Weight is 0: give that a value, or choose it too."]
+    coat.default_value = 0.5
+    assert stops() == []
+    settings.sockets, coat.default_value = {"coat_weight", "coat_roughness"}, 0.0
+    assert stops() == []
+
+
+def test_which_details_belong_to_a_lobe_is_as_the_backend_has_it() -> None:
+    from blender_addon.check.checks import AMOUNT_OF
+
+    def key(name: str) -> str:
+        return name.lower().replace(" ", "_")
+
+    assert {key(detail): key(amount) for detail, amount in AMOUNT_OF.items()} == blender_selection.AMOUNT_OF
