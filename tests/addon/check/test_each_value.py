@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the check lets begin, the backend takes: each value chosen alone, at materials with and without lobes."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from mfo_backend.material.principled.blender_selection import select_blender_parameters
+from mfo_backend.types.errors import BadInputError
+
+
+@pytest.mark.parametrize("weights", [0.0, 0.5])
+def test_the_check_and_the_backend_agree_on_each_value_chosen_alone(scene: SimpleNamespace, weights: float) -> None:
+    from blender_addon.check.checks import quick_check
+    from blender_addon.properties import SOCKET_ITEMS
+
+    context = scene.bpy.context
+    settings = context.scene.mfo
+    settings.reference_path, settings.parameter_set = scene.reference, "chosen"
+    nodes = scene.bpy.data.materials["Glaze"].node_tree.nodes
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    for name in ("Coat Weight", "Sheen Weight", "Subsurface Weight", "Anisotropic", "Emission Strength"):
+        shader.inputs[name].default_value = weights
+    shader.inputs["Thin Film Thickness"].default_value = weights
+    present = [s.name.lower().replace(" ", "_") for s in shader.inputs if s.type == "VALUE" and s.default_value != 0.0]
+    disagree, begin = [], 0
+    for key, name, *_ in SOCKET_ITEMS:
+        if name not in shader.inputs:
+            continue
+        settings.sockets = {key}
+        stops = [f.sentence for f in quick_check(context.scene, context.view_layer) if f.level == "stops"]
+        begin += not stops
+        try:
+            select_blender_parameters([key], present=present)
+        except BadInputError as error:
+            disagree += [] if stops else [str(error)]
+        else:
+            disagree += stops
+    assert disagree == []
+    assert begin >= 12
