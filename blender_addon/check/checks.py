@@ -22,7 +22,7 @@ from ..export.nodes.shader_graph import source_of
 from ..export.nodes.target_shader import TargetShader, fits_all_leaves, target_shader
 from ..export.render_state import instanced_objects, rendered_objects
 from ..graph_values.mix_values import default_values, inside_values
-from ..properties import SOCKET_ITEMS, crossed_limits, node_value_key
+from ..properties import SOCKET_ITEMS, SOCKETS_START, crossed_limits, node_value_key
 from ..result.animated_sockets import DRIVER, REPLACE, animation_of
 from ..result.local_copy import unwritable
 from ..versions import overrides_of
@@ -151,15 +151,17 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
     settings = scene.mfo
     found = [Finding(FINE, f"'{material.name}' has a {target.node.bl_label}.")]
     inside = _inside(settings, target, material)
-    if settings.parameter_set == "chosen" and settings.model == "blender_principled":
-        chosen = {name for key, name, *_ in SOCKET_ITEMS if key in settings.sockets and name in sockets}
-        of_others = bool(settings.targets) and len(settings.node_values) > 0
+    by_set = {"chosen": settings.sockets, "reduced": SOCKETS_START}
+    if settings.parameter_set in by_set and settings.model == "blender_principled":
+        wanted, is_chosen = by_set[settings.parameter_set], settings.parameter_set == "chosen"
+        chosen = {name for key, name, *_ in SOCKET_ITEMS if key in wanted and name in sockets}
+        of_others = is_chosen and bool(settings.targets) and len(settings.node_values) > 0
         if not chosen - set(linked) and not inside and not of_others:
             fix = (Fix("all_parameters"),)
             return [Finding(STOPS, "No value is chosen that has no link: choose at least one, or All.", fix)]
         linked = [name for name in linked if name in chosen]
         found += _without_effect(target, chosen)
-        for name in crossed_limits(settings):
+        for name in crossed_limits(settings) if is_chosen else ():
             found.append(Finding(STOPS, f"The limits of {name} leave nothing: the least must be below the most."))
     linked = [target.own_name(name) for name in linked if f"{target.own_name(name)} of material" not in said]
     if inside:
