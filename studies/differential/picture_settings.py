@@ -118,11 +118,8 @@ def _beyond(owner: str) -> Callable[[Rig, Draw], None]:
     def put(rig: Rig, draw: Draw) -> None:
         """Numbers that a link can give and no slider."""
         item = getattr(rig, owner)
-        tree, shader = item.data.materials[0].node_tree, principled(item)
         for name in draw.choice(list(_BEYOND), 2, replace=False):
-            value = tree.nodes.new("ShaderNodeValue")
-            value.outputs[0].default_value = float(draw.choice(_BEYOND[str(name)]))
-            tree.links.new(value.outputs[0], shader.inputs[str(name)])
+            _link_value(item, principled(item).inputs[str(name)], float(draw.choice(_BEYOND[str(name)])))
 
     return put
 
@@ -133,6 +130,25 @@ _BEYOND = {
     "Coat Roughness": (1.4, -0.2), "Diffuse Roughness": (1.5, -0.5), "Coat IOR": (0.8, 5.0),
     "Transmission Weight": (-0.5,), "Emission Strength": (-1.0, 2.0), "Subsurface Weight": (-0.4,),
 }  # fmt: skip
+
+
+def _mix_beyond(rig: Rig, draw: Draw) -> None:
+    """Half of a Transparent, or none, by a factor that no slider gives."""
+    tree, shader = rig.box.data.materials[0].node_tree, principled(rig.box)
+    clear, mix = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeMixShader")
+    clear.inputs["Color"].default_value = (0.5, 0.5, 0.5, 1.0)
+    _link_value(rig.box, mix.inputs[0], float(draw.choice([1.4, -0.4])))
+    shown = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
+    for source, socket in ((shader.outputs[0], mix.inputs[1]), (clear.outputs[0], mix.inputs[2])):
+        tree.links.new(source, socket)
+    tree.links.new(mix.outputs[0], shown)
+
+
+def _link_value(item: Any, socket: Any, number: float) -> None:
+    tree = item.data.materials[0].node_tree
+    value = tree.nodes.new("ShaderNodeValue")
+    value.outputs[0].default_value = number
+    tree.links.new(value.outputs[0], socket)
 
 
 def _from_instancer(rig: Rig, draw: Draw) -> None:
@@ -166,6 +182,8 @@ def _all() -> Iterator[Setting]:
         yield Setting(f"beyond bounds on the {owner}", _beyond(owner))
     yield Setting("map of the instancer", _from_instancer, ("of each instance",))
     yield Setting("without a map", _without_map)
+    yield Setting("alpha below zero", lambda rig, _: _link_value(rig.box, principled(rig.box).inputs["Alpha"], -0.4))
+    yield Setting("mix beyond bounds", _mix_beyond)
 
 
 PICTURE_SETTINGS = tuple(_all())

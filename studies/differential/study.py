@@ -25,8 +25,10 @@ import numpy as np
 from ..parity.cycles_parity import render_job
 from .compare import Difference, Picture, compare
 from .random_scene import GROUPS, PLAIN_WORDS, WORDS, Rig, build, drawn
+from .warm_blender import warm_blenders
 
 AGAIN = 4  # times as many samples, with other seeds, before a difference is believed
+FREE = ("specular_ior_level", "roughness", "sheen_roughness")  # no setting of the study links all
 
 
 @dataclass(frozen=True)
@@ -59,10 +61,20 @@ def try_scene(settings: Sequence[str], seed: int, folder: Path, *, size: int, sa
         report = export_job(bpy.context, rig.target, job, reference=folder / "cycles_1.exr", fit={})
     except ExportError as refusal:
         return Outcome(tuple(settings), str(refusal), (), None)
-    first, second = render_job(job, 2 * samples, "specular_ior_level")
+    first, second = _ours(job, 2 * samples)
     region = report.request["reference"].get("region", (0.0, 0.0, 1.0, 1.0))
     ours = _empty_beside(first, region), _empty_beside(second, region)
     return Outcome(tuple(settings), "", report.notes, compare(ours, theirs))
+
+
+def _ours(job: Path, samples: int) -> tuple[Picture, Picture]:
+    """Two pictures of a job; one value without a link is free, of which nothing is asked."""
+    from mfo_backend.types.errors import BadInputError
+
+    for free in FREE[:-1]:
+        with contextlib.suppress(BadInputError):
+            return render_job(job, samples, free)
+    return render_job(job, samples, FREE[-1])
 
 
 def _empty_beside(picture: Picture, region: Sequence[float]) -> Picture:
@@ -87,22 +99,33 @@ def minimised(outcome: Outcome, seed: int, folder: Path, *, size: int, samples: 
 def study(
     scenes: int, seed: int, *, size: int, samples: int, exported: bool = False, groups: Sequence[str] = ()
 ) -> list[Outcome]:
-    """Try that many scenes and return the silent failures, minimised."""
+    """Try that many scenes and return the silent failures, minimised.
+
+    All scenes first ask Blenders that run already; what fails or is refused there is tried anew, with its own.
+    """
     failures, refused, named = [], 0, 0
-    for number in range(seed, seed + scenes):
+    again = list[tuple[int, list[str]]]()
+    with warm_blenders():
+        for number in range(seed, seed + scenes):
+            names = drawn(number, exported=exported, groups=groups)
+            with tempfile.TemporaryDirectory() as name:
+                outcome = try_scene(names, number, Path(name), size=size, samples=samples)
+            if outcome.is_silent or outcome.refusal:
+                again.append((number, names))
+                print(f"scene {number} is tried again: {outcome.refusal or outcome.difference}", flush=True)
+            elif outcome.difference is not None and outcome.difference.is_failure:
+                named += 1
+                print(f"scene {number}, named: {', '.join(names)}: {outcome.difference}", flush=True)
+    for number, names in again:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            names = drawn(number, exported=exported, groups=groups)
-            outcome = try_scene(names, number, folder, size=size, samples=samples)
+            outcome = try_scene(names, number, folder, size=size, samples=AGAIN * samples)
             refused += bool(outcome.refusal)
-            named += outcome.difference is not None and outcome.difference.is_failure and not outcome.is_silent
-            if outcome.is_silent:
-                outcome = try_scene(outcome.settings, number, folder, size=size, samples=AGAIN * samples)
             if outcome.is_silent:
                 outcome = minimised(outcome, number, folder, size=size, samples=AGAIN * samples)
                 failures.append(outcome)
                 print(f"scene {number}: {', '.join(outcome.settings) or 'the plain scene'}: {outcome.difference}")
-            sys.stdout.flush()
+                sys.stdout.flush()
     print(f"{scenes} scenes from {seed}: {len(failures)} silent failures, {named} named, {refused} refused")
     return failures
 

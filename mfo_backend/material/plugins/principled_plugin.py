@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from ...types.errors import SetupError
 from ...types.parameter import Value
+from ..arrays.clamp import saturate
 from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
 from ..principled.bumped_normals import valid_normal
@@ -338,8 +339,8 @@ class BlenderPrincipled(mi.BSDF):
         return bs, dr.select(valid, weight, 0)
 
     def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
-        """Share of light that passes unchanged, 1 - alpha."""
-        alpha = self.values_at(si, active)["alpha"]
+        """Share of light that passes unchanged, 1 - alpha; a link may give alphas beyond 0 and 1."""
+        alpha = saturate(self.values_at(si, active)["alpha"])
         return dr.select(active, mi.Color3f(1 - alpha), 0) if self.lobes.alpha else mi.Color3f(0)
 
     def passing_chance(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, active: Any) -> Any:

@@ -53,12 +53,40 @@ def test_a_planted_difference_is_minimised_to_its_cause(monkeypatch: pytest.Monk
     assert minimised(outcome, SEED, tmp_path, size=32, samples=32).settings == ("lamp energy",)
 
 
+def test_a_planted_difference_of_a_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bakes of half the colour: by second Blenders that run already, and by own ones before it is reported."""
+    from blender_addon.export.materials.baked_material import Baked
+    from blender_addon.probe import client
+    from studies.differential import study
+
+    own, color, asked = client.own_blender, Baked._color, set[bool]()
+
+    def halved(self: Baked, pixels: np.ndarray) -> np.ndarray:
+        asked.add(client.own_blender is own)
+        return np.float32(0.5) * color(self, pixels)
+
+    monkeypatch.setattr(Baked, "_color", halved)
+    monkeypatch.setattr(study, "drawn", lambda *_, **__: ["coordinates of an empty"])
+    found = study.study(1, SEED, size=32, samples=32)
+    assert [outcome.settings for outcome in found] == [("coordinates of an empty",)]
+    assert asked == {False, True}
+
+
 def test_what_shows_objects_is_as_in_cycles(tmp_path) -> None:
     """Each of these alone was 0.3 to 467 % beside Cycles, a block at 8 deviations or more, and nothing was said."""
     from studies.differential.study import try_scene
 
     shown = ("instancer without shadow", "lamp indirect only", "lamp in a holdout collection", "attribute of data")
     outcome = try_scene((*shown, "ocean", "few hairs in the viewport", "children"), SEED, tmp_path, size=32, samples=64)
+    assert outcome.difference is not None
+    assert not outcome.difference.is_failure
+
+
+def test_shadows_of_an_alpha_below_zero_are_as_in_cycles(tmp_path) -> None:
+    """1 - alpha of the light passed: 4 % too bright, a block at 104 deviations."""
+    from studies.differential.study import try_scene
+
+    outcome = try_scene(["alpha below zero"], SEED, tmp_path, size=32, samples=128)
     assert outcome.difference is not None
     assert not outcome.difference.is_failure
 

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Second Blenders that need no start: processes with bpy loaded, each of which answers one export after another.
+
+Loading bpy and the modules of bakes is a third of the processor time of a small scene. Each export opens a file of its
+own in them, as a new one would.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from unittest import mock
+
+LONGEST = 1 << 20  # bytes of a request: arguments, environment and folder of a process
+STREAMS = 3  # stdin, stdout, stderr
+AT_ONCE = 2  # an export asks one for values of nodes while another bakes
+
+
+@contextlib.contextmanager
+def warm_blenders() -> Iterator[None]:
+    """Exports within ask Blenders that run already."""
+    from blender_addon.probe import client
+
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as listener:
+        place = Path(folder) / "socket"
+        listener.bind(str(place))
+        listener.listen()
+        file = listener.fileno()
+        words = [sys.executable, "-m", __name__, "serve", str(file)]
+        servers = [_KeptServer(words, folder, [file]) for _ in range(AT_ONCE)]
+        relay = [sys.executable, "-I", "-S", __file__, "relay", str(place)]
+        try:
+            with mock.patch.object(client, "own_blender", lambda _, arguments: [*relay, *arguments]):
+                yield
+        finally:
+            for server in servers:
+                server.end()
+
+
+class _KeptServer:
+    """A process that is started again where it ends, as a Blender may in an export."""
+
+    def __init__(self, words: list[str], folder: str, files: list[int]) -> None:
+        self._start = functools.partial(subprocess.Popen, words, pass_fds=files, env=os.environ | {"TMPDIR": folder})
+        self._wanted, self._process = True, self._start()
+        self._thread = threading.Thread(target=self._keep, daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        self._wanted = False
+        self._process.kill()
+        self._thread.join()
+
+    def _keep(self) -> None:
+        while True:
+            self._process.wait()
+            if not self._wanted:
+                return
+            self._process = self._start()
+
+
+def serve(listener: socket.socket) -> None:
+    """Be the second Blender of one connection after another, until this process is killed."""
+    from blender_addon.probe import server
+
+    own = [os.dup(stream) for stream in range(STREAMS)]
+    while True:
+        connection, _ = listener.accept()
+        with connection:
+            text, files, _, _ = socket.recv_fds(connection, LONGEST, STREAMS)
+            _put_streams(files)
+            for file in files:
+                os.close(file)
+            request = json.loads(text)
+            words = request["words"]
+            at = words.index("--parent")  # that of the relay, whose end says nothing
+            sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the connection
+            os.chdir(request["folder"])
+            try:
+                server.main([*words[:at], *words[at + 2 :]])
+            finally:
+                os.chdir("/")
+                _put_streams(own)
+
+
+def _put_streams(files: list[int]) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    for stream, file in enumerate(files):
+        os.dup2(file, stream)
+
+
+def relay(place: str, words: list[str]) -> None:
+    """Stand for the second Blender in the process that asks: its streams and words go to one that runs."""
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(place)
+        request = {"words": words, "folder": os.getcwd()}
+        socket.send_fds(connection, [json.dumps(request).encode()], range(STREAMS))
+        for stream in range(STREAMS):
+            os.close(stream)
+        connection.recv(1)  # nothing is sent: it returns when the export asks no more
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "serve":
+        serve(socket.socket(fileno=int(sys.argv[2])))
+    else:
+        relay(sys.argv[2], sys.argv[3:])
