@@ -136,7 +136,6 @@ def _mix_beyond(rig: Rig, draw: Draw) -> None:
     """Half of a Transparent, or none, by a factor that no slider gives."""
     tree, shader = rig.box.data.materials[0].node_tree, principled(rig.box)
     clear, mix = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeMixShader")
-    clear.inputs["Color"].default_value = (0.5, 0.5, 0.5, 1.0)
     _link_value(rig.box, mix.inputs[0], float(draw.choice([1.4, -0.4])))
     shown = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
     for source, socket in ((shader.outputs[0], mix.inputs[1]), (clear.outputs[0], mix.inputs[2])):
