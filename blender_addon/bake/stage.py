@@ -8,8 +8,13 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
+from mathutils import Matrix
 
 NAME = "material_fit_bake"
+PLACE = (
+    "rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale",
+    "delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale",
+)  # fmt: skip
 
 
 class Stage(NamedTuple):
@@ -27,13 +32,14 @@ def staged(
     layers = instance.object.original.type == "MESH"
     matrix = instance.matrix_world.copy()
     mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
-    item = bpy.data.objects.new(NAME, mesh)
+    item, carrier = bpy.data.objects.new(NAME, mesh), bpy.data.objects.new(NAME, None)
     try:
-        item.matrix_world = matrix
+        _put_there(item, carrier, instance.object, matrix)
         with alone(scene, instance.object, item) as stage:
             yield Stage(stage, item)
     finally:
         bpy.data.objects.remove(item)
+        bpy.data.objects.remove(carrier)
         bpy.data.meshes.remove(mesh)
 
 
@@ -87,6 +93,18 @@ def copy_properties(owners: Iterable[bpy.types.ID | bpy.types.ViewLayer | None],
         for key in owner.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
             if not hasattr(owner[key], "as_pointer"):
                 into[key] = owner[key]
+
+
+def _put_there(item: bpy.types.Object, carrier: bpy.types.Object, shown: bpy.types.Object, matrix: Matrix) -> None:
+    """Give `item` the object's own place, which Attribute nodes may ask for by its path, and `matrix` by a parent."""
+    for name in PLACE:
+        setattr(item, name, getattr(shown, name))
+    item.parent = carrier
+    try:
+        item.matrix_parent_inverse = matrix @ item.matrix_basis.inverted()
+    except ValueError:  # the object itself has no size, what shows it has
+        item.parent = None
+        item.matrix_world = matrix
 
 
 def _copy_what_nodes_ask_for(shown: bpy.types.Object, item: bpy.types.Object) -> None:

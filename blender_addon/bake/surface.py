@@ -20,9 +20,10 @@ from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for, asked_of_place
 from ..export.nodes.displacement import bends_normals, unbent
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
-from ..probe.closure_tree import ClosureTree, Leaf, Value
+from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
 from ..probe.light_path import SCATTERED, answer_light_paths, answer_random, light_path_outputs
 from ..versions import active_output
+from .read_alphas import keep_alphas
 from .stage import Stage, bake, staged
 from .unwrap import unwrapped
 
@@ -69,8 +70,10 @@ def baked_surface(
             answer["place"], answer["sides"] = place, bool(asked_for(tree, OF_SIDE))
             if emits:
                 answer["emission"] = baked.file(baked.closure())
+            own = own_groups(tree)
+            groups += own
+            keep_alphas((tree, *own))
             closures = ClosureTree(tree)
-            groups += closures.groups
             answer["leaves"] = _leaves(closures, baked)
             sockets = [leaf.node.inputs.get(name) for leaf in closures.leaves for name in LEFT_OUT]
             answer["left_out"] = sorted({socket.name for socket in sockets if socket is not None and socket.is_linked})

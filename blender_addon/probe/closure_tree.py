@@ -30,12 +30,11 @@ class Leaf:
 
 
 class ClosureTree:
-    """The leaves of a tree that nobody else uses; groups become its own, unless they are."""
+    """The leaves of a tree that nobody else uses, nor the groups in it."""
 
-    def __init__(self, tree: bpy.types.NodeTree, *, own_groups: bool = True) -> None:
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
         self._tree = tree
         self._at_tops: dict[tuple[int, ...], bpy.types.NodeSocket] = {}
-        self.groups = _own_groups(tree, 0) if own_groups else []
         output = active_output(tree)
         self.leaves: list[Leaf] = []
         if output is not None:
@@ -124,13 +123,13 @@ class ClosureTree:
         return self._math("MULTIPLY", first, second)
 
 
-def _own_groups(tree: bpy.types.NodeTree, depth: int) -> list[bpy.types.NodeTree]:
+def own_groups(tree: bpy.types.NodeTree, depth: int = 0) -> list[bpy.types.NodeTree]:
     """Give each group node of `tree` a group of its own, to any depth; returns them."""
     made: list[bpy.types.NodeTree] = []
     for node in tree.nodes:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and depth < DEEPEST:
             node.node_tree = node.node_tree.copy()
-            made += [node.node_tree, *_own_groups(node.node_tree, depth + 1)]
+            made += [node.node_tree, *own_groups(node.node_tree, depth + 1)]
     return made
 
 

@@ -218,7 +218,7 @@ def _put_outputs(
     tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]
 ) -> dict[str, str]:
     """Put an output node of the given name on each of these sockets of a variant; returns the sockets' types."""
-    closures = ClosureTree(tree, own_groups=False) if not all(paths[name][-1] for name in outputs) else None
+    closures = ClosureTree(tree) if not all(paths[name][-1] for name in outputs) else None
     remove_outputs(tree)
     for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial"]:
         tree.nodes.remove(node)

@@ -20,7 +20,7 @@ from .leaf_sockets import GLOSSY, HELD, conductor_colors, stretched
 
 EMISSION = ("Emission Color", "Emission Strength")
 TURNED = ("Anisotropic", "Anisotropy")  # sockets that turn highlights along a tangent
-WHITE = 1.0 - 1e-3  # a Transparent BSDF of this colour or brighter counts as white
+WHITE = 1e-3  # a Transparent BSDF this far from 1 counts as white
 BLACK = Socket((0.0, 0.0, 0.0))
 MISSING = 1e-3  # of the weights' sum, below which nothing is missing
 OVER = 1.0 + 1e-3  # weights that add up to more are those of an Add Shader
@@ -72,7 +72,7 @@ class Baked:
     def _leaf(self, leaf: Mapping[str, Any], name: str, findings: Findings) -> Material:
         given = leaf["sockets"]
         if leaf["kind"] == TRANSPARENT:
-            if np.min(self._socket(given["Color"]).value) < WHITE:
+            if np.abs(to_rec709(self._array(given["Color"])) - 1.0).max() > WHITE:
                 findings.note(f"Material '{name}': Transparent BSDF is taken for white.")
             return Material(name, "null")
         kind = CONDUCTOR if "Extinction" in given else KINDS.get(leaf["kind"])

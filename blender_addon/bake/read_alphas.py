@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colours of pictures whose Alpha is read too: Cycles divides them by it, in a bake of the colours alone as well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from ..versions import active_output
+
+# Of alpha, added to the colour: nothing, and yet no zero, with which Cycles would leave Alpha out
+TRACE = 1e-30
+
+
+def keep_alphas(trees: Iterable[bpy.types.NodeTree]) -> None:
+    """Let whatever reads Color of an Image Texture node in these trees read its Alpha, where something else does.
+
+    Cycles leaves out what a bake does not ask for, and divides by alpha where Alpha is linked
+    (`ImageTextureNode::compile`).
+    """
+    for tree in trees:
+        links = list(tree.links)
+        shown = _reaching(tree, links)
+        for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeTexImage"]:
+            color, alpha = node.outputs["Color"], node.outputs["Alpha"]
+            if any(link.from_socket == alpha and link.to_node.as_pointer() in shown for link in links):
+                ends = [link.to_socket for link in links if link.from_socket == color]
+                both = tree.nodes.new("ShaderNodeMix")
+                both.data_type, both.blend_type, both.clamp_factor = "RGBA", "ADD", False
+                both.inputs[0].default_value = TRACE
+                first, second = (socket for socket in both.inputs if socket.type == "RGBA")
+                tree.links.new(color, first)
+                tree.links.new(alpha, second)
+                for end in ends:
+                    tree.links.new(next(socket for socket in both.outputs if socket.type == "RGBA"), end)
+
+
+def _reaching(tree: bpy.types.NodeTree, links: list[bpy.types.NodeLink]) -> set[int]:
+    """The nodes on which an output of the tree, or of a group, hangs."""
+    outputs = [active_output(tree), *(node for node in tree.nodes if node.bl_idname == "NodeGroupOutput")]
+    waiting = [node for node in outputs if node is not None]
+    found = {node.as_pointer() for node in waiting}
+    while waiting:
+        node = waiting.pop()
+        for link in links:
+            before = link.from_node
+            if link.to_node == node and not link.is_muted and before.as_pointer() not in found:
+                found.add(before.as_pointer())
+                waiting.append(before)
+    return found
