@@ -28,7 +28,7 @@ from .random_scene import GROUPS, PLAIN_WORDS, WORDS, Rig, build, drawn
 from .warm_blender import warm_blenders
 
 AGAIN = 4  # times as many samples, with other seeds, before a difference is believed
-FREE = ("specular_ior_level", "roughness", "sheen_roughness")  # no setting of the study links all
+FREE = ("specular_ior_level", "roughness", "base_color", "metallic", "alpha")  # no setting of the study links all
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,14 @@ class Outcome:
     difference: Difference | None
 
     @property
+    def is_named_by_setting(self) -> bool:
+        """Whether a sentence names one of the settings, and not only what the plain scene has."""
+        return any(word in note for name in self.settings for word in WORDS[name] for note in self.notes)
+
+    @property
     def is_silent(self) -> bool:
         """Whether the pictures differ and no sentence names one of the settings."""
-        words = [*PLAIN_WORDS, *(word for name in self.settings for word in WORDS[name])]
-        named = any(word in note for word in words for note in self.notes)
+        named = self.is_named_by_setting or any(word in note for word in PLAIN_WORDS for note in self.notes)
         return self.difference is not None and self.difference.is_failure and not named
 
 
@@ -115,7 +119,8 @@ def study(
                 print(f"scene {number} is tried again: {outcome.refusal or outcome.difference}", flush=True)
             elif outcome.difference is not None and outcome.difference.is_failure:
                 named += 1
-                print(f"scene {number}, named: {', '.join(names)}: {outcome.difference}", flush=True)
+                by = "a setting" if outcome.is_named_by_setting else "the plain scene"  # which may hide another cause
+                print(f"scene {number}, named by {by}: {', '.join(names)}: {outcome.difference}", flush=True)
     for number, names in again:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)

@@ -63,7 +63,8 @@ def _read_surface(material: bpy.types.Material, tree: bpy.types.NodeTree, owner:
     if node.bl_idname == PRINCIPLED:
         return _read_principled(material, node, findings)
     if node.bl_idname == TRANSPARENT:
-        if list(node.inputs["Color"].default_value)[:3] != [1.0, 1.0, 1.0]:
+        color = node.inputs["Color"]
+        if color.is_linked or list(color.default_value)[:3] != [1.0, 1.0, 1.0]:
             findings.note(f"Material '{material.name}': {node.bl_label} is taken for white.")
         return Material(material.name, "null")
     named = _context_inputs(node)

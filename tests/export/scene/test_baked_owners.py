@@ -79,3 +79,26 @@ def test_an_instance_has_the_colour_of_its_instancer(stage: Any, export: Any, re
     seen = picture.reshape(-1, picture.shape[-1])[:, :3]
     for color in baked:
         assert np.abs(seen - color).max(axis=1).min() < 1e-3
+
+
+@pytest.mark.parametrize("shown_by", ["parent", "instancer"])
+def test_an_object_is_told_its_own_place(shown_by: str, stage: Any, export: Any, render_cycles: Any) -> None:
+    """By its path, whatever its parent or its instancer does to it; a bake had what both make together."""
+    target, box = stage
+    box.rotation_euler, box.location = (0.4, 0.3, 0.8), (0.1, 0.2, 0.0)
+    if shown_by == "parent":
+        box.parent = bpy.data.objects.new("Carrier", None)
+        carrier = box.parent
+    else:
+        carrier = bpy.data.objects.new("Instance", None)
+        prefab = bpy.data.collections.new("Prefab")
+        prefab.objects.link(box)
+        bpy.context.scene.collection.objects.unlink(box)
+        carrier.instance_type, carrier.instance_collection = "COLLECTION", prefab
+    carrier.rotation_euler, carrier.scale = (0.2, 0.1, 0.5), (0.9, 0.6, 0.8)
+    bpy.context.scene.collection.objects.link(carrier)
+    told = box.data.materials[0].node_tree.nodes.new("ShaderNodeAttribute")
+    told.attribute_type, told.attribute_name = "OBJECT", "rotation_euler"
+    picture, (baked,) = shown_and_baked(told, target, export, render_cycles)
+    np.testing.assert_allclose(picture[CENTRE][:3], (0.4, 0.3, 0.8), atol=1e-4)
+    np.testing.assert_allclose(baked, picture[CENTRE][:3], atol=1e-4)

@@ -381,3 +381,20 @@ def test_attributes_of_the_view_layer_are_those_of_the_users_scene(owner: str, s
     report = export(target)
     bsdf, _, _ = shape_of(report)
     assert report.request["materials"][bsdf]["sockets"]["Roughness"]["value"] == pytest.approx(0.7, abs=1e-5)
+
+
+@pytest.mark.parametrize("other", [0.5, 1.5])
+def test_a_transparent_bsdf_that_is_not_white_is_named(other: float, stage: Any, export: Any) -> None:
+    """Darker or brighter than white, alone or in a mix: light behind was 4 % and more beside Cycles."""
+    target, _, nodes = stage
+    clear, color = nodes.new("BsdfTransparent"), nodes.new("RGB")
+    color.outputs[0].default_value = (other, 1.0, 1.0, 1.0)
+    nodes.tree.links.new(color.outputs[0], clear.inputs["Color"])
+    nodes.tree.links.new(clear.outputs[0], nodes.surface)
+    named = "Material 'Ball': Transparent BSDF is taken for white."
+    assert named in export(target).notes
+    mix = nodes.new("MixShader")
+    nodes.tree.links.new(nodes.principled.outputs[0], mix.inputs[1])
+    nodes.tree.links.new(clear.outputs[0], mix.inputs[2])
+    nodes.tree.links.new(mix.outputs[0], nodes.surface)
+    assert named in export(target).notes
