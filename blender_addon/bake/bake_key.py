@@ -21,6 +21,7 @@ from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for, turns_with_camera
 from ..probe.graph_copy import nodes_of
 from ..versions import node_tree_of
+from .stage import PLACE
 
 SHOWN_ONLY = {  # of a node or a socket: how it looks in the editor
     "bl_description", "bl_height_default", "bl_height_max", "bl_height_min", "bl_icon", "bl_label",
@@ -71,6 +72,7 @@ def surface_key(
         if item.original.vertex_groups and any(node.bl_idname == "ShaderNodeAttribute" for node in nodes_of(tree)):
             raise _NoKeyError
         key.put(material.displacement_method, [list(row) for row in instance.matrix_world])
+        key.put([list(getattr(item, name)) for name in PLACE])
         data = item.original.data
         if hasattr(data, "texspace_location"):
             key.put(list(data.texspace_location), list(data.texspace_size))

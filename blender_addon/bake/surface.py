@@ -48,9 +48,10 @@ def baked_surface(
     those that reflect light or let it through, each with ``kind``, ``name``, ``weight``, ``sockets`` and what of the
     node's settings counts; ``emission`` and for leaves ``normal``, where there are any; ``view``, ``paths``,
     ``around`` and ``place``: what of the view, of light paths, of other objects and of its own place the nodes ask
-    for; ``sides``: whether for the side that is seen; ``left_out``: linked sockets that are not baked. A value is a
-    number, a list, or the name of a .npy (size, size, channels), first row at the top, in the working space. Normals
-    are in the frame of the map: its u axis, the normal's side of it, the smooth normal.
+    for; ``sides``: whether for the side that is seen; ``alone``: whether there is one closure in all; ``left_out``:
+    linked sockets that are not baked. A value is a number, a list, or the name of a .npy (size, size, channels), first
+    row at the top, in the working space. Normals are in the frame of the map: its u axis, the normal's side of it, the
+    smooth normal.
     """
     shown = material_of_slot(instance.object, slot)
     assert shown is not None  # a surface without material needs no bake
@@ -75,6 +76,7 @@ def baked_surface(
             keep_alphas((tree, *own))
             closures = ClosureTree(tree)
             answer["leaves"] = _leaves(closures, baked)
+            answer["alone"] = len(closures.leaves) == 1
             sockets = [leaf.node.inputs.get(name) for leaf in closures.leaves for name in LEFT_OUT]
             answer["left_out"] = sorted({socket.name for socket in sockets if socket is not None and socket.is_linked})
             np.save(folder / "corners.npy", stage.corners)

@@ -58,9 +58,10 @@ class Baked:
         if not weighted:
             return {identifier: Material(name, "emission" if emission else "diffuse", {"Base Color": BLACK} | emission)}
         if len(weighted) == 1:
-            whole = weighted[0][1]
+            whole, below = weighted[0][1], self._emission_below_layers() if emission else {}
+            emission = below or emission
             return _with_normal(
-                identifier, replace(whole, sockets=whole.sockets | emission, emission_is_dimmed=True), emission
+                identifier, replace(whole, sockets=whole.sockets | emission, emission_is_dimmed=not below), emission
             )
         found: dict[str, Material] = {}
         parts = []
@@ -124,6 +125,16 @@ class Baked:
             return {}
         mean = [float(number) for number in radiance.mean(axis=(0, 1))]
         return dict(zip(EMISSION, (Socket(mean, True, _texture(radiance)), Socket(1.0)), strict=True))
+
+    def _emission_below_layers(self) -> dict[str, Socket]:
+        """What a Principled BSDF alone emits before its layers, which dim it by the angle that no bake knows."""
+        leaf = self._answer["leaves"][0]["sockets"]
+        if not (self._answer["alone"] and all(name in leaf for name in EMISSION)):
+            return {}
+        color, strength = (self._array(leaf[name]) for name in EMISSION)
+        radiance = self._color((color * strength).astype(np.float32))
+        mean = [float(number) for number in radiance.mean(axis=(0, 1))]
+        return dict(zip(EMISSION, (Socket(mean, True, _picture(radiance)), Socket(1.0)), strict=True))
 
     def _socket(self, value: Any) -> Socket:
         if isinstance(value, str):
