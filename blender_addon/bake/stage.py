@@ -11,7 +11,7 @@ import bpy
 from mathutils import Matrix
 
 NAME = "material_fit_bake"
-PLACE = (
+PLACE = (  # an object's own, by which Attribute nodes may ask
     "rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale",
     "delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale",
 )  # fmt: skip

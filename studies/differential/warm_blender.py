@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Second Blenders that need no start: processes with bpy loaded, each of which answers one export after another.
 
-Loading bpy and the modules of bakes is a third of the processor time of a small scene. Each export opens a file of its
+Loading bpy and the modules of bakes is most of what second Blenders cost a small scene. Each export opens a file of its
 own in them, as a new one would.
 """
 

@@ -134,7 +134,9 @@ class Baked:
         color, strength = (self._array(leaf[name]) for name in EMISSION)
         radiance = self._color((color * strength).astype(np.float32))
         mean = [float(number) for number in radiance.mean(axis=(0, 1))]
-        return dict(zip(EMISSION, (Socket(mean, True, _picture(radiance)), Socket(1.0)), strict=True))
+        return dict(
+            zip(EMISSION, (Socket(mean, True, _picture(radiance.astype(np.float64))), Socket(1.0)), strict=True)
+        )
 
     def _socket(self, value: Any) -> Socket:
         if isinstance(value, str):
