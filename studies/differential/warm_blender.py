@@ -16,12 +16,14 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
 
 LONGEST = 1 << 20  # bytes of a request: arguments, environment and folder of a process
 STREAMS = 3  # stdin, stdout, stderr
+LOOK_SECONDS = 1.0  # between two looks whether the study is still there
 AT_ONCE = 2  # an export asks one for values of nodes while another bakes
 
 
@@ -72,6 +74,7 @@ def serve(listener: socket.socket) -> None:
     """Be the second Blender of one connection after another, until this process is killed."""
     from blender_addon.probe import server
 
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     own = [os.dup(stream) for stream in range(STREAMS)]
     while True:
         connection, _ = listener.accept()
@@ -90,6 +93,13 @@ def serve(listener: socket.socket) -> None:
             finally:
                 os.chdir("/")
                 _put_streams(own)
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the study is gone."""
+    while os.getppid() == parent:
+        time.sleep(LOOK_SECONDS)
+    os._exit(1)
 
 
 def _put_streams(files: list[int]) -> None:

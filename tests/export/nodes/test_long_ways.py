@@ -66,7 +66,7 @@ def looks(count: int, monkeypatch: pytest.MonkeyPatch) -> int:
             assert leaf is not None
             assert leaf.places
         copy = own_copy(material)
-        assert len(ClosureTree(copy.node_tree, own_groups=False).leaves) == 2
+        assert len(ClosureTree(copy.node_tree).leaves) == 2
         remove_copy(copy)
     return asked
 
