@@ -88,11 +88,17 @@ def serve(listener: socket.socket) -> None:
             at = words.index("--parent")  # that of the relay, whose end says nothing
             sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the connection
             os.chdir(request["folder"])
+            answered = threading.Event()
+            watch = threading.Thread(target=_end_unless, args=(answered, connection), daemon=True)
+            watch.start()
             try:
                 server.main([*words[:at], *words[at + 2 :]])
             finally:
                 os.chdir("/")
                 _put_streams(own)
+                answered.set()
+                connection.shutdown(socket.SHUT_RDWR)
+                watch.join()
 
 
 def _end_with(parent: int) -> None:
@@ -100,6 +106,13 @@ def _end_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(LOOK_SECONDS)
     os._exit(1)
+
+
+def _end_unless(answered: threading.Event, connection: socket.socket) -> None:
+    """End this process if its relay is killed before all is answered, as a second Blender would be."""
+    connection.recv(1)  # nothing is sent: it returns at the end of either side
+    if not answered.is_set():
+        os._exit(1)
 
 
 def _put_streams(files: list[int]) -> None:
