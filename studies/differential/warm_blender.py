@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Second Blenders that need no start: processes with bpy loaded, each of which answers one export after another.
 
-Loading bpy and the modules of bakes is most of what second Blenders cost a small scene. Each export opens a file of its
-own in them, as a new one would.
+Loading bpy takes a second of each small scene. Each export opens a file of its own in them, as a new one
+would.
 """
 
 from __future__ import annotations
