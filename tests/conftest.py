@@ -16,8 +16,15 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from mfo_backend.render.machine.cache_folder import use_kernel_cache
+from mfo_backend.types.processors import processors
 
 use_kernel_cache()  # the one of the commands that tests start: what either has compiled is there for both
+
+# A thread of Dr.Jit that has nothing to do waits busily, so processes that share a machine share its processors, too:
+# a quarter of the processor seconds of a fit are saved. The commands that tests start have as many threads.
+if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
+    share = processors() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    os.environ.setdefault("MFO_THREADS", str(max(1, share)))
 
 # a machine under load is slow, so no example has a deadline; the database would write into the working folder
 _ALWAYS = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}

@@ -91,6 +91,20 @@ def test_numpy_computes_with_one_thread_under_plain_pytest_in_a_study_and_in_the
         seen.unlink()
 
 
+def test_no_test_reads_an_exr_file_with_one_thread() -> None:
+    """Mitsuba would wait for ever, and no limit of time ends it: `two_threads`, or `load_scene` of the export."""
+
+    def is_guarded(lines: list[str], number: int) -> bool:
+        return any("two_threads()" in line for line in lines[max(0, number - 2) : number + 1])
+
+    found = []
+    for path in (ROOT / "tests").rglob("*.py"):
+        lines = path.read_text("utf-8").splitlines()
+        reads = [n for n, line in enumerate(lines) if re.search(r"(mi|mitsuba)\.(load_file\(|Bitmap\(str)", line)]
+        found += [f"{path.name}:{number + 1}" for number in reads if not is_guarded(lines, number)]
+    assert found == []
+
+
 def test_the_quick_tests_exist() -> None:
     spec = importlib.util.spec_from_file_location("dev", ROOT / "dev.py")
     assert spec is not None

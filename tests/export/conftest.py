@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from .load_scene import load_scene
+
 Pixels = np.ndarray
 
 # the pure part is tested without Blender too
@@ -103,8 +105,8 @@ def export(tmp_path: Path) -> Callable[..., Any]:
 @pytest.fixture
 def render_mitsuba(mitsuba: Any) -> Callable[..., Pixels]:
     def render(report: Any, spp: int = 64) -> Pixels:
-        """Return what `mi.load_file` and `mi.render` make of the job's scene, with our lamps registered."""
-        scene = mitsuba.load_file(str(report.folder / "scene.xml"), parallel=False)  # plugins in Python
+        """Return what `mi.render` makes of the job's scene, with our lamps registered."""
+        scene = load_scene(mitsuba, report, parallel=False)  # plugins in Python
         return np.array(mitsuba.render(scene, spp=spp))[:, :, :3]
 
     return render

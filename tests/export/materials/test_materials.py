@@ -11,6 +11,7 @@ import pytest
 
 from blender_addon.export.job import check_export
 
+from ..load_scene import load_scene
 from ..scenes import add_camera, add_light, add_quad, diffuse_material, emission_material, new_material, world_color
 from ..socket_walk import silent_sockets
 
@@ -128,7 +129,7 @@ def test_pictures_stay_linked(scene: Any, export: Any, mitsuba: Any) -> None:
         np.testing.assert_allclose(sockets[name]["value"], value if len(value) == 3 else value[0], atol=0.003)
     assert sockets["Sheen Weight"] == {"value": pytest.approx(0.3), "linked": True}
     assert sockets["IOR"]["linked"] is False
-    scene_read = mitsuba.load_file(str(report.folder / "scene.xml"), optimize=False)
+    scene_read = load_scene(mitsuba, report, optimize=False)
     parameters = mitsuba.traverse(scene_read)
     for name in ("base_color", "roughness", "metallic"):
         assert f"target_bsdf.brdf_0.{name}.data" in parameters

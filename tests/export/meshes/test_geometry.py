@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
+from ..load_scene import load_scene
 from ..scenes import (
     add_camera,
     add_light,
@@ -26,7 +27,7 @@ from ..scenes import (
 
 
 def shapes_of(mitsuba: Any, report: Any) -> dict[str, Any]:
-    scene = mitsuba.load_file(str(report.folder / "scene.xml"), optimize=False)
+    scene = load_scene(mitsuba, report, optimize=False)
     return {shape.id(): shape for shape in scene.shapes()}
 
 

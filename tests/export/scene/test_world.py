@@ -13,6 +13,7 @@ from mathutils import Vector
 
 from mfo_backend.scene.image_file import read_image
 
+from ..load_scene import load_scene
 from ..scenes import add_camera, add_quad, new_material
 
 DIRECTIONS = [
@@ -74,7 +75,7 @@ def test_environment_along_axes_and_between(
     target = add_quad("Target", 0.02, -1.0, new_material("Target"))
     report = export(target)
     target.hide_render = True
-    world = mitsuba.load_file(str(report.folder / "scene.xml")).environment()
+    world = load_scene(mitsuba, report).environment()
     expected, found = [], []
     for direction in DIRECTIONS:
         camera.rotation_euler = Vector(direction).to_track_quat("-Z", "Y").to_euler()
