@@ -7,6 +7,7 @@ MFO_EXAMPLES asks for that many new examples of each.
 from __future__ import annotations
 
 import compileall
+import gc
 import importlib.util
 import os
 from collections.abc import Iterator
@@ -47,6 +48,12 @@ def pytest_configure(config) -> None:
     if "PYTEST_XDIST_WORKER" not in os.environ:
         for package in ("mfo_backend", "blender_addon"):
             compileall.compile_dir(Path(__file__).parents[1] / package, quiet=2)
+
+
+def pytest_collection_finish() -> None:
+    # A renderer collects garbage before it loads a scene; to look at what the modules of tests hold takes 0.2 s of it
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

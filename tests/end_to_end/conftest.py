@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import json
 import os
@@ -117,3 +118,22 @@ def blend(scene: Scene) -> Callable[..., Done]:
         return run_mfo("blend", file, "--object", scene.object, "--reference", reference, *arguments)
 
     return call
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit of the start to the linear picture, written into a copy; `started_from` is the hash of the file before."""
+
+    done: Done
+    job: Path
+    saved: Path
+    started_from: str
+
+
+@pytest.fixture(scope="session")
+def fitted(scene: Scene, blend: Callable[..., Done], tmp_path_factory: pytest.TempPathFactory) -> Fitted:
+    folder = tmp_path_factory.mktemp("fitted")
+    job, saved = folder / "job", folder / "recovered.blend"
+    before = hashlib.sha256(scene.start.read_bytes()).hexdigest()
+    words = ("--preset", "fast", "--apply", "--save-as", saved, "--json")  # `mfo demo` is without a preset
+    return Fitted(blend(scene.exr, "--out", job, *words), job, saved, before)

@@ -15,7 +15,7 @@ from mfo_backend.metrics.flip.flip_error import flip_error
 from mfo_backend.report.difference_map import NOT_COUNTED
 from mfo_backend.scene.image_file import read_image, write_exr, write_png
 
-from .conftest import RENDER, SIZE, Done, Scene, run_bpy, run_mfo
+from .conftest import RENDER, SIZE, Done, Fitted, Scene, run_bpy, run_mfo
 
 Blend = Callable[..., Done]
 OPAQUE = ("base_color", "metallic", "roughness", "specular_ior_level", "specular_tint", "coat_weight", "coat_roughness",
@@ -28,11 +28,8 @@ found = {s.name: (list(s.default_value) if hasattr(s.default_value, "__len__") e
 """
 
 
-def test_linear_reference_is_recovered_and_applied(scene: Scene, blend: Blend, tmp_path: Path) -> None:
-    before = hashlib.sha256(scene.start.read_bytes()).hexdigest()
-    saved = tmp_path / "recovered.blend"
-    words = ("--preset", "fast", "--apply", "--save-as", saved, "--json")  # `mfo demo` below is without a preset
-    done = blend(scene.exr, "--out", tmp_path / "job", *words)
+def test_linear_reference_is_recovered_and_applied(scene: Scene, fitted: Fitted) -> None:
+    done = fitted.done
     assert done.code == 0, done.stderr
     gap = done.answer["model_gap"]
     assert 0.0 <= gap["relative"] <= gap["at_most"] < 0.05  # the renderer is Cycles' equal, so little is left
@@ -41,13 +38,13 @@ def test_linear_reference_is_recovered_and_applied(scene: Scene, blend: Blend, t
     assert result < 0.06
     assert result < start / 4
     assert done.answer["model"] == "blender_principled"
-    assert hashlib.sha256(scene.start.read_bytes()).hexdigest() == before
-    shown, recovered = run_bpy(SHOW, saved), done.answer["recovered"]
+    assert hashlib.sha256(scene.start.read_bytes()).hexdigest() == fitted.started_from
+    shown, recovered = run_bpy(SHOW, fitted.saved), done.answer["recovered"]
     assert shown["Roughness"] == pytest.approx(recovered["roughness"], abs=1e-6)
     assert shown["Base Color"][:3] == pytest.approx(recovered["base_color"], abs=1e-6)
     for name in ("reference", "start", "result", "difference"):
-        assert (tmp_path / "job" / "pictures" / f"{name}.png").is_file()
-    assert "Roughness" in (tmp_path / "job" / "index.html").read_text("utf-8").title()
+        assert (fitted.job / "pictures" / f"{name}.png").is_file()
+    assert "Roughness" in (fitted.job / "index.html").read_text("utf-8").title()
 
 
 def test_display_picture_is_recovered(scene: Scene, blend: Blend, tmp_path: Path) -> None:
@@ -101,7 +98,8 @@ def test_paper_preset_lowers_flip_after_mse(scene: Scene, blend: Blend, tmp_path
 
 
 def test_demo_judges_in_cycles(tmp_path: Path) -> None:
-    done = run_mfo("demo", "--out", tmp_path / "demo", "--size", 64, "--samples", 64, "--json")
+    as_users = {"MFO_THREADS": ""}  # a thread for each processor, which the other tests share
+    done = run_mfo("demo", "--out", tmp_path / "demo", "--size", 64, "--samples", 64, "--json", environment=as_users)
     assert done.code == 0, done.stderr
     assert done.answer["flip_after"] <= 0.06
     assert done.answer["flip_after"] * 4 <= done.answer["flip_before"]

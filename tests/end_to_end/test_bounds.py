@@ -5,25 +5,16 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from .conftest import Done, Scene, run_mfo
-
-
-@pytest.fixture(scope="module")
-def free_job(scene: Scene, blend: Callable[..., Done], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The job folder of a fit without limits."""
-    job = tmp_path_factory.mktemp("free") / "job"
-    assert blend(scene.exr, "--out", job, "--preset", "fast", "--json").code == 0
-    return job
+from .conftest import Fitted, run_mfo
 
 
 @pytest.mark.parametrize("preset", ["fast", "paper"])
-def test_recovered_values_stay_inside(free_job: Path, tmp_path: Path, preset: str) -> None:
-    job = shutil.copytree(free_job, tmp_path / "job")
+def test_recovered_values_stay_inside(fitted: Fitted, tmp_path: Path, preset: str) -> None:
+    job = shutil.copytree(fitted.job, tmp_path / "job")
     free = json.loads((job / "result.json").read_text("utf-8"))["recovered"]["roughness"]
     limits = [0.7, 0.9] if free < 0.6 else [0.1, 0.3]
     request = json.loads((job / "request.json").read_text("utf-8"))

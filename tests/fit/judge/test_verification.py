@@ -264,7 +264,7 @@ def test_no_piece_of_a_whole_frame_repeats_the_numbers_of_further_samples():
     load_variant()
     from mfo_backend.render.pictures.pixel_pictures import pieces_of
 
-    mask = np.zeros((2160, 3840), bool)
+    mask = np.zeros((1500, 2000), bool)
     mask[:100, :100] = True
     renderer = Renderer()
     found(renderer, 0.4, 0.9, [0.4], shape=(*mask.shape, 3), mask=mask)
