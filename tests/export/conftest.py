@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import nullcontext
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -37,20 +36,6 @@ collect_ignore = (
         "test_world.py",
     ]
 )
-
-
-@pytest.fixture(scope="package", autouse=True)
-def second_blenders() -> Iterator[None]:
-    """Those that bake and evaluate nodes are forks of one that is loaded once; `tests/end_to_end` starts each anew."""
-    if find_spec("bpy") is None:
-        yield
-        return
-    import bpy
-
-    from studies.differential.warm_blender import warm_blenders
-
-    with warm_blenders() if bpy.app.version >= (5, 0) else nullcontext():  # with older ones it was not tried
-        yield
 
 
 @pytest.fixture(scope="session")
