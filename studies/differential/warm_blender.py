@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Second Blenders that need no start: processes with bpy loaded, each of which answers one export after another.
 
-Loading bpy takes a second of each small scene. Each export opens a file of its own in them, as a new one
-would.
+    python -m studies.differential.warm_blender serve SOCKET
+    python -m studies.differential.warm_blender relay PLACE WORD ...
+
+Loading bpy takes a second of each small scene. Each export opens a file of its own in them, as a new one would. The
+study starts both parts.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import functools
 import json
@@ -133,8 +137,18 @@ def relay(place: str, words: list[str]) -> None:
         connection.recv(1)  # nothing is sent: it returns when the export asks no more
 
 
-if __name__ == "__main__":
-    if sys.argv[1] == "serve":
-        serve(socket.socket(fileno=int(sys.argv[2])))
+def main() -> None:
+    """What a process of its own is for: to serve, or to relay."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", choices=("serve", "relay"))
+    parser.add_argument("place", help="the number of a socket that listens, or the path of one")
+    parser.add_argument("words", nargs=argparse.REMAINDER, help="those of a second Blender")
+    given = parser.parse_args()
+    if given.part == "serve":
+        serve(socket.socket(fileno=int(given.place)))
     else:
-        relay(sys.argv[2], sys.argv[3:])
+        relay(given.place, given.words)
+
+
+if __name__ == "__main__":
+    main()
