@@ -43,6 +43,10 @@ preferences.view.show_splash = False
 preferences.view.ui_scale = scale
 
 
+# pixels at scale 1 of the line below a path that its field cuts, as it does that of every test's folder
+NAME_BELOW = 18
+
+
 def module(name):
     """One of the add-on, which may be installed on the way."""
     return importlib.import_module(f"{addon_id}.blender_addon.{name}")
@@ -111,7 +115,8 @@ def draw_part(path_field):
     """Open the part below the path, and drag a rectangle over the view; then let all of the picture count again."""
     part = bpy.context.scene.mfo.first_picture.part
     x, y = path_field
-    yield from click(x, y - 28 * scale)
+    below = y - (28 + NAME_BELOW) * scale
+    yield from click(x, below)
     yield from shot("part")
     yield from press("mfo.draw_part(")
     yield 0.5
@@ -124,7 +129,7 @@ def draw_part(path_field):
     yield from shot("part_drawn")
     yield from press("mfo.whole_picture(", part=0.88)
     assert part.is_whole
-    yield from click(x, y - 28 * scale)
+    yield from click(x, below)
 
 
 def story():
