@@ -56,12 +56,20 @@ def named_numbers(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
     for node in tree.body:
         if _names_a_number(node):
             target = node.targets[0] if isinstance(node, ast.Assign) else node.target
-            yield target.id, node.value
+            if isinstance(target, ast.Tuple):
+                yield from zip((name.id for name in target.elts), node.value.elts, strict=True)
+            else:
+                yield target.id, node.value
 
 
 def _names_a_number(node: ast.stmt) -> bool:
-    one_name = isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)
-    return (one_name or isinstance(node, ast.AnnAssign)) and node.value is not None and _is_number(node.value)
+    if isinstance(node, ast.AnnAssign):
+        return node.value is not None and _is_number(node.value)
+    if not isinstance(node, ast.Assign) or len(node.targets) != 1 or not _is_number(node.value):
+        return False
+    (target,) = node.targets
+    several = isinstance(target, ast.Tuple) and all(isinstance(name, ast.Name) for name in target.elts)
+    return isinstance(target, ast.Name) or several
 
 
 def _is_number(value: ast.expr) -> bool:

@@ -20,8 +20,8 @@ from ..check.ticked_slots import NONE_TICKED, left_out, ticked_slots
 from ..export.fitted_slot import FittedSlot
 from ..export.meshes.known_meshes import KnownMeshes
 from ..export.steps import Pause, Steps, drained, part_of
-from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
+from ..process.own_blender import SERVER, own_blender
 from ..result import shown_result
 from ..running import fit_queue, running_export, running_job
 from ..running.fit_queue import EndedFit, PreparedFit

@@ -51,11 +51,12 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
 def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
     target, folder = Target.of(request), Path(request["folder"])
     depths = range(int(request.get("depths", 1)))
-    paths = {
-        f"{number} {socket}": [*leaf["node"], socket]
+    asked = {
+        f"{number} {socket}": (number, socket)
         for number, leaf in enumerate(request["leaves"])
         for socket in [*leaf["sockets"], *([""] if leaf["weight"] else [])]
     }
+    paths = {name: [*request["leaves"][number]["node"], socket] for name, (number, socket) in asked.items()}
     renders, variant = VariantPictures(target, paths, request["samples"]), Variant(tuple(paths))
     found: dict[str, Picture] = {}
     elsewhere: dict[str, Picture] = {}
@@ -80,10 +81,9 @@ def _answer(request: Mapping[str, Any]) -> dict[str, Any]:
         if name in elsewhere:
             said["elsewhere"] = f"elsewhere_{k:02d}.npy"
             np.save(folder / said["elsewhere"], elsewhere[name])
-        number, _, socket = name.partition(" ")
-        leaf = leaves[int(number)]
+        number, socket = asked[name]
         if socket:
-            leaf["sockets"][socket] = said
+            leaves[number]["sockets"][socket] = said
         else:
-            leaf["weight"] = said
+            leaves[number]["weight"] = said
     return {"leaves": leaves, **write_surface(target, surface, folder), "depths": len(seen) // height}

@@ -21,9 +21,9 @@ from ..backend.preferences import idle_seconds
 from ..check import preflight
 from ..check.preflight import redraw
 from ..pictures import previews
-from ..probe.own_blender import SERVER, own_blender
 from ..process import waiting_backend
 from ..process.job_process import JobProcess, Outcome
+from ..process.own_blender import SERVER, own_blender
 from ..process.progress_lines import Event
 from ..result import history, shown_result
 from ..result.job_result import JobResult, JobResultError, read_job_result, result_folders

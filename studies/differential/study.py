@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from ..parity.cycles_parity import render_job
+from ..warm_blender import warm_blenders
 from .compare import Difference, Picture, compare
 from .random_scene import GROUPS, PLAIN_WORDS, WORDS, Rig, build, drawn
-from .warm_blender import warm_blenders
 
 AGAIN = 4  # times as many samples, with other seeds, before a difference is believed
 FREE = ("specular_ior_level", "roughness", "base_color", "metallic", "alpha")  # no setting of the study links all

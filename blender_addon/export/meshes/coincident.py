@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..files.ply_file import TriangleMesh
 
-STEPS = 1 << 16  # across the whole scene; triangles that agree to one of these are looked at
+GRID_STEPS = 1 << 16  # across the whole scene; triangles that agree to one of these are looked at
 CLOSE = 1e-3  # of a triangle's longest side: corners so near are in the same place
 
 
@@ -67,7 +67,7 @@ def _in_place(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArra
 
 def _keys(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.int64]:
     """One number for each triangle of points in the unit cube, whichever corner comes first; others may share it."""
-    grid = np.round(points * STEPS).astype(np.int64)
+    grid = np.round(points * GRID_STEPS).astype(np.int64)
     mixed = (grid[:, 0] * 73856093) ^ (grid[:, 1] * 19349663) ^ (grid[:, 2] * 83492791)
     a, b, c = (mixed[corner] for corner in triangles.T)
     return (a + b + c) * 6364136223846793005 + a * b * c

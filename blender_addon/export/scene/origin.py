@@ -16,7 +16,7 @@ from .scene_data import SceneData, Shape
 # Metres. Mitsuba starts rays 9e-5 (1 + d) above a surface, d its distance from zero: a millimetre here. A ball of 1 m
 # on a floor was as in Cycles at 35 m, 0.07 % too dark at 117 m, 0.8 % at 1.2 km and 5.3 % at 5.8 km; moved, 0.03 %.
 # Of a smaller target it is so many times its size: one of 1 mm was 0.2 % too dark at 0.7 m
-FAR = 10.0
+FAR_AWAY = 10.0
 # Of a target's size: a ball of 2 m with subsurface loses 0.2 % of the picture's light in Cycles at 1 km, 0.7 % at 3 km
 # and 2.5 % at 10 km
 MOST_APART = 500.0
@@ -40,7 +40,7 @@ def scene_origin(
             if not (np.isfinite(middle).all() and size > SMALLEST):
                 return np.zeros(3)
             step = min(1.0, 2.0 ** np.floor(np.log2(size)))
-            is_far = min(eye, float(np.linalg.norm(middle))) > FAR * min(1.0, size)
+            is_far = min(eye, float(np.linalg.norm(middle))) > FAR_AWAY * min(1.0, size)
             return step * np.rint(middle / step) if is_far else np.zeros(3)
     return np.zeros(3)
 

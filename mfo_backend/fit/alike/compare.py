@@ -29,7 +29,7 @@ Vector = NDArray[np.float64]
 # Of a sentence on another material
 TOLD_FROM = 0.05  # its probability; rarer ones still widen the deviations
 SEEN_CHANGE = 0.05  # of a value's range
-MOST_NAMED = 4  # values in its sentence; no measurement
+MOST_TOLD = 4  # values in its sentence; no measurement
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: Paramete
         away = np.abs(rival.x - x) / (table.upper - table.lower)
         names = [name for name in table.names if _matters(name, x, rival.x, table)]
         change = {name: float(away[table.slice_of(name)].max()) for name in names}
-        told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > SEEN_CHANGE][:MOST_NAMED]
+        told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > SEEN_CHANGE][:MOST_TOLD]
         if rival.share < TOLD_FROM or not told:
             continue
         instead = ", ".join(

@@ -29,7 +29,7 @@ from ..tolerances import DETERMINED_BELOW, MODEL_ERROR, WEAK_BELOW
 Vector = NDArray[np.float64]
 
 INFLATION = 1.2  # where own noise in the derivatives is not known
-TOGETHER, MOST_NAMED = 0.5, 2  # correlation from which on two values move together; so many are named
+TOGETHER, MOST_TOGETHER = 0.5, 2  # correlation from which on two values move together; so many are named
 # Of the box: the root mean square distance of a uniform distribution over it from one of its ends, which is the largest
 # from any point. In 30 fits of Cycles' pictures 73 of 220 known values are called determined with it and 67 without,
 # one of them wrongly in both (docs/notebook/several_pictures.md). Smaller: more is promised of what values trade.
@@ -174,5 +174,5 @@ def _traded(spread: Vector, table: ParameterTable) -> dict[str, tuple[str, ...]]
         rows = correlation[table.slice_of(name)]
         shared = {other: float(rows[:, table.slice_of(other)].max()) for other in table.names if other != name}
         together = sorted((n for n, c in shared.items() if c > TOGETHER), key=lambda n: -shared[n])
-        found[name] = tuple(together[:MOST_NAMED])
+        found[name] = tuple(together[:MOST_TOGETHER])
     return found

@@ -45,10 +45,10 @@ TURNS = tuple(range(0, 360, 30))  # degrees; the first is the present camera
 LAMP_TURNS = (90, 180, 270)  # degrees
 SIDE = 80  # pixels along the longer side of a candidate, at most: some thousand see the target. No measurement
 GRID = 1  # squared: camera rays of a pixel. No measurement
-# So many of the best are recorded again with other random numbers and as fine as FINER squared: of 26 the best is one
-# that chance favours. A ray that met a narrow coat's highlight promised its weight to 0.0003 where 0.09 came of it
+# So many of the best are recorded again with other random numbers and as fine as GRID_AGAIN squared: of 26 the best is
+# one that chance favours. A ray that met a narrow coat's highlight promised its weight to 0.0003 where 0.09 came of it
 # (docs/notebook/several_pictures.md).
-LOOKED_AT_AGAIN, FINER = 3, 3
+LOOKED_AT_AGAIN, GRID_AGAIN = 3, 3
 # Times that they are recorded, of which the geometric mean counts: what few lanes of a narrow lobe tell scatters by
 # factors. Three recordings promised a coat's weight to 0.015, 0.061 and 0.31, and it came to 0.056
 # (docs/notebook/several_pictures.md). No other number was tried. Larger: more time.
@@ -198,7 +198,9 @@ def next_picture(scene: RecordedScene, known: Known, candidates: Candidates, see
         first = best_first(predictions(known, dict(_told(scene, known, candidates, center, seed)), table))
         some = (PRESENT, *first[:LOOKED_AT_AGAIN])
         again = [
-            predictions(known, dict(_told(scene, known, candidates, center, seed + k, grid=FINER, only=some)), table)
+            predictions(
+                known, dict(_told(scene, known, candidates, center, seed + k, grid=GRID_AGAIN, only=some)), table
+            )
             for k in range(1, 1 + RECORDED_AGAIN if first else 1)
         ]
         predicted = _typical(again)

@@ -28,7 +28,7 @@ FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
 # A recording that leaves pixels out: no more of them than this share; so many of the brightest are in it; and what
 # counts as lit, of the median of the target
-MOST_THINNED, BRIGHTEST, LIT = 0.6, 100, 0.01
+MOST_THINNED, MOST_BRIGHT, LIT = 0.6, 100, 0.01
 SMALL_TARGET = 16  # a target this small may lie between the rays of a coarser grid
 FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
 _AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
@@ -138,7 +138,7 @@ def thinned_grid(grid: NDArray[np.int64], reference: Pixels, mask: NDArray[np.bo
     # M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018): even whatever the share, without
     # the rows and columns that every n-th pixel may fall on
     kept = (0.7548776662466927 * x + 0.5698402909980532 * y) % 1.0 < share
-    bright = np.flatnonzero(mask)[np.argsort(value[mask])[-BRIGHTEST:]]
+    bright = np.flatnonzero(mask)[np.argsort(value[mask])[-MOST_BRIGHT:]]
     kept.reshape(-1)[bright] = True
     return np.where(kept & mask, grid, 0)
 

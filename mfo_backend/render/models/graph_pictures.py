@@ -25,7 +25,7 @@ Variant = tuple[Sequence[Value], Sequence[str]]  # all values of a graph, and th
 
 # Subpixels along a pixel of the pictures that a solve looks at: small pictures, and larger ones, whose evaluation takes
 # the longer. Each subpixel has one sample: four take half as long again and say no more (docs/notebook/graph_values.md)
-SMALL, LARGE = 4, 2
+SCALE_OF_SMALL, SCALE_OF_LARGE = 4, 2
 MOST_SUBPIXELS = 400_000  # of a small picture at its scale
 # Where normals change two subpixels are too few, and certainty does not know: values were 2 to 3 % off. Up to 256 x 256
 MOST_SUBPIXELS_OF_NORMALS = 1_050_000
@@ -115,7 +115,7 @@ class GraphPictures:
         self._fine_scale = fine
         turns = any(name in DIRECTIONS for value in values for name in value.sockets)
         most = MOST_SUBPIXELS_OF_NORMALS if turns else MOST_SUBPIXELS
-        self._scale = SMALL if pixels * SMALL**2 <= most else LARGE
+        self._scale = SCALE_OF_SMALL if pixels * SCALE_OF_SMALL**2 <= most else SCALE_OF_LARGE
         self.table = table_of(values)
         self._values, self._evaluate = tuple(values), evaluate
         changed = {name for value in values for name in value.sockets}

@@ -56,7 +56,7 @@ LANES_OF_A_WALK = 8
 # Extinctions that walks below the surface are recorded for, as multiples of the material's, near a solution and for the
 # first search. Wider: more noise; with 0.25 to 4 a plain material was taken for a coated one, as with others then
 NEAR_WALKS, FAR_WALKS = (1.0,), (0.5, 1.0, 2.0)
-DIRECT, DEEPEST = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
+DIRECT, DEEPEST_RECORDED = 2, 16  # path length of light that comes from lights alone, and of a scene without a limit
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class RecordedScene:
         """Named rules on what to trace: light kinds, and light over other surfaces by a probe of some rays."""
         scene, sampled = self.renderer.scene, self._walks or not self.lights_exact
         limit = int(getattr(self._integrator, "max_depth", DIRECT))
-        depth = DEEPEST if limit < 0 else min(limit, DEEPEST)
+        depth = DEEPEST_RECORDED if limit < 0 else min(limit, DEEPEST_RECORDED)
         if depth <= DIRECT:
             return SceneNeeds(sampled, DIRECT, ())
         width, height = (int(n) for n in scene.sensors()[0].film().crop_size())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from blender_addon.export.job import check_export
-from blender_addon.export.scene.origin import FAR
+from blender_addon.export.scene.origin import FAR_AWAY
 from mfo_backend.job.folder.job_folder import JobFolder
 from mfo_backend.job.folder.request import read_request
 
@@ -113,7 +113,8 @@ def test_what_hides_a_far_target_is_found(scene: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("distance", "height", "is_far"), [(0.9 * FAR, 0.5, False), (1.1 * FAR, 0.5, True), (0.0, 2.0 * FAR, False)]
+    ("distance", "height", "is_far"),
+    [(0.9 * FAR_AWAY, 0.5, False), (1.1 * FAR_AWAY, 0.5, True), (0.0, 2.0 * FAR_AWAY, False)],
 )
 def test_what_is_near_stays_where_it_is(distance: float, height: float, is_far: bool, scene: Any, export: Any) -> None:
     world_color(scene, 1.0)

@@ -10,11 +10,11 @@ import pytest
 
 from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded.where_to_look import (
-    BRIGHTEST,
     FINEST,
     GRID_DETAIL,
     GRID_EDGE,
     GRID_PLAIN,
+    MOST_BRIGHT,
     all_groups,
     detail_grid,
     edges_of_light,
@@ -132,7 +132,7 @@ def test_a_large_target_is_thinned_evenly_and_keeps_what_is_brightest():
     assert not kept[~mask].any()
     assert kept[300:310, 100:110].all()
     lit = mask & (image[:, :, 0] > 0.0)
-    assert np.square(thin)[lit].sum() == pytest.approx(80_000 + GRID_PLAIN**2 * BRIGHTEST, rel=0.01)
+    assert np.square(thin)[lit].sum() == pytest.approx(80_000 + GRID_PLAIN**2 * MOST_BRIGHT, rel=0.01)
     share = 80_000 / np.square(grid)[lit].sum()
     kept[300:310, 100:110] = False
     blocks = kept[10:390, 10:390].reshape(19, 20, 19, 20).sum(axis=(1, 3)) / 400

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Second Blenders that need no start: processes with bpy loaded, each of which answers one export after another.
 
-    python -m studies.differential.warm_blender serve SOCKET
-    python -m studies.differential.warm_blender relay PLACE WORD ...
+    python -m studies.warm_blender serve SOCKET
+    python -m studies.warm_blender relay PLACE WORD ...
 
 Loading bpy takes a second of each small scene. Each export opens a file of its own in them, as a new one would. The
 study starts both parts.
