@@ -35,7 +35,9 @@ KEPT_ANSWERS = 6  # answers that are kept
 # square: a tenth of what is seen, and a third of what a noisy reference hides
 EXTRAPOLATED = 1e-3
 LOOKED_AT = 20_000  # rows of two pictures whose slopes are compared
-HELD_TO = 0.1  # weight of what is held of an entry that never moved alone, beside 1 for a move; no measurement
+# Weight of what is held of an entry that never moved alone, beside 1 for a move. Evaluations of the nodes in fits of
+# ramp, hue and facing at 96 x 96: 24, 16, 25 with it and with 0.01; 24, 16, 32 with 1 (docs/notebook/graph_values.md)
+HELD_TO = 0.1
 MOST_TURNS = 10_000  # of the least squares; as many as there are entries are usual
 
 
