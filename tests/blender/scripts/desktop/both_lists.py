@@ -207,7 +207,7 @@ def story():
     for name in ("Left", "Right"):
         shown = [row.name for row in runtime().materials].index(f"{name} Paint")
         yield from press(f"mfo.show_material(index={shown})")
-        assert runtime().shown_material == shown
+        yield from until(lambda at=shown: runtime().shown_material == at, 10)
         assert runtime().material == f"{name} Paint"
         yield from shot(f"6_{name.lower()}")
     assert values() == start
