@@ -91,7 +91,8 @@ def copy_properties(owners: Iterable[bpy.types.ID | bpy.types.ViewLayer | None],
     """Give an ID the custom properties of others, which Attribute nodes look for; those of the last one win."""
     for owner in filter(None, owners):
         for key in owner.keys():  # noqa: SIM118  # Blender's custom properties have no iterator
-            if not hasattr(owner[key], "as_pointer"):
+            # before Blender 5 settings of add-ons, as Cycles' own, lie among them
+            if not hasattr(owner[key], "as_pointer") and key not in owner.bl_rna.properties:
                 into[key] = owner[key]
 
 

@@ -9,6 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.bake.stage import copy_properties
+
 from ..scenes import add_camera, add_quad, new_material, world_color
 
 CENTRE = np.s_[16, 16]  # of a picture of 32 x 32 pixels
@@ -102,3 +104,11 @@ def test_an_object_is_told_its_own_place(shown_by: str, stage: Any, export: Any,
     picture, (baked,) = shown_and_baked(told, target, export, render_cycles)
     np.testing.assert_allclose(picture[CENTRE][:3], (0.4, 0.3, 0.8), atol=1e-4)
     np.testing.assert_allclose(baked, picture[CENTRE][:3], atol=1e-4)
+
+
+def test_settings_that_an_older_blender_left_are_no_properties_of_the_user(scene: Any) -> None:
+    """Files saved before Blender 5 have Cycles' own among them, which no other may be given."""
+    owner, item = (bpy.data.objects.new(name, None) for name in ("Owner", "Item"))
+    owner["cycles"], owner["tint"] = {"use_deform_motion": 0}, 0.5
+    copy_properties((owner,), item)
+    assert dict(item.items()) == {"tint": 0.5}
