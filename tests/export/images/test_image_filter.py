@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.export.files.exr_file import write_exr
 from blender_addon.export.images.image_filter import divides_by_nothing, filtered_pixels
 from blender_addon.export.nodes.shader_graph import read_socket
 
@@ -160,11 +161,8 @@ def glow_of_floats(path: Path, color: float) -> Any:
     values = np.ones((8, 8, 4), np.float32)
     values[..., 3] = np.random.default_rng(5).random((8, 8)) < 0.6
     values[..., :3] = np.where(values[..., 3:] > 0.0, 0.5, color)
-    image = bpy.data.images.new("made", 8, 8, alpha=True, float_buffer=True)
-    image.pixels.foreach_set(values.ravel())
-    image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
-    image.save()
-    return bpy.data.images.load(image.filepath_raw)
+    write_exr(path, values)  # Blender before 5 encodes what it saves
+    return bpy.data.images.load(str(path))
 
 
 @pytest.mark.parametrize(
