@@ -165,7 +165,7 @@ def apply(chosen: argparse.Namespace) -> dict[str, Any]:
     if len(results) > 1 and chosen.material:
         raise HeadlessError("--material names one material, and the job has several: leave it out.")
     applied = [_put_values(bpy, chosen, folder) for folder in results]
-    _save(bpy, chosen.save_as)
+    _save(chosen.save_as)
     notes += [note for _, _, _, said in applied for note in said]
     material, _result, values, _ = applied[0]
     answer = {"saved": str(chosen.save_as), "material": material.name, "sockets": values, "notes": notes}
@@ -350,13 +350,13 @@ def _open(path: Path) -> Any:
     return bpy
 
 
-def _save(bpy: Any, path: Path) -> None:
+def _save(path: Path) -> None:
+    from .process.saved_file import save_over
+
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), copy=True, check_existing=False)
-    except RuntimeError as error:
-        raise HeadlessError(f"{path} cannot be written ({str(error).strip()}): choose another place.") from error
-    if not path.is_file():
-        raise HeadlessError(f"{path} cannot be written: choose another place.")
+        save_over(path.absolute())
+    except OSError as error:
+        raise HeadlessError(f"{path} cannot be written ({error.strerror or error}): choose another place.") from error
 
 
 def _arguments() -> list[str]:

@@ -16,8 +16,9 @@ from typing import Any
 from ..process.backend_python import EXTENSION_ROOT
 from ..process.background_task import environment_for
 from ..process.job_process import log_tail
-from ..process.own_blender import own_blender, save_copy
+from ..process.own_blender import own_blender
 from ..process.process_group import KILL, own_group, signal_group
+from ..process.saved_file import save_copy
 from ..process.temporary_folder import make_folder
 
 # a surface of 1024 texels takes up to 7 s of one core, a sky of 1024 pixels 5; a big file on a slow machine far more

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How to start this very Blender again, program or module, and a copy of the file for it."""
+"""How to start this very Blender again, program or module."""
 
 from __future__ import annotations
 
@@ -20,19 +20,3 @@ def own_blender(module: str, arguments: list[str]) -> list[str]:
     script = Path(__file__).resolve().parent.parent.joinpath(*module.split(".")).with_suffix(".py")
     options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", str(script), "--"]
     return [bpy.app.binary_path, *options, *arguments]
-
-
-def save_copy(path: Path) -> None:
-    """Write the file as it is now to `path`; the session keeps its name and its unsaved changes.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
-    except RuntimeError as error:
-        raise OSError(str(error).strip().removeprefix("Error: ")) from error
-    if not path.is_file():
-        raise OSError(f"{path} was not written")

@@ -22,6 +22,7 @@ from ..check.preflight import redraw
 from ..pictures import previews
 from ..process.backend_python import EXTENSION_ROOT, backend_environment
 from ..process.background_task import TASK_TICK, BackgroundTask, Step, environment_for
+from ..process.saved_file import save_copy
 from ..process.temporary_folder import make_folder
 from ..result import shown_result
 
@@ -150,10 +151,7 @@ def close() -> None:
 def _begin(folder: Path, steps: list[Step], done: Callable[[list[dict[str, Any]]], None]) -> None:
     global _current
     try:
-        try:
-            bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"), copy=True, check_existing=False)
-        except RuntimeError as error:
-            raise OSError(str(error).strip()) from error
+        save_copy(folder / "scene.blend")
         _current = _Running(BackgroundTask(steps, folder), folder, done)
     except OSError:
         shutil.rmtree(folder, ignore_errors=True)

@@ -16,7 +16,7 @@ from ...graph_values.mix_values import default_values, inside_values
 from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
 from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, plain_name
-from ...process.own_blender import save_copy
+from ...process.saved_file import save_copy
 from ..camera.camera_model import Region, edges_of
 from ..camera.render_region import picture_size
 from ..findings import ExportError, Findings
