@@ -42,10 +42,11 @@ def displaced_corners(
                 mesh.materials.append(materials[-1])
             mesh.polygons.foreach_set("material_index", np.clip(faces, 0, len(slots) - 1))  # clear() has set them to 0
             moving = [shown.original for shown in slots if shown is not None and moves_faces(shown.original)]
+            matrix = instance.matrix_world.copy()  # the item's own is not read as it is before Blender 5
             if not any(asked_of_place(material.node_tree) for material in moving):
                 # far from zero the kernel's places are coarse
-                stage.item.matrix_world = stage.item.matrix_world.to_3x3().to_4x4()
-            _keep_places(stage)
+                matrix = stage.item.matrix_world = matrix.to_3x3().to_4x4()
+            _keep_places(mesh, np.array(matrix, dtype=np.float64))
             stage.scene.cycles.samples = 1
             offsets = _baked(stage, materials, "up") - _baked(stage, materials, "down")
             normals = 2.0 * _baked(stage, materials, "normal") - 1.0
@@ -63,12 +64,10 @@ def displaced_corners(
             bpy.data.materials.remove(material)
 
 
-def _keep_places(stage: Stage) -> None:
+def _keep_places(mesh: Any, matrix: NDArray[np.float64]) -> None:
     """Give the mesh its places in the world before anything moves them, as an attribute."""
-    mesh: Any = stage.item.data
     places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     mesh.vertices.foreach_get("co", places)
-    matrix = np.array(stage.item.matrix_world, dtype=np.float64)
     places = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
     attribute = mesh.attributes.new(PLACE, "FLOAT_VECTOR", "POINT")
     attribute.data.foreach_set("vector", places.astype(np.float32).ravel())

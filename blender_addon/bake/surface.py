@@ -163,7 +163,7 @@ def _stage(
             layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
             layer.uv.foreach_set("vector", uv.reshape(-1))
             mesh.uv_layers.active = layer
-            corners = _add_tangents(mesh, uv, stage.item.matrix_world)
+            corners = _add_tangents(mesh, uv, instance.matrix_world)
             mesh.materials.clear()
             for number in range(last + 1):
                 mesh.materials.append(material if number == slot else blank)
