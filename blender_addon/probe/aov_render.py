@@ -180,6 +180,7 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
     try:
         put(render, "engine", "CYCLES")
         put(cycles, "device", "CPU")
+        put(cycles, "shading_system", False)  # Open Shading Language writes no outputs
         put(render, "resolution_percentage", 100)
         put(render, "resolution_x", width)
         put(render, "resolution_y", height)

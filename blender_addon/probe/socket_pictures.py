@@ -23,8 +23,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     names), its `sockets` and whether its `weight` is asked for, the `scale` in subpixels along a pixel, `samples`
     of each subpixel, the `folder` for the files, and how many `depths`: the first is what the camera sees, the
     second what it would see were that away, and so on; files have one below the other, and `far_side` asks for a
-    coarser second one; how many `depths` there are is answered, too. `region` is the left, top,
-    right and bottom of what the picture shows alone, in pixels of the frame, None for all; places count from
+    second one, coarser where pictures are large; how many `depths` there are is answered, too. `region` is the left,
+    top, right and bottom of what the picture shows alone, in pixels of the frame, None for all; places count from
     `origin`, zero if it is absent. Answered are for each of the `leaves` the `sockets` by name and the `weight`,
     each a `file` and its `mean` over what the camera sees; the file `positions`, and `camera`, the (3, 4) matrix
     from the world to columns and rows of the files. Colours are linear Rec.709, directions unit vectors of the

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..graph_values.place import Place, write
 from .aov_render import Frame, world_to_frame
 from .closure_tree import ClosureTree
-from .depths import FAR_SCALE, FAR_SIDE, joined_depths, peeled, with_far_side
+from .depths import FAR_SIDE, joined_depths, peeled, scale_of_far_side, with_far_side
 from .graph_copy import own_copy, remove_copy, variant_of
 from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
 from .server import ProbeRequestError
@@ -103,7 +103,7 @@ class VariantPictures:
     ) -> Surface:
         """Render the variants and hand on what each socket holds, in their order.
 
-        A picture shows `depths` one below the other, or with `far_side` a coarser one of it below the first.
+        A picture shows `depths` one below the other, or with `far_side` one of it below the first, coarser where large.
 
         Raises
         ------
@@ -153,8 +153,8 @@ class VariantPictures:
             some = variants[begin : begin + most]
             found, kinds = self._rendered(some, frame, depths)
             if far_side:
-                coarse = self.target.frame(FAR_SCALE, _outputs_of(some) * (FAR_SIDE + 1))
-                found = with_far_side(found, self._rendered(some, coarse, (FAR_SIDE,))[0])
+                behind = self.target.frame(scale_of_far_side(frame), _outputs_of(some) * (FAR_SIDE + 1))
+                found = with_far_side(found, self._rendered(some, behind, (FAR_SIDE,))[0])
             mask = found[MASK]
             seen = mask[..., 0] > SEEN
             if not seen.any():  # Cycles shows nothing of a material that is too large for it

@@ -80,19 +80,23 @@ class SeenSurface:
         width, height = dr.opaque(mi.Float, self.width), dr.opaque(mi.Float, self.height)
         inside = active & (w > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
         first = mi.UInt32(dr.select(inside, row, 0)) * mi.UInt32(width) + mi.UInt32(dr.select(inside, column, 0))
-        source, seen = self._at(first, point, inside)
+        # at a rim one subpixel holds both sides, each within the other's reach
+        source, seen, nearest = self._at(first, point, inside)
         for depth in range(1, self.depths):
             below = dr.opaque(mi.UInt32, depth * self.height * self.width)
-            here, is_here = self._at(first + below, point, inside & ~seen)
-            source, seen = dr.select(is_here, here, source), seen | is_here
+            here, is_here, apart = self._at(first + below, point, inside)
+            is_nearer = is_here & (~seen | (apart < nearest))
+            source, nearest = dr.select(is_nearer, here, source), dr.select(is_nearer, apart, nearest)
+            seen |= is_here
         return source, seen
 
-    def _at(self, index: mi.UInt32, point: mi.Point3f, active: Any) -> tuple[mi.UInt32, mi.Bool]:
-        """The same at one depth, where `index` is the subpixel that the point projects to."""
+    def _at(self, index: mi.UInt32, point: mi.Point3f, active: Any) -> tuple[mi.UInt32, mi.Bool, mi.Float]:
+        """The same at one depth, where `index` is the subpixel that the point projects to, and how far from there the
+        camera saw the surface."""
         source = dr.gather(mi.UInt32, self._source, index, active)
         known = active & (source != NOWHERE)
-        found = dr.gather(mi.Point3f, self._positions, index, known)
-        return source, known & (dr.norm(found - point) <= dr.gather(mi.Float, self._reach, index, known))
+        apart = dr.norm(dr.gather(mi.Point3f, self._positions, index, known) - point)
+        return source, known & (apart <= dr.gather(mi.Float, self._reach, index, known)), apart
 
 
 def _eye_of(camera: NDArray[np.float64]) -> NDArray[np.float64]:

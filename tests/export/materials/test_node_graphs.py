@@ -17,7 +17,7 @@ from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
 from mfo_backend.job.run.job_scene import request_materials  # noqa: E402
 
-from ..scenes import add_camera, add_light, new_material, world_color  # noqa: E402
+from ..scenes import add_camera, add_light, add_quad, new_material, world_color  # noqa: E402
 
 
 def ball(material: Any) -> Any:
@@ -172,6 +172,49 @@ def recorded_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[A
     groups = paths.pixel_groups(paths.interior)
     found = np.asarray(recorded.pictures(paths, groups)(renderer.start))[:, :, 0]
     return found, wanted.reshape(-1, 3)[groups.pixels]
+
+
+def test_a_mirror_aslant_shows_where_the_far_side_begins(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any
+) -> None:
+    """A ball that is white before and black from a sharp edge at its rim on, which a mirror shows from the side.
+
+    What lies just behind the rim had what the camera sees just before it: 8.5 % too bright.
+    """
+    lit_scene(scene)
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    scene.camera.data.lens, scene.cycles.max_bounces, scene.cycles.samples = 20.0, 2, 256
+    scene.cycles.diffuse_bounces = scene.cycles.glossy_bounces = 2
+    world_color(scene, 1.0)
+    mirror = add_quad("Mirror", 3.4, 0.0, new_material("Mirror", Metallic=1.0, Roughness=0.0))
+    mirror.location, mirror.rotation_euler = (2.3, 0.0, 0.0), (0.0, -np.pi / 4, 0.0)
+    material = new_material("Target", Specular_IOR_Level=0.0)
+    tree = material.node_tree
+    split, edge = tree.nodes.new("ShaderNodeSeparateXYZ"), tree.nodes.new("ShaderNodeMath")
+    edge.operation = "GREATER_THAN"
+    tree.links.new(coordinates(tree), split.inputs[0])
+    tree.links.new(split.outputs["Z"], edge.inputs[0])
+    edge.inputs[1].default_value = 0.625
+    tree.links.new(edge.outputs[0], principled(material).inputs["Base Color"])
+    renderer, wanted = renderer_and_cycles(export, render_cycles, ball(material))
+    found = np.mean([renderer.image(renderer.start, seed=seed, spp=256) for seed in range(4)], axis=0)
+    image = slice(13, 19), slice(19, 27)  # of the ball in the mirror
+    assert abs(found[image].mean() / wanted[image].mean() - 1.0) < 0.02
+
+
+def test_open_shading_language_evaluates_nodes_as_the_other(scene: Any, export: Any) -> None:
+    """It writes no outputs: no camera saw such a target."""
+    lit_scene(scene)
+    material = new_material("Target")
+    noise_ramp(material.node_tree, principled(material))
+    target, found = ball(material), []
+    for number, by_language in enumerate((False, True)):
+        scene.cycles.shading_system = by_language
+        report = export(target, name=f"job_{number}")
+        assert scene.cycles.shading_system == by_language
+        entry = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]
+        found.append(np.load(report.folder / entry["graph"]))
+    np.testing.assert_allclose(*found, atol=1e-6)
 
 
 def test_one_blender_evaluates_and_bakes(scene: Any, export: Any, monkeypatch: pytest.MonkeyPatch) -> None:

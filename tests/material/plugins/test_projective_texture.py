@@ -44,6 +44,24 @@ def test_a_point_has_the_value_of_its_subpixel(texture: Any) -> None:
     np.testing.assert_array_equal(found, [[0, 0, 0], [2, 3, 32], [1, 2, 21]])
 
 
+def test_of_two_sides_in_one_subpixel_the_nearer_counts(tmp_path: Path) -> None:
+    """At a rim each lies within the other's reach: a far side had the near one's values."""
+    from mfo_backend.material.plugins.projective_texture import register
+
+    register()
+    row, column = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    both = [np.stack([column + 0.5, row + 0.5, np.full_like(row, z)], axis=-1) for z in (0.0, 1.5)]
+    np.save(tmp_path / "positions.npy", np.concatenate(both))
+    values = np.repeat(np.array((1.0, 2.0), np.float32), HEIGHT)[:, None, None]
+    np.save(tmp_path / "values.npy", np.broadcast_to(values, (2 * HEIGHT, WIDTH, 1)))
+    texture = mi.load_dict({
+        "type": "projective", "filename": str(tmp_path / "values.npy"), "camera": CAMERA, "depths": 2,
+        "positions": str(tmp_path / "positions.npy"), "outside": 7.0,
+    })  # fmt: skip
+    found = at(texture, *((2.5, 1.5, z) for z in (-0.5, 0.0, 0.7, 0.8, 1.5, 2.0, 9.0)))
+    np.testing.assert_array_equal(found[:, 0], [1, 1, 1, 2, 2, 2, 7])
+
+
 def test_just_beside_the_surface_a_neighbour_counts(texture: Any) -> None:
     np.testing.assert_array_equal(at(texture, (3.2, 1.5, 0.0)), [[2, 1, 12]])
 
