@@ -70,7 +70,7 @@ class CyclesPath(RBIntegrator):
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out. In a scene whose
         lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
         drawn; it has no derivatives. With `walked` somebody else adds what comes from below the first hit
-        (`exit_light`).
+        (`exit_light`), for camera rays that behind cut-outs.
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
@@ -114,7 +114,10 @@ class CyclesPath(RBIntegrator):
             valid |= (bounce == 0) & si.is_valid()
             last = mi.Bool(shadows.ends(si, passages))  # its own light still counts
             si = seen_side(scene, si)
-            without = dr.select(bounce == int(before is not None), float(walked), 0.0)
+            by_others = bounce == 0
+            if dr.hint(before is not None, mode="scalar"):  # cut-outs behind a bounce are not looked through
+                by_others = (bounce == 1) & (passages == 0)
+            without = dr.select(by_others, float(walked), 0.0)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
             bsdf = si.bsdf(ray)
             if dr.hint(absorption, mode="scalar"):

@@ -12,7 +12,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from ..scenes import add_camera, add_light, new_material  # noqa: E402
+from ..scenes import add_camera, add_light, add_quad, new_material  # noqa: E402
 from .test_node_graphs import ball, principled, renderer_and_cycles  # noqa: E402
 
 SAMPLES, RECORDINGS = 256, 4
@@ -173,3 +173,24 @@ def test_a_mix_from_another_camera_is_what_its_own_camera_sees(
         groups = paths.pixel_groups(paths.interior)
         levels.append(np.asarray(recorded.evaluator(paths, groups)(renderer.start))[:, :, 0].mean(axis=0))
     np.testing.assert_allclose(levels[1], levels[0], rtol=0.03)  # noise of blue is 1.4 % in each
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.5])
+def test_wax_behind_a_cut_out(scene: Any, export: Any, render_cycles: Any, mitsuba: Any, alpha: float) -> None:
+    """A sheet to fit of which one half is cut out, and a ball of wax behind it: nothing of the wax came through."""
+    lit(scene)
+    ball(new_material("Wax", Roughness=1.0, Specular_IOR_Level=0.0, **VALUES))
+    material = new_material("Sheet", Base_Color=(0.2, 0.2, 0.2), Roughness=0.8)
+    tree = material.node_tree
+    split, edge = tree.nodes.new("ShaderNodeSeparateXYZ"), tree.nodes.new("ShaderNodeMapRange")
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], split.inputs[0])
+    tree.links.new(split.outputs["X"], edge.inputs["Value"])
+    edge.interpolation_type = "STEPPED"
+    edge.inputs["Steps"].default_value, edge.inputs["To Min"].default_value = 1.0, 1.0
+    edge.inputs["To Max"].default_value = alpha
+    tree.links.new(edge.outputs[0], principled(material).inputs["Alpha"])
+    sheet = add_quad("Sheet", 1.2, 1.3, material)
+    renderer, wanted = renderer_and_cycles(export, render_cycles, sheet)
+    found = np.mean([renderer.image(renderer.start, seed=seed, spp=SAMPLES) for seed in range(RECORDINGS)], axis=0)
+    open_half = slice(12, 20), slice(17, 22)
+    np.testing.assert_allclose(found[open_half].mean(axis=(0, 1)), wanted[open_half].mean(axis=(0, 1)), rtol=0.03)
