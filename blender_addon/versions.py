@@ -198,6 +198,14 @@ def rounds_beside_flat_faces() -> bool:
     return bpy.app.version < (5, 2, 0)
 
 
+def keeps_data_below_subdivision() -> bool:
+    """Whether in renders a Subdivision that is the last modifier keeps the custom properties of the mesh.
+
+    Blender 4.3 loses them, 5.0 and 5.2 keep them; what is between was not tried.
+    """
+    return bpy.app.version >= (5, 0, 0)
+
+
 def save_as_multilayer(settings: bpy.types.ImageFormatSettings) -> None:
     """Let renders be written as uncompressed 32-bit multilayer EXR (a media type of its own from Blender 5.0 on)."""
     if hasattr(settings, "media_type"):

@@ -153,7 +153,7 @@ def _lamp_stage(
         data.color, data.energy, data.use_shadow = (1.0, 1.0, 1.0), 1.0, False
         if hasattr(data, "use_temperature"):  # Blender 4.5
             data.use_temperature = False
-        with alone(scene, instance.object, lamp) as stage:
+        with alone(scene, instance, lamp) as stage:
             stage.cycles.samples, stage.cycles.light_sampling_threshold = 1, 0.0
             settings = stage.render.bake
             settings.target = "VERTEX_COLORS"

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import bpy
 from mathutils import Matrix
 
+from ..versions import keeps_data_below_subdivision
+
 NAME = "material_fit_bake"
 PLACE = (  # an object's own, by which Attribute nodes may ask
     "rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale",
@@ -35,7 +37,7 @@ def staged(
     item, carrier = bpy.data.objects.new(NAME, mesh), bpy.data.objects.new(NAME, None)
     try:
         _put_there(item, carrier, instance.object, matrix)
-        with alone(scene, instance.object, item) as stage:
+        with alone(scene, instance, item) as stage:
             yield Stage(stage, item)
     finally:
         bpy.data.objects.remove(item)
@@ -44,16 +46,20 @@ def staged(
 
 
 @contextmanager
-def alone(scene: bpy.types.Scene, shown: bpy.types.Object, item: bpy.types.Object) -> Iterator[bpy.types.Scene]:
-    """A scene with nothing but `item`, whose nodes find what those of a depsgraph's object do, for Cycles to bake in.
+def alone(
+    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object
+) -> Iterator[bpy.types.Scene]:
+    """A scene with nothing but `item`, whose nodes find what those of a depsgraph's instance do, for Cycles to bake in.
 
     Its name is that of the original meanwhile.
     """
+    shown, color = instance.object, color_of(instance)
     original = shown.original
     window, stage = bpy.context.window, bpy.data.scenes.new(NAME)
     before, view_layer, name = window.scene, window.view_layer, original.name
     try:
         _copy_what_nodes_ask_for(shown, item)
+        item.color = color
         stage.collection.objects.link(item)
         stage.camera = scene.camera
         copy_properties((scene.world, scene, view_layer), stage)
@@ -66,6 +72,15 @@ def alone(scene: bpy.types.Scene, shown: bpy.types.Object, item: bpy.types.Objec
         item.name = NAME
         original.name = name
         bpy.data.scenes.remove(stage)
+
+
+def color_of(instance: bpy.types.DepsgraphObjectInstance) -> tuple[float, ...]:
+    """The colour that Object Info gives: an instance has that of its instancer.
+
+    `instance.object` has it, too, but where Python knows the object that is shown already and answers with that.
+    """
+    shown = instance.parent if instance.is_instance and instance.parent is not None else instance.object
+    return tuple(shown.color)
 
 
 def bake(stage: Stage, kind: str) -> None:
@@ -119,14 +134,35 @@ def _copy_what_nodes_ask_for(shown: bpy.types.Object, item: bpy.types.Object) ->
         mesh.use_auto_texspace = False
         mesh.texspace_location = original.data.texspace_location
         mesh.texspace_size = original.data.texspace_size
-    item.pass_index, item.color = original.pass_index, shown.color  # an instance has its instancer's colour
-    # Attribute finds those of the data after those of the object; a modifier that makes a new mesh has none
-    data = shown.data if len(original.modifiers) else original.data
+    item.pass_index = original.pass_index
     copy_properties((original,), item)
-    copy_properties((data,), item.data)
+    _copy_properties_of_data(shown, item.data)
     name = original.name  # Object Info's Random is made of it
     original.name = "material_fit_original"
     item.name = name
+
+
+def _copy_properties_of_data(shown: bpy.types.Object, into: bpy.types.ID) -> None:
+    """Give an ID the custom properties of what a depsgraph's object shows; a modifier that makes a new mesh has none.
+
+    Attribute finds them after those of the object.
+    """
+    original = shown.original
+    rendered = [modifier for modifier in original.modifiers if modifier.show_render]
+    if not (rendered and rendered[-1].type == "SUBSURF" and keeps_data_below_subdivision()):
+        copy_properties((shown.data if rendered else original.data,), into)
+        return
+    before = original.copy()
+    apart = bpy.data.scenes.new(NAME)
+    try:
+        before.modifiers.remove(before.modifiers[rendered[-1].name])
+        apart.collection.objects.link(before)
+        layer = apart.view_layers[0]
+        layer.update()
+        copy_properties((before.evaluated_get(layer.depsgraph).data,), into)
+    finally:
+        bpy.data.scenes.remove(apart)
+        bpy.data.objects.remove(before)
 
 
 def _set_up(stage: bpy.types.Scene, scene: bpy.types.Scene) -> None:

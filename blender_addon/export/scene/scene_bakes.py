@@ -18,6 +18,7 @@ from ...bake.bake_cache import cache_folder
 from ...bake.baker import BakeError, Baker
 from ...bake.panorama import ALIKE, LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
+from ...bake.stage import color_of
 from ...probe.client import Probe
 from ...probe.light_path import OF_CAMERA
 from ...versions import node_tree_of
@@ -279,7 +280,7 @@ def _own(surface: Surface) -> Own:
     """What a bake of a surface hangs on of its instance: its colour, and all, or for bent normals proportions, size,
     and mirroring."""
     tree = node_tree_of(surface.material)
-    color = tuple(surface.instance.object.color) if asked_for(tree, OF_INSTANCER_COLOR) else ()
+    color = color_of(surface.instance) if asked_for(tree, OF_INSTANCER_COLOR) else ()
     return (*color, *_own_of_place(surface, tree))
 
 
