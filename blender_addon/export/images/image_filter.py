@@ -39,9 +39,10 @@ def filtered_pixels(
     """
     encoded = not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
     pixels = read_encoded(image) if encoded and not image.is_float else read_pixels(image)
+    if image.is_float:
+        encoded &= _is_read_by_cycles(image)  # what Blender gives it is decoded
     if image.is_float and _is_multiplied(image, pixels):
         pixels[:, :, :3] = _multiplied_floats(image, pixels)
-        encoded &= _is_read_by_cycles(image)  # what Blender gives it is decoded
     if encoded and image.is_float:  # of which Blender keeps linear numbers
         pixels[:, :, :3] = linear_to_srgb(pixels[:, :, :3])
     pixels = _with_alpha(image, pixels, alpha_read)

@@ -23,6 +23,9 @@ TEXTURED = {
     "Transmission Weight": "spec_trans",
 }
 FLIP_V = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+# Of v from the top: what lies on the edge between two pixels, as all of a mesh without a UV map, has the upper one in
+# Blender, and would have the lower one
+BELOW_EDGE = 1e-6
 
 
 def bsdf_element(
@@ -166,9 +169,11 @@ def _value(name: str, value: Any, texture: Texture | None, save: Callable[[Textu
 def texture_element(name: str, texture: Texture, path: str) -> Element:
     """Return the `<texture>`; the meshes carry 1 - v because Mitsuba counts rows from the top."""
     element = bitmap(name, path, extension=texture.wrap, filter_type=texture.filter_type)
-    if not np.allclose(texture.uv_matrix, np.eye(3)):
+    nearest = texture.filter_type == "nearest"
+    if nearest or not np.allclose(texture.uv_matrix, np.eye(3)):
         # Mitsuba 3.9 takes rotation and scale from the upper left 2x2, the translation from the fourth column
         flat = FLIP_V @ texture.uv_matrix @ FLIP_V
+        flat[1, 2] -= BELOW_EDGE if nearest else 0.0
         matrix = np.eye(4)
         matrix[:2, :2], matrix[:2, 3] = flat[:2, :2], flat[:2, 2]
         add(element, transform("to_uv", matrix))
