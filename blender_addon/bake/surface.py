@@ -345,7 +345,7 @@ def _emits(tree: bpy.types.NodeTree) -> bool:
         if node.bl_idname == EMISSION:
             return True
         strength = node.inputs.get("Emission Strength")
-        if strength is not None and (strength.is_linked or strength.default_value > 0.0):
+        if strength is not None and (strength.is_linked or strength.default_value != 0.0):
             return True
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and _emits(node.node_tree):
             return True

@@ -169,7 +169,11 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
     if bakes is not None:
         bakes.finish(data, findings)
     for material in data.materials.values():
-        if any(leaf.model == "emission" and takes_light(leaf.emission) for leaf in (material, *material.leaves)):
+        # a Principled BSDF that would take light gives none, but by Open Shading Language
+        leaves = [
+            leaf for leaf in (material, *material.leaves) if leaf.model == "emission" or data.settings.open_shading
+        ]
+        if any(takes_light(leaf.emission) for leaf in leaves):
             refuse_dark(material.name, findings)
     for shape in data.emitting:
         if shape.linked:

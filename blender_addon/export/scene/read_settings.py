@@ -41,7 +41,8 @@ def read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
     depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
     exposure = cycles.film_exposure
     film = scene.render.film_transparent
-    return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, cycles.use_light_tree)
+    others = cycles.use_light_tree, cycles.shading_system
+    return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, *others)
 
 
 def name_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, findings: Findings) -> None:

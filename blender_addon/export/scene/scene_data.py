@@ -60,7 +60,8 @@ class RenderSettings:
     """What the picture needs beside the scene. `exposure` is Cycles' film exposure, already in every light.
 
     `light_paths` is that object of request.json: what Cycles does to indirect light. With a `light_tree` Cycles
-    chooses among lights by what they give without their nodes.
+    chooses among lights by what they give without their nodes. By `open_shading` (OSL) a Principled BSDF may take light
+    away.
     """
 
     pixel_filter: PixelFilter
@@ -70,6 +71,7 @@ class RenderSettings:
     spp: int
     light_paths: dict[str, float | int] = field(default_factory=dict)
     light_tree: bool = False
+    open_shading: bool = False
 
 
 @dataclass

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from blender_addon.export.job import check_export
+from blender_addon.export.job import ExportError, check_export
 
 from ..scenes import add_camera, add_light, add_quad, diffuse_material, new_material, world_color
 
@@ -102,6 +102,31 @@ def test_portal_and_negative_light(scene: Any) -> None:
     assert check_export(bpy.context, target)[0] == [
         "Light 'Light' takes light away (negative power or colour): make it positive."
     ]
+
+
+@pytest.mark.parametrize("shown", ["target", "baked", "plain"])
+def test_open_shading_language_lets_a_principled_bsdf_take_light(
+    shown: str, scene: Any, export: Any, render_cycles: Any
+) -> None:
+    """Its emission below zero is none without that; nothing was said, and a picture was 17 to 130 % too bright."""
+    target = floor()
+    world_color(scene, 1.0)
+    dark = target if shown == "target" else add_quad("Dark", 0.4, 0.5, new_material("Dark", Emission_Strength=-0.9))
+    dark.location.x += 0.5
+    tree = dark.data.materials[0].node_tree
+    scene.cycles.samples = 4
+    shader = tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+    shader.inputs["Emission Strength"].default_value = -0.9
+    shader.inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    if shown == "baked":
+        noise = tree.nodes.new("ShaderNodeTexNoise")
+        tree.links.new(noise.outputs["Color"], shader.inputs["Base Color"])
+    assert render_cycles().min() >= 0.0
+    export(target)
+    scene.cycles.shading_system = True
+    assert render_cycles().min() < 0.0
+    with pytest.raises(ExportError, match="takes light away"):
+        export(target, name="open")
 
 
 @pytest.mark.parametrize("case", CASES)
