@@ -139,8 +139,9 @@ def _few_in_viewport(kind: str) -> Callable[[Rig, Draw], None]:
     return put
 
 
-def _children(rig: Rig, _: Draw) -> None:
+def _children(rig: Rig, _: Draw, seed: int = 0) -> None:
     system = rig.floor.modifiers.new("Clumps", "PARTICLE_SYSTEM").particle_system
+    system.seed = seed
     made = system.settings
     made.type, made.count, made.particle_size, made.use_advanced_hair = "HAIR", 4, 0.06, True
     made.render_type, made.instance_object = "OBJECT", rig.box
@@ -149,7 +150,7 @@ def _children(rig: Rig, _: Draw) -> None:
 
 
 def _simplified_children(rig: Rig, draw: Draw) -> None:
-    _children(rig, draw)
+    _children(rig, draw, seed=1)  # beside those of the other setting
     render = rig.scene.render
     render.use_simplify, render.simplify_child_particles, render.simplify_child_particles_render = True, 1.0, 0.5
 
@@ -164,6 +165,7 @@ def _emitter_hidden(rig: Rig, draw: Draw) -> None:
     made = system.settings
     made.type, made.count, made.particle_size, made.use_advanced_hair = "HAIR", 8, 0.3, True
     made.render_type, made.instance_object = "OBJECT", rig.box
+    made.size_random = 0.5  # no two tops in one plane
     carrier.show_instancer_for_render = False
 
 

@@ -106,7 +106,7 @@ def _shown_again(rig: Rig, _: Draw) -> None:
         carriers.append(empty)
     carriers[0].visible_camera = carriers[0].visible_shadow = False
     outer.objects.link(carriers[0])
-    carriers[1].location, carriers[1].scale = (1.5, -1.0, 0.4), (0.7, 0.7, 0.7)
+    carriers[1].location, carriers[1].scale = (1.3, -1.7, 0.37), (0.6, 0.7, 0.7)
     rig.scene.collection.objects.link(carriers[1])
 
 
