@@ -70,7 +70,7 @@ class CyclesPath(RBIntegrator):
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out. In a scene whose
         lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
         drawn; it has no derivatives. With `walked` somebody else adds what comes from below the first hit
-        (`exit_light`), for camera rays that behind cut-outs.
+        (`exit_light`); for camera rays that is the first behind cut-outs.
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
