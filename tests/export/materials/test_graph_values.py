@@ -49,7 +49,7 @@ def bent_twice(tree: Any, node: Any) -> None:
     )
     waves.inputs["Scale"].default_value = 1.0
     displaced.inputs["Scale"].default_value = 0.2
-    tree.links.new(waves.outputs["Factor"], displaced.inputs["Height"])
+    tree.links.new(waves.outputs[1], displaced.inputs["Height"])
     tree.links.new(displaced.outputs[0], tree.get_output_node("CYCLES").inputs["Displacement"])
     tree.links.new(bumped.outputs[0], node.inputs["Coat Normal"])
 
