@@ -178,6 +178,16 @@ def counts_passages_exactly() -> bool:
     return bpy.app.version >= (5, 0, 0)
 
 
+def alpha_is_by_setting() -> bool:
+    """Whether an image's Alpha says what Cycles multiplies by alpha; before Blender 5.2 the image's file says it."""
+    return bpy.app.version >= (5, 2, 0)
+
+
+def reads_webp_multiplied() -> bool:
+    """Whether OpenImageIO gives Cycles the colours of a WebP times their alpha, as it did before 3.0.7."""
+    return bpy.app.oiio.version < (3, 0, 7)
+
+
 def is_module() -> bool:
     """Whether Blender is a module of this Python, not a program."""
     return not bpy.app.binary_path

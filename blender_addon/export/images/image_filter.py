@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .color_space import linear_to_srgb, srgb_to_linear
+from .image_alpha import as_cycles_has_it, blend, is_read_by_cycles, multiplies
 from .image_pixels import SRGB_NAMES, UnreadableImageError, is_data, read_encoded, read_pixels
 
 MOST_PIXELS = 1 << 22  # of a finer grid; 2048 squared, 50 MB of colours
@@ -39,16 +40,13 @@ def filtered_pixels(
     """
     encoded = not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
     pixels = read_encoded(image) if encoded and not image.is_float else read_pixels(image)
-    if image.is_float:
-        encoded &= _is_read_by_cycles(image)  # what Blender gives it is decoded
-    if image.is_float and _is_multiplied(image, pixels):
-        pixels[:, :, :3] = _multiplied_floats(image, pixels)
+    pixels, blended = as_cycles_has_it(image, pixels)
+    if image.is_float and not is_read_by_cycles(image):
+        encoded = False  # Cycles does not decode what Blender has decoded
     if encoded and image.is_float:  # of which Blender keeps linear numbers
-        pixels[:, :, :3] = linear_to_srgb(pixels[:, :, :3])
-    pixels = _with_alpha(image, pixels, alpha_read)
-    divided = alpha_read and interpolation != "Closest" and _is_multiplied(image, pixels)
-    if divided:
-        pixels = np.concatenate([pixels[:, :, :3] * pixels[:, :, 3:], pixels[:, :, 3:]], axis=2)
+        pixels = np.concatenate([linear_to_srgb(pixels[:, :, :3]), pixels[:, :, 3:]], axis=2)
+    pixels = blend(image, pixels) if blended else pixels
+    divided = alpha_read and blended
     steps = _steps(pixels)
     if steps > 1 and interpolation in ("Cubic", "Smart"):
         pixels = _finer(pixels, steps, wrap, _cubic)
@@ -79,62 +77,16 @@ def equirectangular_pixels(image: bpy.types.Image, interpolation: str) -> Pixels
 
 def divides_by_nothing(image: bpy.types.Image, interpolation: str) -> bool:
     """Whether Cycles, where a node's Alpha is linked, divides colours that are there by an alpha that is almost 0."""
-    if not image.is_float or interpolation == "Closest":  # bytes are multiplied, and there is nothing between pixels
+    if interpolation == "Closest" or multiplies(image):  # there is nothing between pixels, or less where alpha is 0
         return False
     try:
-        pixels = read_encoded(image)
+        pixels, blended = as_cycles_has_it(image, read_encoded(image))
     except UnreadableImageError:
         return False
-    if not _is_multiplied(image, pixels):
+    if not blended:
         return False
-    color = _multiplied_floats(image, pixels).max(axis=2)
+    color = pixels[:, :, :3].max(axis=2)
     return bool(((color > LEAST_COLOUR) & (color > MOST_DIVIDED * pixels[:, :, 3])).any())
-
-
-def _is_read_by_cycles(image: bpy.types.Image) -> bool:
-    """Whether Cycles reads the file of an image itself, and does not ask Blender for pixels."""
-    return image.source == "FILE" and image.packed_file is None
-
-
-def _multiplied_floats(image: bpy.types.Image, pixels: Pixels) -> Pixels:
-    """The colours of floats that Cycles takes for multiplied by alpha: of a file as it holds them, whatever its Alpha
-    says to Blender."""
-    return _as_stored(image) if _is_read_by_cycles(image) else pixels[:, :, :3]
-
-
-def _with_alpha(image: bpy.types.Image, pixels: Pixels, alpha_read: bool) -> Pixels:
-    """Colours as Cycles' node gives them: times alpha unless its Alpha is linked."""
-    mode = image.alpha_mode
-    if mode == "NONE":
-        return np.concatenate([pixels[:, :, :3], np.ones_like(pixels[:, :, 3:])], axis=2)
-    alpha = pixels[:, :, 3:]
-    if not _is_multiplied(image, pixels):
-        return pixels
-    color = pixels[:, :, :3]
-    # Cycles takes the file's colours as if they were not multiplied; Blender divides, and clips to 1
-    if mode == "PREMUL" and not image.is_float and _is_read_by_cycles(image):
-        color = _as_stored(image)
-    if image.is_float and alpha_read:  # floats are multiplied by alpha already
-        color = np.divide(color, alpha, out=color.copy(), where=alpha > 0.0)
-    elif not image.is_float and not alpha_read:
-        color = color * alpha
-    return np.concatenate([color, alpha], axis=2)
-
-
-def _is_multiplied(image: bpy.types.Image, pixels: Pixels) -> bool:
-    """Whether Cycles filters a picture's colours times an alpha that is not 1 everywhere."""
-    straight = is_data(image) or image.alpha_mode in ("CHANNEL_PACKED", "NONE")
-    return not straight and bool((pixels[:, :, 3] != 1.0).any())
-
-
-def _as_stored(image: bpy.types.Image) -> Pixels:
-    """Colours of a file without the division by alpha."""
-    copy = image.copy()
-    try:
-        copy.alpha_mode = "CHANNEL_PACKED"
-        return (read_pixels if image.is_float else read_encoded)(copy)[:, :, :3]
-    finally:
-        bpy.data.images.remove(copy)
 
 
 def _steps(pixels: Pixels) -> int:

@@ -15,6 +15,7 @@ from typing import BinaryIO
 START = 1 << 20  # bytes that are read; a JPEG may have thumbnails and profiles before its size
 _PNG = b"\x89PNG\r\n\x1a\n"
 _DIRECTORY = 4096  # bytes of a TIFF's first directory, of 12 an entry; cameras write some 40 entries
+_STRAIGHT = 2  # of a TIFF's ExtraSamples: an alpha that colours are not multiplied by
 _EXR_DEPTH = {0: "32-bit integer", 1: "16-bit float", 2: "32-bit float"}
 
 
@@ -23,7 +24,7 @@ class PictureHeader:
     """Format and, where they were found, width and height in pixels (else 0) and the depth of a channel in words.
 
     `orientation` is EXIF's, 1 for as stored. `space` (a name of the Color Interop Forum) and `primaries` (CIE xy of
-    red, green, blue and white) are what an OpenEXR says of its colours.
+    red, green, blue and white) are what an OpenEXR says of its colours. `has_straight_alpha` is what a TIFF says.
     """
 
     kind: str
@@ -33,6 +34,7 @@ class PictureHeader:
     orientation: int = 1
     space: str = ""
     primaries: tuple[float, ...] = ()
+    has_straight_alpha: bool = False
 
 
 def read_header(path: Path) -> PictureHeader | None:
@@ -133,7 +135,8 @@ def _radiance(data: bytes) -> PictureHeader:
 
 def _tiff(data: bytes) -> PictureHeader:
     values = _tags(data)
-    return PictureHeader("TIFF", values.get(256, 0), values.get(257, 0), orientation=values.get(274, 1))
+    size, straight = (values.get(256, 0), values.get(257, 0)), values.get(338) == _STRAIGHT
+    return PictureHeader("TIFF", *size, orientation=values.get(274, 1), has_straight_alpha=straight)
 
 
 def _orientation(exif: bytes) -> int:

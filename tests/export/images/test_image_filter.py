@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
+import PIL.Image
 import pytest
 
 from blender_addon.export.files.exr_file import write_exr
@@ -94,6 +97,54 @@ def test_floats_are_multiplied_as_cycles_takes_them(
     theirs = shown_by_cycles(scene, image, "Closest", alpha_read, render_cycles)
     ours = filtered_pixels(image, "Closest", "repeat", alpha_read=alpha_read)
     assert blocks(theirs, 8) == pytest.approx(blocks(ours, 8), rel=2e-3)  # half floats; Straight was a quarter
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("alpha_read", [False, True])
+@pytest.mark.parametrize("kind", ["PNG of 16 bits", "WebP", "straight TIFF of 16 bits", "multiplied TIFF of 8 bits"])
+def test_a_file_says_itself_what_is_multiplied(
+    kind: str, alpha_read: bool, mode: str, scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    """By OpenImageIO a PNG has straight colours however many bits it has, and a WebP multiplied ones."""
+    image = bpy.data.images.load(str(saved(tmp_path, kind)))
+    assert image.is_float == kind.endswith("16 bits")
+    image.colorspace_settings.name, image.alpha_mode = "sRGB", mode
+    theirs = shown_by_cycles(scene, image, "Closest", alpha_read, render_cycles)
+    ours = filtered_pixels(image, "Closest", "repeat", alpha_read=alpha_read)
+    assert blocks(theirs, 8) == pytest.approx(blocks(ours, 8), rel=4e-3, abs=1e-4)  # half floats of the file
+
+
+def saved(folder: Path, kind: str) -> Path:
+    """Random sRGB colours at alphas of 1, 0.502 and 0.251 as another program would write them."""
+    numbers = np.full((8, 8, 4), 255, np.uint8)
+    numbers[..., :3] = np.random.default_rng(3).integers(20, 256, (8, 8, 3))
+    numbers[:, 4:, 3], numbers[:2, 4:, 3] = 128, 64
+    path = folder / ("picture." + {"P": "png", "W": "webp"}.get(kind[0], "tif"))
+    if kind == "WebP":
+        PIL.Image.fromarray(numbers).save(path, lossless=True, exact=True)
+    elif kind.startswith("PNG"):
+        rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in numbers * np.uint16(257))
+        size = struct.pack(">IIBBBBB", 8, 8, 16, 6, 0, 0, 0)
+        parts = ((b"IHDR", size), (b"IDAT", zlib.compress(rows)), (b"IEND", b""))
+        chunks = [struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in parts]
+        path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))
+    else:
+        path.write_bytes(tiff(numbers * np.uint16(257), 2) if kind.startswith("straight") else tiff(numbers, 1))
+    return path
+
+
+def tiff(numbers: np.ndarray, extra: int) -> bytes:
+    """An uncompressed picture in one strip; an `extra` of 2 says that its alpha is straight, 1 that it is not."""
+    height, width, channels = numbers.shape
+    data, bits = numbers.astype(numbers.dtype.newbyteorder("<")).tobytes(), 8 * numbers.itemsize
+    of_bits = struct.pack("<4H", bits, bits, bits, bits)
+    tags = [
+        (256, 3, 1, width), (257, 3, 1, height), (258, 3, 4, 8), (259, 3, 1, 1), (262, 3, 1, 2),
+        (273, 4, 1, 8 + len(of_bits)), (277, 3, 1, channels), (278, 3, 1, height), (279, 4, 1, len(data)),
+        (338, 3, 1, extra),
+    ]  # fmt: skip
+    directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", *tag) for tag in tags) + bytes(4)
+    return b"II*\0" + struct.pack("<I", 8 + len(of_bits) + len(data)) + of_bits + data + directory
 
 
 @pytest.mark.parametrize("packed", [False, True])
