@@ -96,6 +96,7 @@ SCENE = {
     "Their light changes with the distance in another way in each direction.": "Leur lumière change avec la distance autrement dans chaque direction.",
     "Light '{}' is a portal, which gives no light of its own; it is left out.": "La lumière '{}' est un portail, qui ne donne pas de lumière à lui ; elle est omise.",
     "Light '{}' is hidden from {} rays; in the fit it is not.": "La lumière '{}' est cachée aux rayons {} ; dans l'ajustement elle ne l'est pas.",
+    "Light '{}' is sheared by its parents: clear the parent's non-uniform scale.": "La lumière '{}' est cisaillée par ses parents : enlever leur échelle inégale.",
     "Light '{}' is scaled or sized to nothing: give it a size and a scale above 0.": "La lumière '{}' est réduite à rien : lui donner une taille et une échelle au-dessus de 0.",
     "Light '{}' is without Multiple Importance Sampling: mirrors do not show it in Cycles, but in the fit they do.": "La lumière '{}' est sans Multiple Importance Sampling : les miroirs ne la montrent pas dans Cycles, mais la montrent dans l'ajustement.",
     "Light '{}' takes light away (negative power or colour): make it positive.": "La lumière '{}' enlève de la lumière (puissance ou couleur négative) : la rendre positive.",

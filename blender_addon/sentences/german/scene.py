@@ -97,6 +97,7 @@ SCENE = {
     "Their light changes with the distance in another way in each direction.": "Ihr Licht ändert sich mit der Entfernung in jeder Richtung anders.",
     "Light '{}' is a portal, which gives no light of its own; it is left out.": "Licht '{}' ist ein Portal, das kein eigenes Licht gibt; es wird weggelassen.",
     "Light '{}' is hidden from {} rays; in the fit it is not.": "Licht '{}' ist vor {} Strahlen verborgen; in der Anpassung nicht.",
+    "Light '{}' is sheared by its parents: clear the parent's non-uniform scale.": "Licht '{}' ist durch seine Eltern geschert: deren ungleichmäßige Skalierung aufheben.",
     "Light '{}' is scaled or sized to nothing: give it a size and a scale above 0.": "Licht '{}' ist auf nichts skaliert: ihm eine Größe und eine Skalierung über 0 geben.",
     "Light '{}' is without Multiple Importance Sampling: mirrors do not show it in Cycles, but in the fit they do.": "Licht '{}' ist ohne Multiple Importance Sampling: Spiegel zeigen es in Cycles nicht, in der Anpassung schon.",
     "Light '{}' takes light away (negative power or colour): make it positive.": "Licht '{}' nimmt Licht weg (negative Leistung oder Farbe): sie positiv machen.",
