@@ -21,7 +21,7 @@ from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for, turns_with_camera
 from ..probe.graph_copy import nodes_of
 from ..versions import node_tree_of
-from .stage import PLACE
+from .stage import PLACE, mesh_of
 
 SHOWN_ONLY = {  # of a node or a socket: how it looks in the editor
     "bl_description", "bl_height_default", "bl_height_max", "bl_height_min", "bl_icon", "bl_label",
@@ -76,8 +76,7 @@ def surface_key(
         data = item.original.data
         if hasattr(data, "texspace_location"):
             key.put(list(data.texspace_location), list(data.texspace_size))
-        layers = item.original.type == "MESH"
-        mesh = bpy.data.meshes.new_from_object(item, preserve_all_data_layers=layers, depsgraph=depsgraph)
+        mesh = mesh_of(instance, depsgraph)
         try:
             key.mesh(mesh)
         finally:

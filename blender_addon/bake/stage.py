@@ -31,9 +31,8 @@ def staged(
     scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph
 ) -> Iterator[Stage]:
     """A scene with a copy of the instance's evaluated object, whose coordinates are those of the original."""
-    layers = instance.object.original.type == "MESH"
     matrix = instance.matrix_world.copy()
-    mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=layers, depsgraph=depsgraph)
+    mesh = mesh_of(instance, depsgraph)
     item, carrier = bpy.data.objects.new(NAME, mesh), bpy.data.objects.new(NAME, None)
     try:
         _put_there(item, carrier, instance.object, matrix)
@@ -43,6 +42,15 @@ def staged(
         bpy.data.objects.remove(item)
         bpy.data.objects.remove(carrier)
         bpy.data.meshes.remove(mesh)
+
+
+def mesh_of(instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh:
+    """A new mesh of the faces that an instance shows: those of its object, or others that geometry nodes have made."""
+    item = instance.object
+    if instance.is_instance and item.data != item.original.evaluated_get(depsgraph).data:
+        return item.data.copy()
+    layers = item.original.type == "MESH"
+    return bpy.data.meshes.new_from_object(item, preserve_all_data_layers=layers, depsgraph=depsgraph)
 
 
 @contextmanager

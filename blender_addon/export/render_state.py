@@ -201,3 +201,9 @@ def _layer_collections(root: bpy.types.LayerCollection) -> Iterator[bpy.types.La
     yield root
     for child in root.children:
         yield from _layer_collections(child)
+
+
+def shown_by(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
+    """What puts an instance into the scene, whose settings Cycles takes beside those of the object: itself, if it is
+    no instance."""
+    return instance.parent if instance.is_instance and instance.parent is not None else instance.object

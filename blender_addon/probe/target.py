@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -95,17 +96,46 @@ class Target:
         self, copy: bpy.types.Material, wanted: list[tuple[str, bool]], frame: Frame, samples: int
     ) -> dict[str, NDArray[np.float32]]:
         """What Cycles writes into the outputs of `copy`, which stands in for the material meanwhile."""
+        try:
+            with self._standing_in(copy):
+                by_pixels = bumps_look_at_pixels() and asks_beside(copy.node_tree)
+                return render_outputs(self.scene, self.layer, wanted, frame, samples, by_pixels=by_pixels).values
+        except RuntimeError as error:
+            raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{self.material.name}': {error}") from error
+
+    @contextmanager
+    def _standing_in(self, copy: bpy.types.Material) -> Iterator[None]:
+        """Show `copy` for the material: in the object's slot, or wherever it is, where nodes put it on instances."""
         material, was_link = self.slot.material, self.slot.link
+        if self._is_on_instances_of_nodes:
+            material.user_remap(copy)
+            try:
+                yield
+            finally:
+                copy.user_remap(material)
+            return
         try:
             self.slot.link = "OBJECT"  # the mesh may belong to other objects too
             self.slot.material = copy
-            by_pixels = bumps_look_at_pixels() and asks_beside(copy.node_tree)
-            return render_outputs(self.scene, self.layer, wanted, frame, samples, by_pixels=by_pixels).values
-        except RuntimeError as error:
-            raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{material.name}': {error}") from error
+            yield
         finally:
             self.slot.material = material
             self.slot.link = was_link
+
+    @property
+    def _is_on_instances_of_nodes(self) -> bool:
+        """Whether geometry nodes make meshes with the material, which the object's slot does not change."""
+        if all(modifier.type != "NODES" for modifier in self.obj.modifiers):
+            return False
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        own = self.obj.evaluated_get(depsgraph).data
+        return any(
+            instance.is_instance
+            and instance.object.original == self.obj
+            and instance.object.data != own
+            and any(each is not None and each.original == self.material for each in instance.object.data.materials)
+            for instance in depsgraph.object_instances
+        )
 
 
 def from_origin(camera: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:

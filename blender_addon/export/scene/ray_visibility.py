@@ -10,12 +10,7 @@ from ..audit.object_table import OBJECT_CYCLES
 from ..audit.rules import name_settings
 from ..findings import Findings
 from ..meshes.read_mesh import material_of_slot
-
-
-def shown_by(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
-    """What puts an instance into the scene, whose settings Cycles takes beside those of the object: itself, if it is
-    no instance."""
-    return instance.parent if instance.is_instance and instance.parent is not None else instance.object
+from ..render_state import shown_by
 
 
 def camera_misses(instance: bpy.types.DepsgraphObjectInstance, view_layer: bpy.types.ViewLayer) -> bool:

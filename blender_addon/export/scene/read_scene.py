@@ -40,6 +40,7 @@ from ..render_state import (
     render_state,
     rendered_layer,
     rendered_objects,
+    shown_by,
 )
 from ..steps import Steps
 from .origin import moved, note_far_scattering, scene_origin
@@ -233,7 +234,7 @@ class _Walk:
                     self.data.lights.append(light)
             elif item.type == "MESH":
                 # the faces of curves, texts and geometry nodes come as instances whose parent is the object itself
-                own = not instance.is_instance or instance.parent == item.original.evaluated_get(self.depsgraph)
+                own = shown_by(instance).original == item.original
                 # an object that only collection instances show is fitted in all of them
                 own |= item.original.name_full not in self.rendered
                 self._add_mesh(instance, matrix, own)

@@ -45,7 +45,6 @@ from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
-from .ray_visibility import shown_by
 from .scene_data import SceneData
 from .world_model import refuse_negative
 
@@ -140,7 +139,7 @@ class SceneBakes:
         item, material = surface.instance.object, surface.material
         known = self._ids.setdefault((item.name_full, item.data.as_pointer(), surface.slot), {})
         told = asked_of_instancer(node_tree_of(material))
-        if told and shown_by(surface.instance).original != item.original:
+        if told and surface.instance.is_instance:
             findings.note(
                 f"Material '{material.name}': what {', '.join(told)} tell of each instance of '{item.name}' is left "
                 "out: in the fit it is as of the object alone."

@@ -79,21 +79,29 @@ def test_a_property_of_the_mesh_is_gone_where_a_modifier_makes_a_new_one(
     assert (baked.max() < 1e-4) == is_lost
 
 
-def test_an_instance_has_the_colour_of_its_instancer(stage: Any, export: Any, render_cycles: Any) -> None:
-    """Three instances of a box, two of them of one colour, which share a bake."""
+@pytest.mark.parametrize("is_shown", [False, True])
+def test_an_instance_has_the_colour_of_its_instancer(
+    is_shown: bool, stage: Any, export: Any, render_cycles: Any
+) -> None:
+    """Four instances of a box, two of them of one colour, which share a bake; the box may be there itself, too.
+
+    Where Python has seen the box itself, it finds that in all of its instances.
+    """
     target, box = stage
     box.color = (0.9, 0.9, 0.1, 1.0)
     prefab = bpy.data.collections.new("Prefab")
     prefab.objects.link(box)
-    bpy.context.scene.collection.objects.unlink(box)
-    for x, color in ((-1.2, (0.8, 0.2, 0.1, 1.0)), (0.0, (0.1, 0.3, 0.9, 1.0)), (0.0, (0.1, 0.3, 0.9, 1.0))):
+    if not is_shown:
+        bpy.context.scene.collection.objects.unlink(box)
+    colors = ((0.8, 0.2, 0.1, 1.0), (0.1, 0.3, 0.9, 1.0), (0.1, 0.9, 0.3, 1.0), (0.1, 0.3, 0.9, 1.0))
+    for place, color in zip(((-1.2, -1.2), (0.0, -1.2), (-1.2, 1.2), (0.0, 1.2)), colors, strict=True):
         empty = bpy.data.objects.new("Instance", None)
         empty.instance_type, empty.instance_collection, empty.color = "COLLECTION", prefab, color
-        empty.location = (x, 1.2 * len(bpy.data.objects) - 6.0, 0.0)
+        empty.location = (*place, 0.0)
         bpy.context.scene.collection.objects.link(empty)
     told = box.data.materials[0].node_tree.nodes.new("ShaderNodeObjectInfo")
     picture, baked = shown_and_baked(told, target, export, render_cycles)
-    assert len(baked) == 2
+    assert len(baked) == 3 + is_shown
     seen = picture.reshape(-1, picture.shape[-1])[:, :3]
     for color in baked:
         assert np.abs(seen - color).max(axis=1).min() < 1e-3
@@ -150,3 +158,35 @@ def test_settings_that_an_older_blender_left_are_no_properties_of_the_user(scene
     owner["cycles"], owner["tint"] = {"use_deform_motion": 0}, 0.5
     copy_properties((owner,), item)
     assert dict(item.items()) == {"tint": 0.5}
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_a_mesh_that_geometry_nodes_make_has_its_own_bake(
+    joined: bool, stage: Any, export: Any, render_cycles: Any
+) -> None:
+    """A cube of the nodes knows a tone that the box before them, of as many faces, does not."""
+    target, box = stage
+    material, plain = box.data.materials[0], new_material("Plain")
+    box.data.materials[0] = plain
+    group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    kinds = ("MeshCube", "StoreNamedAttribute", "SetMaterial", "InstanceOnPoints", "JoinGeometry", "MeshLine")
+    cube, tone, painted, instances, join, line = (group.nodes.new(f"GeometryNode{kind}") for kind in kinds)
+    start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    line.inputs["Count"].default_value, cube.inputs["Size"].default_value = 1, (1.2, 1.2, 1.2)
+    tone.data_type, tone.domain, tone.inputs["Name"].default_value = "FLOAT_COLOR", "POINT", "tone"
+    next(s for s in tone.inputs if s.name == "Value" and s.enabled).default_value = (0.2, 0.5, 0.8, 1.0)
+    painted.inputs["Material"].default_value = material
+    chain = [cube.outputs["Mesh"], tone.inputs[0], tone.outputs[0], painted.inputs[0]]
+    chain += [painted.outputs[0], instances.inputs["Instance"], line.outputs[0], instances.inputs["Points"]]
+    chain += [instances.outputs[0], join.inputs[0], join.outputs[0], end.inputs[0]]
+    chain += [start.outputs[0], join.inputs[0]] if joined else []
+    for first, second in zip(chain[::2], chain[1::2], strict=True):
+        group.links.new(first, second)
+    box.modifiers.new("Scatter", "NODES").node_group = group
+    told = material.node_tree.nodes.new("ShaderNodeAttribute")
+    told.attribute_name = "tone"
+    picture, (baked,) = shown_and_baked(told, target, export, render_cycles)
+    np.testing.assert_allclose(baked, (0.2, 0.5, 0.8), atol=1e-3)
+    np.testing.assert_allclose(baked, picture[CENTRE][:3], atol=1e-3)

@@ -43,8 +43,8 @@ def test_an_object_that_only_an_instance_shows_is_fitted(scene: Any, export: Any
     assert render_mitsuba(export(item)).mean() == pytest.approx(theirs.mean(), rel=0.02)
 
 
-def scatter(item: Any, material: Any = None, of: Any = None) -> None:
-    """Put `of`, or a small cube of that material that the tree makes itself, on every vertex of `item`."""
+def scatter(item: Any, material: Any = None, of: Any = None, *, joined: bool = True) -> None:
+    """Put `of`, or a small cube of that material that the tree makes itself, on every vertex of `item`, or for it."""
     group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -62,7 +62,8 @@ def scatter(item: Any, material: Any = None, of: Any = None) -> None:
     link(source.outputs["Geometry"], instances.inputs["Instance"])
     link(start.outputs[0], instances.inputs["Points"])
     link(instances.outputs[0], join.inputs[0])
-    link(start.outputs[0], join.inputs[0])
+    if joined:
+        link(start.outputs[0], join.inputs[0])
     link(join.outputs[0], end.inputs[0])
     item.modifiers.new("Scatter", "NODES").node_group = group
 
@@ -77,6 +78,31 @@ def test_meshes_that_geometry_nodes_make_are_instanced_with_their_material(scene
     assert len(list((report.folder / "meshes").glob("*.ply"))) == 1 + 4
     ours = render_mitsuba(report)
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.02)
+
+
+def test_a_material_with_nodes_is_fitted_on_meshes_that_geometry_nodes_make(scene: Any, export: Any) -> None:
+    """Its values were looked for in the object's slot alone, so that the camera was said to see nothing."""
+    item = lit_quad(scene)
+    material = item.data.materials[0]
+    tree = material.node_tree
+    noise, shader = tree.nodes.new("ShaderNodeTexNoise"), next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+    tree.links.new(noise.outputs["Color"], shader.inputs["Base Color"])
+    scatter(item, material, joined=False)
+    bpy.context.view_layer.update()
+    assert export(item).request["target"]["object"] == "Target"
+    assert item.material_slots[0].material == material
+
+
+def test_what_nodes_say_of_their_instances_is_named(scene: Any, export: Any) -> None:
+    target = lit_quad(scene)
+    item = add_quad("Item", 0.9, 1.0, new_material("Plain"))
+    material = new_material("Sprinkle")
+    tree = material.node_tree
+    said, shader = tree.nodes.new("ShaderNodeAttribute"), next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+    said.attribute_type, said.attribute_name = "INSTANCER", "tone"
+    tree.links.new(said.outputs["Color"], shader.inputs["Base Color"])
+    scatter(item, material)
+    assert [note for note in export(target).notes if "what Attribute tell of each instance of 'Item'" in note]
 
 
 def sprinkle(item: Any, source: Any, *, collection: bool) -> None:
