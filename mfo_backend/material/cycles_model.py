@@ -62,6 +62,8 @@ class CyclesModel:
     walks_again
         Light that has left from below walks below the next surface, too (from 5.0); before, and by a profile, that is a
         diffuse one.
+    samples_see_layers
+        Light samples of a surface that glows are dimmed by its coat and sheen (from 5.2); before, by the coat's tint.
     """
 
     multiple_scattering: bool = True
@@ -76,6 +78,7 @@ class CyclesModel:
     disk: bool = False
     radius_is_path: bool = False
     walks_again: bool = False
+    samples_see_layers: bool = False
 
 
 def cycles_model(
@@ -111,4 +114,5 @@ def cycles_model(
         disk=subsurface_method == "BURLEY",
         radius_is_path=subsurface_method == "RANDOM_WALK" and major_minor >= (5, 2),
         walks_again=major_minor >= (5, 0) and subsurface_method != "BURLEY",
+        samples_see_layers=major_minor >= (5, 2),
     )

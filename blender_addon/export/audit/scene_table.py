@@ -77,7 +77,8 @@ BY_SIMPLIFY = frozenset({"use_camera_cull", "use_distance_cull", "texture_limit_
 RENDER = Owner(
     exported="engine film_transparent pixel_aspect_x pixel_aspect_y resolution_percentage resolution_x resolution_y "
     "simplify_subdivision simplify_subdivision_render use_border use_compositing use_motion_blur use_multiview "
-    "use_simplify border_max_x border_max_y border_min_x border_min_y use_crop_to_border use_sequencer",
+    "use_simplify border_max_x border_max_y border_min_x border_min_y use_crop_to_border use_sequencer "
+    "use_auto_generate_texture_cache use_texture_cache",
     no_effect="anisotropic_filter bake bake_bias bake_margin bake_margin_type bake_samples bake_type bake_user_scale "
     "compositor_denoise_device compositor_denoise_final_quality compositor_denoise_preview_quality compositor_device "
     "compositor_precision dither_intensity ffmpeg file_extension filepath filter_size fps fps_base frame_map_new "
@@ -87,13 +88,13 @@ RENDER = Owner(
     "simplify_child_particles_render simplify_gpencil simplify_gpencil_antialiasing simplify_gpencil_modifier "
     "simplify_gpencil_onplay simplify_gpencil_shader_fx simplify_gpencil_tint simplify_gpencil_view_fill "
     "simplify_volumes stamp_background stamp_font_size stamp_foreground stamp_note_text stereo_views threads "
-    "threads_mode use_auto_generate_texture_cache use_bake_clear use_bake_lores_mesh use_bake_multires "
+    "threads_mode use_bake_clear use_bake_lores_mesh use_bake_multires "
     "use_bake_selected_to_active use_bake_user_scale use_file_extension use_high_quality_normals use_lock_interface "
     "use_new_cpu_compositor use_overwrite use_persistent_data use_placeholder use_render_cache "
     "use_sequencer_override_scene_strip use_simplify_normals use_single_layer use_spherical_stereo use_stamp_camera "
     "use_stamp_date use_stamp_filename use_stamp_frame use_stamp_frame_range use_stamp_hostname use_stamp_labels "
     "use_stamp_lens use_stamp_marker use_stamp_memory use_stamp_note use_stamp_render_time use_stamp_scene "
-    "use_stamp_sequencer_strip use_stamp_time use_texture_cache views views_format sequencer_gl_preview",
+    "use_stamp_sequencer_strip use_stamp_time views views_format sequencer_gl_preview",
     named={
         "use_freestyle": Named(False, "Freestyle draws lines into Cycles' picture; the fit has none."),
         "use_stamp": Named(False, "Burn Into Image writes text into the picture; the fit has none."),

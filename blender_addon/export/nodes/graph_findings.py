@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 
@@ -144,6 +145,8 @@ def _is_missing(image: bpy.types.Image | None) -> bool:
         return True
     if image.source == "TILED":  # has no size before it is rendered
         return False
+    if image.source in ("SEQUENCE", "MOVIE"):  # has pixels at the frames that were shown
+        return not image.packed_files and not Path(bpy.path.abspath(image.filepath, library=image.library)).exists()
     return not image.has_data and not image.packed_file and not any(image.size)
 
 

@@ -12,6 +12,7 @@ from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.read_camera import read_pixel_filter
 from ..findings import Findings
+from ..images.texture_cache import uses_texture_cache
 from ..meshes.read_mesh import MESH_TYPES
 from ..render_state import layer_collections
 from .scene_data import RenderSettings
@@ -57,6 +58,11 @@ def name_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
     strips = getattr(scene.sequence_editor, "strips", None) or getattr(scene.sequence_editor, "sequences", ())
     if scene.render.use_sequencer and len(strips):
         findings.note("The render shows the strips of the Video Sequencer; the fit shows the scene.")
+    if uses_texture_cache(scene.render, (image for image in bpy.data.images if image.users)):
+        findings.note(
+            "Cycles reads pictures through its texture cache, which averages them where they are small; the fit does "
+            "not. Turn Texture Cache off in Render Properties > Performance, and render the reference anew."
+        )
 
 
 def _shows_faces(collection: bpy.types.Collection) -> bool:

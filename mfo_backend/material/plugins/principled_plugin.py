@@ -145,7 +145,7 @@ class BlenderPrincipled(mi.BSDF):
     def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
         """What alpha, sheen and coat leave of the surface's own light towards `si.wi`, perhaps to a light sample."""
         own = {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
-        if sampled:
+        if sampled and not self.model.samples_see_layers:
             return mi.Color3f(sampled_emission(self.values_at(si, active) | own, si.wi, self.lobes))
         return mi.Color3f(self._layers(si, active, **own).layers.emission)
 

@@ -170,7 +170,7 @@ def layer_stack(parameters: Mapping[str, Any], wi: Any, lobes: Lobes, model: Cyc
 
 
 def sampled_emission(parameters: Mapping[str, Any], wi: Any, lobes: Lobes) -> Any:
-    """Radiance emitted towards `wi` as Cycles' light samples of a surface see it.
+    """Radiance emitted towards `wi` as Cycles' light samples of a surface see it before Blender 5.2.
 
     It makes no closures for them, so of what lies above only alpha and the coat's tint count. Found by renders: the
     light of a surface with a sheen is 8 % brighter with light samples (Emission Sampling) than without.

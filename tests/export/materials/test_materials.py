@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -334,6 +335,24 @@ def test_a_missing_picture_keeps_no_target_from_a_fit(scene: Any, socket: str) -
     errors, notes = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
     assert errors == []
     assert [note for note in notes if "the image 'gone.png' of the node 'Image Texture' is missing" in note]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_sequence_is_missing_where_its_first_picture_is(is_there: bool, scene: Any, tmp_path: Path) -> None:
+    """Blender has no pixels of one before it is shown."""
+    made = bpy.data.images.new("made", 4, 4)
+    made.filepath_raw, made.file_format = str(tmp_path / "frame_0001.png"), "PNG"
+    made.save()
+    material = new_material("Target")
+    node = image_node(material, bpy.data.images.load(made.filepath_raw))
+    node.image.source = "SEQUENCE"
+    material.node_tree.links.new(node.outputs["Color"], principled(material).inputs["Base Color"])
+    add_camera("ORTHO", ortho_scale=2.0)
+    add_light("POINT", energy=10.0)
+    if not is_there:
+        (tmp_path / "frame_0001.png").unlink()
+    _, notes = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
+    assert any("is missing; it is magenta" in note for note in notes) != is_there
 
 
 def test_no_socket_is_dropped_in_silence(scene: Any) -> None:
