@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...versions import alpha_is_by_setting, reads_webp_multiplied
+from ...versions import alpha_is_by_setting, reads_webp_multiplied, working_space_to_rec709
 from .image_pixels import SRGB_NAMES, is_data, read_encoded, read_pixels
 from .picture_header import PictureHeader, read_header
 
@@ -43,11 +43,14 @@ def as_cycles_has_it(image: bpy.types.Image, pixels: Pixels) -> tuple[Pixels, bo
     return pixels, _has_alpha(pixels) and mode != "CHANNEL_PACKED" and not is_data(image)
 
 
-def blend(image: bpy.types.Image, pixels: Pixels) -> Pixels:
-    """The colours that Cycles interpolates, of those that it has: times alpha where it multiplies."""
+def blend(image: bpy.types.Image, pixels: Pixels, *, are_bytes: bool) -> Pixels:
+    """The colours that Cycles interpolates, of those that it has: times alpha where it multiplies.
+
+    `are_bytes` says that the pixels are those of a file of bytes, as they are there.
+    """
     if not multiplies(image):
         return pixels
-    return _times_alpha(pixels, None if image.is_float else _floor)
+    return _times_alpha(pixels, _floor if are_bytes else None)
 
 
 def multiplies(image: bpy.types.Image) -> bool:
@@ -87,6 +90,7 @@ def _as_stored(image: bpy.types.Image) -> Pixels:
     try:
         copy.alpha_mode = "CHANNEL_PACKED"
         encoded = not image.is_float and image.colorspace_settings.name in SRGB_NAMES
+        encoded &= working_space_to_rec709() is None
         return (read_encoded if encoded else read_pixels)(copy)
     finally:
         bpy.data.images.remove(copy)

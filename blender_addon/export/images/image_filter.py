@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...versions import working_space_to_rec709
 from .color_space import linear_to_srgb, srgb_to_linear
 from .image_alpha import as_cycles_has_it, blend, is_read_by_cycles, multiplies
 from .image_pixels import SRGB_NAMES, UnreadableImageError, is_data, read_encoded, read_pixels
@@ -39,13 +40,14 @@ def filtered_pixels(
         If the image cannot be read.
     """
     encoded = not is_data(image) and image.colorspace_settings.name in SRGB_NAMES
+    encoded &= working_space_to_rec709() is None  # else Cycles converts pixels before it filters them
     pixels = read_encoded(image) if encoded and not image.is_float else read_pixels(image)
     pixels, blended = as_cycles_has_it(image, pixels)
     if image.is_float and not is_read_by_cycles(image):
         encoded = False  # Cycles does not decode what Blender has decoded
     if encoded and image.is_float:  # of which Blender keeps linear numbers
         pixels = np.concatenate([linear_to_srgb(pixels[:, :, :3]), pixels[:, :, 3:]], axis=2)
-    pixels = blend(image, pixels) if blended else pixels
+    pixels = blend(image, pixels, are_bytes=encoded and not image.is_float) if blended else pixels
     divided = alpha_read and blended
     steps = _steps(pixels)
     if steps > 1 and interpolation in ("Cubic", "Smart"):

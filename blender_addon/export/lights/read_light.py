@@ -15,12 +15,13 @@ from ...versions import cycles_settings, light_color, light_is_normalized, light
 from ..audit.object_table import LIGHT_CYCLES
 from ..audit.rules import name_settings
 from ..findings import Findings
-from ..images.color_space import to_rec709
+from ..images.color_space import from_rec709, to_rec709
 from ..nodes.graph_findings import note_missing_pictures
 from ..nodes.shader_graph import emission_of
 from .lamp_nodes import LampNodesError, lookup_of
 from .light_model import Light
 
+ROUNDING = 1e-6  # of a colour that is converted there and back
 # cubic metres; a light thinner than any scene needs has no area that light could come from
 LEAST_VOLUME = 1e-18
 # Cosines of the angles between a light's axes. Cycles takes a sheared area light for a rectangle in one place and for a
@@ -59,9 +60,12 @@ def read_light(
         else:
             color = color * emission
     power = light_strength(data) * exposure
-    if power < 0.0 or color.min() < 0.0:
+    if power < 0.0 or from_rec709(color).min() < -ROUNDING:
         findings.error(f"Light '{name}' takes light away (negative power or colour): make it positive.")
         return None
+    if color.min() < -ROUNDING:
+        findings.note(f"Light '{name}' has a colour beyond linear Rec.709, in which the fit counts: it is at its edge.")
+    color = color.clip(0.0)
     if power == 0.0 or color.max() == 0.0:
         return None
     name_settings(LIGHT_CYCLES, cycles, name, findings)

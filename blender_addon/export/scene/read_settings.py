@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ...versions import counts_passages_exactly, cycles_settings
+from ...versions import counts_passages_exactly, cycles_settings, working_space_to_rec709
 from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.read_camera import read_pixel_filter
@@ -58,6 +58,11 @@ def name_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
     strips = getattr(scene.sequence_editor, "strips", None) or getattr(scene.sequence_editor, "sequences", ())
     if scene.render.use_sequencer and len(strips):
         findings.note("The render shows the strips of the Video Sequencer; the fit shows the scene.")
+    if working_space_to_rec709() is not None:
+        findings.note(
+            f"The working space of this file is {bpy.data.colorspace.working_space}. The fit counts in linear Rec.709, "
+            "where coloured light on coloured surfaces is another: values of what such light shows may be off."
+        )
     if uses_texture_cache(scene.render, (image for image in bpy.data.images if image.users)):
         findings.note(
             "Cycles reads pictures through its texture cache, which averages them where they are small; the fit does "

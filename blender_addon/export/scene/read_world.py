@@ -17,6 +17,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..images.image_filter import equirectangular_pixels
 from ..images.image_pixels import UnreadableImageError
+from ..lights.negative_light import refuse_negative
 from ..nodes.dependence import turns_with_camera
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
@@ -26,7 +27,7 @@ from ..nodes.shader_graph import (
     source_of,
     surface_of,
 )
-from .world_model import World, refuse_negative, resample
+from .world_model import World, resample
 
 if TYPE_CHECKING:
     from .scene_bakes import SceneBakes
@@ -84,7 +85,7 @@ def _background(node: bpy.types.Node, exposure: float, name: str, findings: Find
     if source is not None and source.node.bl_idname == "ShaderNodeTexEnvironment":
         pixels, lookup = _environment(source.node)
         refuse_negative(name, pixels, findings)
-        return World(np.full(3, scale), pixels, lookup)
+        return World(np.full(3, scale), pixels.clip(0.0), lookup)
     color = read_socket(node.inputs["Color"])
     if color.texture is not None:
         raise UnsupportedNodeError("an Image Texture instead of an Environment Texture")

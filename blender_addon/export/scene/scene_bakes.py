@@ -27,6 +27,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..lights.lamp_tables import LampTables
 from ..lights.light_model import Light
+from ..lights.negative_light import refuse_negative
 from ..material_model import grey
 from ..materials.baked_material import Baked
 from ..materials.read_context import read_context
@@ -46,7 +47,6 @@ from ..nodes.graph_findings import note_missing_pictures
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
 from .scene_data import SceneData
-from .world_model import refuse_negative
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
 # of one object whose instances have each something of their own, or bent normals and other proportions or sizes; what

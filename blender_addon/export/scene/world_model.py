@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..files.xml_scene import Element, add, bitmap, plugin, rgb, scalar, string, transform
-from ..findings import Findings
-from ..lights.light_model import takes_light
 
 # Mitsuba's envmap looks up local (x, y, z), Y up; Blender's equirectangular image has +X in its middle and Z up
 AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -91,12 +89,6 @@ def world_irradiance(world: World) -> float:
         weights = np.sin((np.arange(height) + 0.5) / height * math.pi)
         mean = float(weights @ world.pixels.mean(axis=(1, 2), dtype=np.float64)) / float(weights.sum())
     return math.pi * mean * float(world.color.mean())
-
-
-def refuse_negative(name: str, radiance: NDArray[np.floating], findings: Findings) -> None:
-    """An error where a world of this name takes light away."""
-    if takes_light(radiance):
-        findings.error(f"World '{name}' takes light away (negative strength or colour): make it positive.")
 
 
 def resample(

@@ -14,6 +14,7 @@ import PIL.Image
 import pytest
 
 from blender_addon.export.files.exr_file import write_exr
+from blender_addon.export.images.color_space import to_rec709
 from blender_addon.export.images.image_filter import divides_by_nothing, filtered_pixels
 from blender_addon.export.nodes.shader_graph import read_socket
 
@@ -145,6 +146,20 @@ def tiff(numbers: np.ndarray, extra: int) -> bytes:
     ]  # fmt: skip
     directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", *tag) for tag in tags) + bytes(4)
     return b"II*\0" + struct.pack("<I", 8 + len(of_bits) + len(data)) + of_bits + data + directory
+
+
+def test_pictures_are_filtered_after_decoding_in_a_wide_working_space(
+    scene: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    if not hasattr(getattr(bpy.data, "colorspace", None), "working_space"):
+        pytest.skip("this Blender has one working space")
+    bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=False)
+    image = picture(tmp_path / "picture.png")
+    image.alpha_mode = "NONE"
+    theirs = to_rec709(shown_by_cycles(scene, image, "Linear", False, render_cycles))
+    ours = filtered_pixels(image, "Linear", "repeat", alpha_read=False)
+    seen = blocks(ours, 8).mean(axis=(0, 1))
+    assert blocks(theirs, 8).mean(axis=(0, 1)) == pytest.approx(seen, rel=5e-3)  # before decoding 14 % darker
 
 
 @pytest.mark.parametrize("packed", [False, True])

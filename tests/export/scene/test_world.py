@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
+from blender_addon.export.job import check_export
 from mfo_backend.scene.image_file import read_image
 
 from ..load_scene import load_scene
-from ..scenes import add_camera, add_quad, new_material
+from ..scenes import add_camera, add_light, add_quad, new_material, world_color
 
 DIRECTIONS = [
     (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0.1, 0.05, 1), (0.05, -0.1, -1),
@@ -236,3 +237,22 @@ def test_world_that_cannot_be_rendered_is_an_error(scene: Any, export: Any, monk
         with pytest.raises(ExportError, match=f"World 'World' could not be rendered by Cycles: .*{said}"):
             export(target)
         assert not list(tmp_path.iterdir())
+
+
+def test_a_wide_working_space_is_named_and_its_light_taken_at_the_edge(scene: Any, export: Any) -> None:
+    """Deep red light was said to take light away. The sums in Rec.709 are others: a warm lamp was 7 to 24 % off."""
+    if not hasattr(getattr(bpy.data, "colorspace", None), "working_space"):
+        pytest.skip("this Blender has one working space")
+    world_color(scene, 1.0).inputs["Color"].default_value = (1.0, 0.0, 0.0, 1.0)
+    lamp = add_light("POINT", energy=10.0)
+    lamp.data.color = (1.0, 0.0, 0.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    target = add_quad("Target", 1.0, 0.0, new_material("Target"))
+    assert check_export(bpy.context, target) == ([], [])
+    bpy.ops.wm.set_working_color_space(working_space="Linear Rec.2020", convert_colors=False)
+    errors, notes = check_export(bpy.context, target)
+    assert errors == []
+    for said in ("World 'World' has colours beyond", "Light 'Light' has a colour beyond", "The working space of this"):
+        assert sum(note.startswith(said) for note in notes) == 1
+    lamp.data.energy = -10.0
+    assert "takes light away" in check_export(bpy.context, target)[0][0]
