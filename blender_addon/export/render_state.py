@@ -207,3 +207,8 @@ def shown_by(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
     """What puts an instance into the scene, whose settings Cycles takes beside those of the object: itself, if it is
     no instance."""
     return instance.parent if instance.is_instance and instance.parent is not None else instance.object
+
+
+def hides_original(item: bpy.types.Object) -> bool:
+    """Whether Cycles shows an object by its instances alone: one whose parent has it on its vertices or faces."""
+    return item.parent is not None and item.parent.instance_type in ("VERTS", "FACES")

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import bpy
 
+from ..export.nodes.shader_graph import UNKNOWN
+
 GROUP = "ShaderNodeGroup"
 
 
@@ -19,6 +21,19 @@ def own_copy(material: bpy.types.Material) -> bpy.types.Material:
     copy.animation_data_clear()
     _own(copy.node_tree)
     return copy
+
+
+def unlink_unknown() -> None:
+    """Remove the links from nodes that Cycles has not, of all trees of the file; Cycles itself takes no notice of them.
+
+    What is put into a copy of a tree would find nothing at the end of such a link, where the socket has its own value.
+    """
+    owners = (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights)
+    trees = [tree for owner in owners if (tree := owner.node_tree) is not None]
+    for tree in (*trees, *bpy.data.node_groups):
+        if tree.bl_idname == "ShaderNodeTree":
+            for link in [link for link in tree.links if link.from_node.bl_idname in UNKNOWN]:
+                tree.links.remove(link)
 
 
 def variant_of(tree: bpy.types.NodeTree) -> bpy.types.NodeTree:

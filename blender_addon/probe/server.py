@@ -67,6 +67,9 @@ def _open(file: Path) -> Mapping[str, Any]:
         bpy.ops.wm.open_mainfile(filepath=str(file), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         return {"status": "failed", "sentence": f"The copy of the file cannot be opened ({str(error).strip()})."}
+    from .graph_copy import unlink_unknown
+
+    unlink_unknown()
     return {"status": "ok", "blender": list(bpy.app.version)}
 
 

@@ -17,7 +17,7 @@ from ..findings import Findings, Fix
 from ..material_model import Material, Socket
 from ..nodes.closure_leaves import OUTPUT, UNKNOWN, ClosureLeaf
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
-from ..nodes.graph_findings import graph_problem, note_few_samples, note_missing_pictures
+from ..nodes.graph_findings import graph_problem, note_few_samples, note_missing_pictures, note_pixel_sizes
 from ..nodes.leaf_kinds import (
     EMISSION,
     TRANSPARENT,
@@ -60,6 +60,7 @@ def read_target(
         return None
     name_material_settings(material, findings)
     note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
+    note_pixel_sizes(f"Material '{material.name}'", node_tree_of(material), findings)
     note_few_samples(material.name, node_tree_of(material), findings)
     shared = target.shared_group([name for name, place in target.places.items() if not place.socket.is_linked])
     if shared is not None:

@@ -128,6 +128,17 @@ def note_missing_pictures(owner: str, tree: bpy.types.NodeTree | None, findings:
         )
 
 
+def note_pixel_sizes(owner: str, tree: bpy.types.NodeTree | None, findings: Findings) -> None:
+    """Name nodes that measure in pixels of the picture, which are others where their values are looked at."""
+    output = active_output(tree)
+    for node in _nodes_before(output.inputs) if output is not None else ():
+        if node.bl_idname == "ShaderNodeWireframe" and node.use_pixel_size:
+            findings.note(
+                f"{owner}: the node '{node.name}' measures in pixels, which are finer in the fit: its lines are "
+                "thinner. Turn its Pixel Size off, and render the reference anew."
+            )
+
+
 def note_few_samples(material: str, tree: bpy.types.NodeTree | None, findings: Findings) -> None:
     """Name Bevel nodes whose normals are mostly noise, which the fit has the mean of."""
     output = active_output(tree)

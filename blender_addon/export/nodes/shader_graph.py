@@ -49,6 +49,9 @@ class UnsupportedNodeError(Exception):
     """A node tree holds something that is not exported; the message names it, as part of a sentence."""
 
 
+UNKNOWN = ("ShaderNodeShaderToRGB", "NodeUndefined")  # to Cycles, for which what they feed has no link
+
+
 class Links:
     """The links of node trees by where they end, for one walk: `socket.links` looks through all of a tree each time."""
 
@@ -94,7 +97,7 @@ def source_of(socket: bpy.types.NodeSocket, links: Links | None = None) -> bpy.t
             socket, links = node.inputs[0], links or Links()
             continue
         if not node.mute:
-            return output
+            return None if node.bl_idname in UNKNOWN else output
         through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
         if through is None:
             return None

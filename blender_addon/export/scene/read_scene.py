@@ -36,6 +36,7 @@ from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
 from ..render_state import (
     background_objects,
+    hides_original,
     note_viewport,
     render_state,
     rendered_layer,
@@ -272,7 +273,7 @@ class _Walk:
         if instance.is_instance:
             parent = instance.parent
             return parent is not None and parent.original.name_full in self.rendered
-        if item.original.name_full not in self.rendered:
+        if item.original.name_full not in self.rendered or hides_original(item):
             return False
         return not item.is_instancer or item.show_instancer_for_render
 

@@ -43,7 +43,7 @@ from ..nodes.dependence import (
     asked_of_place,
 )
 from ..nodes.displacement import bends_normals
-from ..nodes.graph_findings import note_missing_pictures
+from ..nodes.graph_findings import note_missing_pictures, note_pixel_sizes
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
 from .scene_data import SceneData
@@ -159,6 +159,7 @@ class SceneBakes:
             own = next(iter(known))
         if own not in known:
             note_missing_pictures(f"Material '{material.name}'", node_tree_of(material), findings)
+            note_pixel_sizes(f"Material '{material.name}'", node_tree_of(material), findings)
             identifier = f"baked_{sum(map(len, self._ids.values())) + 1:04d}"
             try:
                 if len(self._surfaces) >= MOST_SURFACES:

@@ -157,3 +157,18 @@ def test_a_shader_linked_to_a_value_is_left_out_as_in_cycles(scene: Any, export:
     color = report.request["materials"]["target_bsdf"]["sockets"]["Base Color"]
     assert color["linked"]
     assert color["value"] == pytest.approx([0.2, 0.4, 0.3])
+
+
+@pytest.mark.parametrize("in_pixels", [True, False])
+def test_lines_as_wide_as_pixels_are_named(in_pixels: bool, scene: Any) -> None:
+    """A ball with lines of one pixel was 24 % too dark in silence."""
+    material = new_material("Lines")
+    tree = material.node_tree
+    lines = tree.nodes.new("ShaderNodeWireframe")
+    lines.use_pixel_size = in_pixels
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree.links.new(lines.outputs[0], shader.inputs["Base Color"])
+    world_color(scene, 1.0)
+    add_camera("ORTHO", ortho_scale=2.0)
+    _, notes = check_export(bpy.context, add_quad("Target", 1.0, 0.0, material))
+    assert any("'Wireframe' measures in pixels" in note for note in notes) == in_pixels

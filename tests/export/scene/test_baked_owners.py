@@ -190,3 +190,24 @@ def test_a_mesh_that_geometry_nodes_make_has_its_own_bake(
     picture, (baked,) = shown_and_baked(told, target, export, render_cycles)
     np.testing.assert_allclose(baked, (0.2, 0.5, 0.8), atol=1e-3)
     np.testing.assert_allclose(baked, picture[CENTRE][:3], atol=1e-3)
+
+
+def test_what_cycles_has_no_node_for_has_no_link(stage: Any, export: Any, render_cycles: Any) -> None:
+    """Shader to RGB is Eevee's: Cycles takes the ramp's own factor, and a bake had white where the link ended."""
+    target, box = stage
+    tree = box.data.materials[0].node_tree
+    kinds = ("ShaderNodeBsdfDiffuse", "ShaderNodeShaderToRGB", "ShaderNodeValToRGB")
+    shader, seen, told = (tree.nodes.new(kind) for kind in kinds)
+    tree.links.new(shader.outputs[0], seen.inputs[0])
+    tree.links.new(seen.outputs[0], told.inputs[0])
+    told.inputs[0].default_value = 0.25
+    told.color_ramp.elements[0].color = (0.8, 0.1, 0.4, 1.0)
+    picture, (baked,) = shown_and_baked(told, target, export, render_cycles)
+    np.testing.assert_allclose(baked, picture[CENTRE][:3], atol=1e-3)
+    np.testing.assert_allclose(baked, (0.85, 0.325, 0.55), atol=1e-3)
+    principled = next(node for node in target.data.materials[0].node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    plain = export(target, "plain").request["materials"]["target_bsdf"]["sockets"]["Base Color"]
+    own = target.data.materials[0].node_tree
+    own.links.new(own.nodes.new("ShaderNodeShaderToRGB").outputs[0], principled.inputs["Base Color"])
+    linked = export(target, "linked").request["materials"]["target_bsdf"]["sockets"]["Base Color"]
+    assert linked["value"] == plain["value"]

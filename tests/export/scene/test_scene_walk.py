@@ -215,3 +215,20 @@ def test_a_background_set_is_shown(scene: Any, export: Any, render_cycles: Any, 
     bpy.context.view_layer.update()
     theirs, ours = render_cycles(), render_mitsuba(export(item))
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)  # half of it comes from the set
+
+
+@pytest.mark.parametrize("kind", ["VERTS", "FACES", "NONE"])
+def test_a_child_of_what_shows_it_on_faces_or_vertices_is_not_shown_itself(
+    kind: str, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    """A lamp on one face was there twice."""
+    item = lit_quad(scene)
+    lamp = next(each for each in scene.objects if each.type == "LIGHT")
+    carrier = add_quad("Carrier", 0.2, 0.0, new_material("Carrier"))
+    carrier.instance_type, carrier.show_instancer_for_render, carrier.hide_render = kind, False, kind == "NONE"
+    carrier.location, lamp.location, lamp.parent = (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), carrier
+    bpy.context.view_layer.update()
+    theirs = render_cycles()
+    report = export(item)
+    assert (report.folder / "scene.xml").read_text("utf-8").count('id="light_') == {"VERTS": 4}.get(kind, 1)
+    assert render_mitsuba(report).mean() == pytest.approx(theirs.mean(), rel=0.02)
