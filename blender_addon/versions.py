@@ -208,6 +208,11 @@ def rounds_beside_flat_faces() -> bool:
     return bpy.app.version < (5, 2, 0)
 
 
+def gives_below_zero() -> bool:
+    """Whether a negative emission of a Principled BSDF takes light away, as that of Emission does; not from 5.0 on."""
+    return bpy.app.version < (5, 0, 0)
+
+
 def keeps_data_below_subdivision() -> bool:
     """Whether in renders a Subdivision that is the last modifier keeps the custom properties of the mesh.
 

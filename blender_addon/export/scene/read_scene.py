@@ -171,10 +171,8 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
     if bakes is not None:
         bakes.finish(data, findings)
     for material in data.materials.values():
-        # a Principled BSDF that would take light gives none, but by Open Shading Language
-        leaves = [
-            leaf for leaf in (material, *material.leaves) if leaf.model == "emission" or data.settings.open_shading
-        ]
+        below_zero = data.settings.gives_below_zero
+        leaves = [leaf for leaf in (material, *material.leaves) if leaf.model == "emission" or below_zero]
         if any(takes_light(leaf.emission) for leaf in leaves):
             refuse_dark(material.name, findings)
     for shape in data.emitting:

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ...versions import counts_passages_exactly, cycles_settings, working_space_to_rec709
+from ...versions import counts_passages_exactly, cycles_settings, gives_below_zero, working_space_to_rec709
 from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.read_camera import read_pixel_filter
@@ -42,7 +42,7 @@ def read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
     depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))
     exposure = cycles.film_exposure
     film = scene.render.film_transparent
-    others = cycles.use_light_tree, cycles.shading_system
+    others = cycles.use_light_tree, cycles.shading_system or gives_below_zero()  # Open Shading Language does
     return RenderSettings(pixel_filter, depth, film, exposure, DEFAULT_SPP, light_paths, *others)
 
 

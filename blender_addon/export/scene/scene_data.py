@@ -60,8 +60,8 @@ class RenderSettings:
     """What the picture needs beside the scene. `exposure` is Cycles' film exposure, already in every light.
 
     `light_paths` is that object of request.json: what Cycles does to indirect light. With a `light_tree` Cycles
-    chooses among lights by what they give without their nodes. By `open_shading` (OSL) a Principled BSDF may take light
-    away.
+    chooses among lights by what they give without their nodes. `gives_below_zero` says that a Principled BSDF whose
+    emission is negative takes light away.
     """
 
     pixel_filter: PixelFilter
@@ -71,7 +71,7 @@ class RenderSettings:
     spp: int
     light_paths: dict[str, float | int] = field(default_factory=dict)
     light_tree: bool = False
-    open_shading: bool = False
+    gives_below_zero: bool = False
 
 
 @dataclass
