@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mfo_backend.bench.rows.row import Task
+from mfo_backend.bench.rows.summary import is_at_noise
 from mfo_backend.bench.runs import fit_runner
 from mfo_backend.bench.runs.fit_runner import FitRunner
 from mfo_backend.bench.scenes.assets import Assets
@@ -33,24 +34,26 @@ def _row(runner, monkeypatch, task, number):
 
 
 @pytest.mark.parametrize(
-    ("scenario", "method", "seeds", "flips", "passes"),
+    ("scenario", "method", "scenes", "seeds", "flips", "passes"),
     [
-        # FLIP and passes when this was written:
-        ("base", "fast", 1, (0.0006, 0.0008), (113, 130)),
+        # FLIP of each scene and passes when this was written, where they were more than one seed's:
+        ("base", "fast", 2, 1, (0.0006, 0.0008), 121),
         # 4 samples a pixel; noise alone is 0.054, 0.317 and 0.116, 0.175. One seed says little: 16 have FLIP 0.032 to
         # 0.051, 0.077 to 0.104, 0.029 to 0.114, 0.023 to 0.102
-        ("noise", "fast", 4, (0.038, 0.0925), (490, 84)),
-        ("objects", "fast", 2, (0.0581, 0.0518), (162, 382)),
-        ("relighting", "balanced", 1, (0.012,), (322,)),
+        ("noise", "fast", 2, 4, (0.038, 0.0925), 287),
+        # of six seeds the first scene takes 123 to 864 passes, the mean of four scenes 320 to 474; FLIP is chance there
+        ("objects", "fast", 4, 1, None, 369),
+        ("relighting", "balanced", 1, 1, (0.012,), 322),
     ],
 )
-def test_no_scene_gets_worse_or_dearer(runner, monkeypatch, scenario, method, seeds, flips, passes):
-    scenes = range(len(flips))
-    rows = [[_row(runner, monkeypatch, Task(scenario, scene, method), k) for k in range(seeds)] for scene in scenes]
+def test_no_scenario_gets_worse_or_dearer(runner, monkeypatch, scenario, method, scenes, seeds, flips, passes):
+    rows = [[_row(runner, monkeypatch, Task(scenario, k, method), n) for n in range(seeds)] for k in range(scenes)]
     # other compilers and processors round differently, and a fit that takes one step more is no loss
     found, taken = ([np.mean([getattr(row, name) for row in of]) for of in rows] for name in ("flip", "passes"))
-    assert [value <= 1.25 * flip + 0.002 for value, flip in zip(found, flips, strict=True)] == [True] * len(flips)
-    assert [value <= 1.3 * limit for value, limit in zip(taken, passes, strict=True)] == [True] * len(flips)
+    if flips is not None:
+        assert [value <= 1.25 * flip + 0.002 for value, flip in zip(found, flips, strict=True)] == [True] * scenes
+    assert np.mean(taken) <= 1.3 * passes
+    assert all(is_at_noise(row) for row in itertools.chain.from_iterable(rows))
     for row in itertools.chain.from_iterable(rows):
         assert row.relit_flips
         assert all(flip < row.start_flip for flip in row.relit_flips)

@@ -18,7 +18,7 @@ from tests.render.scenes import POINT, write_scene
 
 REDUCED = ["base_color", "roughness", "metallic", "specular"]
 TWELVE = [*REDUCED, "anisotropic", "sheen", "sheen_tint", "spec_tint", "clearcoat", "clearcoat_gloss"]
-SEEDS = 4
+SEEDS = 12  # the median of four of the twelve values was 130 to 167 by the processor
 
 
 @pytest.mark.parametrize(("names", "most"), [(REDUCED, 35.0), (TWELVE, 163.0)], ids=["six", "twelve"])
