@@ -10,6 +10,7 @@ from typing import NamedTuple
 import bpy
 from mathutils import Matrix
 
+from ..export.render_state import shown_by
 from ..versions import keeps_data_below_subdivision
 
 NAME = "material_fit_bake"
@@ -87,8 +88,7 @@ def color_of(instance: bpy.types.DepsgraphObjectInstance) -> tuple[float, ...]:
 
     `instance.object` has it, too, but where Python knows the object that is shown already and answers with that.
     """
-    shown = instance.parent if instance.is_instance and instance.parent is not None else instance.object
-    return tuple(shown.color)
+    return tuple(shown_by(instance).color)
 
 
 def bake(stage: Stage, kind: str) -> None:
@@ -156,6 +156,8 @@ def _copy_properties_of_data(shown: bpy.types.Object, into: bpy.types.ID) -> Non
     Attribute finds them after those of the object.
     """
     original = shown.original
+    if not original.data.keys():
+        return
     rendered = [modifier for modifier in original.modifiers if modifier.show_render]
     if not (rendered and rendered[-1].type == "SUBSURF" and keeps_data_below_subdivision()):
         copy_properties((shown.data if rendered else original.data,), into)

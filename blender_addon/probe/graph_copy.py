@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import bpy
 
-from ..export.nodes.shader_graph import UNKNOWN
+from ..export.nodes.shader_graph import NOT_IN_CYCLES
 
 GROUP = "ShaderNodeGroup"
 
@@ -32,7 +32,7 @@ def unlink_unknown() -> None:
     trees = [tree for owner in owners if (tree := owner.node_tree) is not None]
     for tree in (*trees, *bpy.data.node_groups):
         if tree.bl_idname == "ShaderNodeTree":
-            for link in [link for link in tree.links if link.from_node.bl_idname in UNKNOWN]:
+            for link in [link for link in tree.links if link.from_node.bl_idname in NOT_IN_CYCLES]:
                 tree.links.remove(link)
 
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import bpy
@@ -122,7 +123,7 @@ class Target:
             self.slot.material = material
             self.slot.link = was_link
 
-    @property
+    @cached_property
     def _is_on_instances_of_nodes(self) -> bool:
         """Whether geometry nodes make meshes with the material, which the object's slot does not change."""
         if all(modifier.type != "NODES" for modifier in self.obj.modifiers):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import os
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -41,10 +42,9 @@ def save_over(path: Path) -> None:
     OSError
         If it cannot be written; what was there before is as it was.
     """
-    trial = path.with_name(f"{path.stem}.trial.blend")  # Blender cannot replace a file by one that it has written
-    save_copy(trial)
-    trial.unlink()
-    save_copy(path)
+    with tempfile.TemporaryDirectory(prefix="material_fit_", dir=path.parent) as folder:
+        save_copy(Path(folder) / path.name)
+    save_copy(path)  # there is room; moved from there, the file would leave no backup as Blender's own do
 
 
 def _is_whole(path: Path) -> bool:

@@ -35,6 +35,7 @@ MATH = {
 
 # those that bend a picture's numbers, which Cycles interpolates before them
 BENDING = ("POWER", "MAXIMUM", "MINIMUM")
+NOT_IN_CYCLES = ("ShaderNodeShaderToRGB", "NodeUndefined")  # what they feed has no link there
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,6 @@ class _Way:
 
 class UnsupportedNodeError(Exception):
     """A node tree holds something that is not exported; the message names it, as part of a sentence."""
-
-
-UNKNOWN = ("ShaderNodeShaderToRGB", "NodeUndefined")  # to Cycles, for which what they feed has no link
 
 
 class Links:
@@ -97,7 +95,7 @@ def source_of(socket: bpy.types.NodeSocket, links: Links | None = None) -> bpy.t
             socket, links = node.inputs[0], links or Links()
             continue
         if not node.mute:
-            return None if node.bl_idname in UNKNOWN else output
+            return None if node.bl_idname in NOT_IN_CYCLES else output
         through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
         if through is None:
             return None
