@@ -41,7 +41,7 @@ def _row(runner, monkeypatch, task, number):
         # 4 samples a pixel; noise alone is 0.054, 0.317 and 0.116, 0.175. One seed says little: 16 have FLIP 0.032 to
         # 0.051, 0.077 to 0.104, 0.029 to 0.114, 0.023 to 0.102
         ("noise", "fast", 2, 4, (0.038, 0.0925), (490, 84)),
-        # six seeds: the first scene takes 123 to 864 passes, the mean of four scenes 320 to 474, and FLIP 0.040 to 0.072
+        # six seeds: the first scene takes 123 to 864 passes, four in the mean 320 to 474 with a FLIP of 0.040 to 0.072
         ("objects", "fast", 4, 2, (0.055,), (369,)),
         ("relighting", "balanced", 1, 1, (0.012,), (322,)),
     ],
